@@ -287,7 +287,8 @@ Raises:
       .def(
           "feed_override", [](PyController& self, double ratio) { self.control().feed_override(ratio); },
           py::arg("ratio"),
-          "Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. From the next step on.")
+          "Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. 0 acts from "
+          "the next step on, another ratio after a period for each eight segments in sight.")
       .def(
           "hold", [](PyController& self) { self.control().hold(); }, "Come to rest along the path.")
       .def(

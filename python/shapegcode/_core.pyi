@@ -1159,7 +1159,7 @@ class MotionController:
         """
     def feed_override(self, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
-        Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. From the next step on.
+        Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. 0 acts from the next step on, another ratio after a period for each eight segments in sight.
         """
     def hold(self) -> None:
         """

@@ -61,8 +61,8 @@ struct ControllerSettings {
   /// Take back, to the second order, what smoothing and shaper cut off arcs. Costs `correction_delay()` periods and a
   /// third of every limit, which the correction may need for itself.
   bool contour_correction = false;
-  /// Segments that the look-ahead sees (8 at least), and those that may wait in all; the second is rounded up to a
-  /// power of two, and holds the window.
+  /// Segments that the look-ahead sees (8 at least; an eighth more are taken in, since those being worked out are not
+  /// seen yet), and those that may wait in all; the second is rounded up to a power of two, and holds the window.
   std::size_t window = 128;
   std::size_t queue = 1024;
 };
@@ -127,11 +127,12 @@ class MotionController {
   PushResult push(const Segment& segment, std::span<const double> following_end = {}) noexcept;
 
   /// The next set-point into `out` (axes() values), from the real-time thread: no allocation, no lock, no exception;
-  /// work bounded by the window.
+  /// the look-ahead works in portions, bounded whatever the window is.
   Activity step(std::span<double> out) noexcept;
 
   /// Ratio of the programmed feeds, 0 to 2; what is outside of that, or no number, is taken as the nearer end (no
-  /// number: as it was). Acts from the next step on.
+  /// number: as it was). 0 acts from the next step on, another ratio when the path in sight has been planned with it:
+  /// after a period for each eight segments of it, and as many again where the ratio before is still being worked out.
   void feed_override(double ratio) noexcept;
   /// Come to rest along the path; resume() goes on.
   void hold() noexcept;

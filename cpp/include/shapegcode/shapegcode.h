@@ -183,7 +183,8 @@ shapegcode_status shapegcode_controller_push_arc(shapegcode_controller* controll
 shapegcode_status shapegcode_controller_step(shapegcode_controller* controller, double* set_point,
                                              shapegcode_activity* activity);
 
-/// Ratio of the programmed feeds; what is outside of 0 to 2 is taken as the nearer end. Acts from the next step on.
+/// Ratio of the programmed feeds; what is outside of 0 to 2 is taken as the nearer end. 0 acts from the next step on,
+/// another ratio after a period for each eight segments in sight.
 shapegcode_status shapegcode_controller_feed_override(shapegcode_controller* controller, double ratio);
 
 /// Come to rest along the path.

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/online_profile.hpp"
+#include "controller/segment_ring.hpp"
 #include "shapegcode/controller.hpp"
 
 namespace shapegcode {

@@ -13,12 +13,6 @@
 #include "shapegcode/controller.hpp"
 
 namespace shapegcode {
-namespace {
-
-constexpr int absorbed_per_period = 4;  // segments that a period takes from the queue
-
-}  // namespace
-
 const char* text_of(PushResult result) noexcept {
   switch (result) {
     case PushResult::accepted:
@@ -67,9 +61,8 @@ class MotionController::Implementation {
         limits_(planning_limits_of(settings, filters_)),
         jerk_periods_(jerk_periods(settings)),
         intake_(limits_, following_limits_of(settings, filters_), filters_.tolerance(), jerk_s(settings)),
-        window_(settings.window),
         ring_(std::bit_ceil(std::max(settings.queue, settings.window + 2))),
-        profile_(ring_, limits_, jerk_s(settings), settings.period_s),
+        profile_(ring_, limits_, jerk_s(settings), settings.window, settings.period_s),
         smoothing_(Fir::moving_average(jerk_periods_), 1) {
     override_.store(settings.limits.feed_override, std::memory_order_relaxed);
     restart(std::array<double, most_controller_axes>{});
@@ -89,7 +82,7 @@ class MotionController::Implementation {
     const bool stopping = hold_.load(std::memory_order_relaxed) || abort_.load(std::memory_order_relaxed);
     profile_.stop(stopping);
     profile_.override_feeds(override_.load(std::memory_order_relaxed));
-    absorb();
+    profile_.look_ahead(head_.load(std::memory_order_acquire));
     const bool settled = rest_periods_ >= settling_periods();
     const bool rested = profile_.at_rest();
     const double distance = profile_.distance();
@@ -149,16 +142,6 @@ class MotionController::Implementation {
   [[nodiscard]] const FilterTolerance& tolerance() const noexcept { return filters_.tolerance(); }
 
  private:
-  void absorb() noexcept {
-    const std::uint64_t head = head_.load(std::memory_order_acquire);
-    const auto room = [&] { return profile_.absorbed() - profile_.running() < window_; };
-    for (int taken = 0; taken < absorbed_per_period && profile_.absorbed() < head && room(); ++taken) {
-      profile_.absorb();
-    }
-    // A motion begins when there is nothing more to be seen.
-    profile_.wait(profile_.absorbed() < head && room());
-  }
-
   [[nodiscard]] int settling_periods() const noexcept { return jerk_periods_ + filters_.duration_samples(); }
 
   double smoothed_distance() noexcept {
@@ -170,10 +153,7 @@ class MotionController::Implementation {
 
   // The point of the path at a distance.
   void place(double distance) noexcept {
-    while (cursor_ < profile_.running() && cursor_ + 1 < profile_.absorbed() &&
-           distance >= ring_[cursor_ + 1].distance) {
-      ++cursor_;
-    }
+    while (cursor_ + 1 < profile_.entered() && distance >= ring_[cursor_ + 1].distance) ++cursor_;
     has_cursor_ = has_cursor_ || cursor_ < profile_.absorbed();
     if (!has_cursor_) {
       position_ = rest_;
@@ -228,7 +208,6 @@ class MotionController::Implementation {
   MotionLimits limits_;
   int jerk_periods_;
   Intake intake_;  // of the planning thread
-  std::size_t window_;
   SegmentRing ring_;
   std::atomic<std::uint64_t> head_{0};  // the next segment to be pushed
   std::atomic<std::uint64_t> tail_{0};  // the oldest one that is still needed

@@ -15,9 +15,10 @@ constexpr double longest_time_s = 32768.0;  // after which times are counted ane
 }  // namespace
 
 void OnlineProfile::restart(std::uint64_t next) noexcept {
-  absorbed_ = running_ = next;
+  plan_.restart(next);
+  running_ = next;
   state_ = State::rest;
-  stop_ = false;
+  stop_ = replanned_ = false;
   distance_ = speed_now_ = 0.0;
   recent_.reset();
 }
@@ -30,8 +31,9 @@ bool OnlineProfile::began_anew() noexcept {
 
 // What of the running segment lies beyond `offset`: with the speeds of the forward pass as the plan has them, or as
 // fast as what follows lets it be.
-OnlineProfile::Remaining OnlineProfile::remaining_beyond(double offset, bool as_planned) const noexcept {
-  const QueuedSegment& entry = (*ring_)[running_];
+OnlineProfile::Remaining OnlineProfile::remaining_beyond(double offset, bool as_planned,
+                                                         std::uint64_t version) const noexcept {
+  const SegmentPlan& entry = plan_.segment(running_, version);
   Remaining remaining;
   double begin = 0.0;
   for (std::size_t k = 0; k < entry.piece_count; ++k) {
@@ -47,19 +49,21 @@ OnlineProfile::Remaining OnlineProfile::remaining_beyond(double offset, bool as_
   }
   for (std::size_t k = remaining.count; k-- > 0;) {
     Piece& piece = remaining.pieces[k];
-    piece.start_speed = std::min(piece.start_speed, speed_beyond(piece, start_after(remaining, k)));
+    piece.start_speed = std::min(piece.start_speed, speed_beyond(piece, start_after(remaining, k, version)));
   }
   return remaining;
 }
 
-double OnlineProfile::start_after(const Remaining& remaining, std::size_t piece) const noexcept {
+double OnlineProfile::start_after(const Remaining& remaining, std::size_t piece, std::uint64_t version) const noexcept {
   if (piece + 1 < remaining.count) return remaining.pieces[piece + 1].start_speed;
-  return running_ + 1 < absorbed_ && !(*ring_)[running_].segment.stop_at_end ? (*ring_)[running_ + 1].start : 0.0;
+  const std::uint64_t end = version == plan_.version() ? absorbed() : plan_.newest() + 1;
+  if (running_ + 1 == end || (*ring_)[running_].segment.stop_at_end) return 0.0;
+  return plan_.start(running_ + 1, version);
 }
 
 void OnlineProfile::enter(std::uint64_t index) noexcept {
   running_ = index;
-  remaining_ = remaining_beyond(0.0, true);
+  remaining_ = remaining_beyond(0.0, true, plan_.version());
   piece_ = 0;
 }
 
@@ -68,7 +72,7 @@ bool OnlineProfile::may_run(double distance, double speed) noexcept {
   if (piece_ == 0) return true;
   Piece piece = remaining_.pieces[piece_ - 1];
   piece.length = std::max(piece_end_ - distance, 0.0);
-  return speed <= speed_beyond(piece, start_after(remaining_, piece_ - 1)) * (1.0 + rounding);
+  return speed <= speed_beyond(piece, start_after(remaining_, piece_ - 1, plan_.version())) * (1.0 + rounding);
 }
 
 // The phases to come begin at the last set-point's distance and speed.
@@ -80,7 +84,7 @@ void OnlineProfile::generate_anew() noexcept {
   length_ = distance_;
   speed_ = speed_now_;
   ramp_ = ramp_count_ = 0;
-  remaining_ = remaining_beyond(distance_ - (*ring_)[running_].distance, false);
+  remaining_ = remaining_beyond(distance_ - (*ring_)[running_].distance, false, plan_.version());
   piece_ = 0;
   state_ = State::running;
   slow_down_ = speed_ > remaining_.pieces[0].start_speed * (1.0 + rounding);
@@ -89,7 +93,7 @@ void OnlineProfile::generate_anew() noexcept {
 // The ramp down within a piece, as steep as its present speed lets it be.
 bool OnlineProfile::next_ramps_down(std::size_t piece) noexcept {
   const double length = remaining_.pieces[piece].length;
-  const double acceleration = acceleration_of((*ring_)[running_], speed_, remaining_.eased[piece]);
+  const double acceleration = plan_.acceleration_of((*ring_)[running_], speed_, remaining_.eased[piece]);
   const double way = speed_ * speed_ / (2.0 * acceleration);
   const double end = way < length ? 0.0 : std::sqrt(std::max(0.0, speed_ * speed_ - 2.0 * acceleration * length));
   ramp_ = 0;
@@ -101,16 +105,16 @@ bool OnlineProfile::next_ramps_down(std::size_t piece) noexcept {
 
 // Ramps of the next piece; false where the motion ends.
 bool OnlineProfile::next_ramps() noexcept {
-  const bool down = stop_ || slow_down_ || ratio_ <= 0.0;
+  const bool down = stop_ || slow_down_ || off_;
   if (down && speed_ <= 0.0) return false;
   while (piece_ == remaining_.count) {
-    if (running_ + 1 == absorbed_ || (*ring_)[running_].segment.stop_at_end) return false;
+    if (running_ + 1 == absorbed() || (*ring_)[running_].segment.stop_at_end) return false;
     enter(running_ + 1);
   }
   const Piece& piece = remaining_.pieces[piece_++];
   piece_end_ = length_ + piece.length;
   if (down) return next_ramps_down(piece_ - 1);
-  const double end = std::min(start_after(remaining_, piece_ - 1), speed_beyond(piece, speed_));
+  const double end = std::min(start_after(remaining_, piece_ - 1, plan_.version()), speed_beyond(piece, speed_));
   ramp_ = 0;
   ramp_count_ = ramps_of(piece, speed_, end, length_, ramps_);
   speed_ = end;
@@ -136,14 +140,11 @@ bool OnlineProfile::next_phase() noexcept {
   return true;
 }
 
-// A motion begins with segment running_, its distances counted anew.
+// A motion begins with segment running_, where distances are counted anew.
 void OnlineProfile::begin() noexcept {
-  for (std::uint64_t i = running_; i < absorbed_; ++i) {
-    QueuedSegment& entry = (*ring_)[i];
-    entry.distance = i == running_ ? 0.0 : (*ring_)[i - 1].distance + (*ring_)[i - 1].segment.length_mm;
-  }
   tick_ = 1;
   began_anew_ = true;
+  replanned_ = false;
   distance_ = 0.0;
   recent_.reset();
   phase_ = {};
@@ -162,9 +163,10 @@ void OnlineProfile::come_to_rest() noexcept {
       length_ >= (entry.distance + entry.segment.length_mm) * (1.0 - 8.0 * std::numeric_limits<double>::epsilon()) -
                      1e-12 * entry.segment.length_mm) {
     distance_ = entry.distance + entry.segment.length_mm;
+    // A hold may end where a segment does, within a motion.
+    const bool goes_on = running_ + 1 < absorbed() && !entry.segment.stop_at_end;
     ++running_;
-    state_ = State::rest;
-    if (running_ < absorbed_) (*ring_)[running_].forward = 0.0;
+    state_ = goes_on ? State::stopped : State::rest;
   } else {
     distance_ = length_;
     state_ = State::stopped;
@@ -175,10 +177,10 @@ void OnlineProfile::advance(bool settled) noexcept {
   ++tick_;
   recent_.add(speed_now_);
   // Not before the set-points have come to rest: they are still on their way to the corner.
-  const bool waits = !settled || waiting_ || stop_ || ratio_ <= 0.0;
-  if (state_ == State::rest && running_ < absorbed_ && !waits) begin();
+  const bool waits = !settled || waiting_ || stop_ || off_;
+  if (state_ == State::rest && running_ < absorbed() && !waits) begin();
   if ((state_ == State::running && (changed_ || (slow_down_ && may_run(distance_, speed_now_)))) ||
-      (state_ == State::stopped && !stop_ && ratio_ > 0.0)) {
+      (state_ == State::stopped && !stop_ && !off_)) {
     generate_anew();
   }
   if (state_ != State::running) {

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 #include <vector>
 
 #include "motion/speed_limits.hpp"
@@ -113,37 +112,35 @@ struct Stretch {
 /// `beside_turn`: limit beside a jump of direction.
 inline std::size_t split_segment(const ZoneSet& at_start, const ZoneSet& at_end, double length, double limit,
                                  double beside_turn, std::array<Stretch, most_pieces>& stretches) noexcept {
-  std::array<double, most_pieces + 1> marks;
-  std::size_t count = 0;
-  marks[count++] = 0.0;
-  marks[count++] = length;
+  std::array<double, most_pieces + 1> marks{0.0, length};
+  std::size_t count = 2;
+  const auto mark = [&](double at) {  // in their order
+    std::size_t k = count++;
+    for (; marks[k - 1] > at; --k) marks[k] = marks[k - 1];
+    marks[k] = at;
+  };
   for (std::size_t kind = 0; kind < zone_kinds; ++kind) {
-    if (at_start[kind].reach > 0.0) {
-      marks[count++] = std::min(at_start[kind].reach, length);
-    }
-    if (at_end[kind].reach > 0.0) {
-      marks[count++] = std::max(length - at_end[kind].reach, 0.0);
-    }
+    const double from_start = at_start[kind].reach;
+    const double from_end = at_end[kind].reach;
+    if (from_start > 0.0 && from_start < length) mark(from_start);
+    if (from_end > 0.0 && from_end < length) mark(length - from_end);
   }
-  std::sort(marks.begin(), marks.begin() + count);
+  const auto keep = [&](Stretch& stretch, std::size_t kind, double of_zone) {
+    if (kind == jump_zone) {
+      stretch.eased = true;
+      if (of_zone == static_cast<double>(Jump::turn)) stretch.limit = std::min(stretch.limit, beside_turn);
+    } else {
+      stretch.limit = std::min(stretch.limit, of_zone);
+    }
+  };
   std::size_t made = 0;
   for (std::size_t k = 0; k + 1 < count; ++k) {
-    if (marks[k + 1] <= marks[k]) {
-      continue;
-    }
+    if (marks[k + 1] <= marks[k]) continue;
     const double middle = 0.5 * (marks[k] + marks[k + 1]);
     Stretch stretch{marks[k + 1] - marks[k], limit, false};
     for (std::size_t kind = 0; kind < zone_kinds; ++kind) {
-      for (const auto& [zone, is_in] : {std::pair{at_start[kind], middle < at_start[kind].reach},
-                                        std::pair{at_end[kind], middle > length - at_end[kind].reach}}) {
-        if (!is_in) continue;
-        if (kind == jump_zone) {
-          stretch.eased = true;
-          if (zone.limit == static_cast<double>(Jump::turn)) stretch.limit = std::min(stretch.limit, beside_turn);
-        } else {
-          stretch.limit = std::min(stretch.limit, zone.limit);
-        }
-      }
+      if (middle < at_start[kind].reach) keep(stretch, kind, at_start[kind].limit);
+      if (middle > length - at_end[kind].reach) keep(stretch, kind, at_end[kind].limit);
     }
     stretches[made++] = stretch;
   }
