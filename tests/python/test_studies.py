@@ -291,9 +291,17 @@ def test_the_command_draws_and_writes_its_page(tmp_path: Path) -> None:
         ("[0.0, 0.008]", "[]", "= []: must have 1 or more values"),
         ("[vary]", 'measure = ["shake_um"]\n[vary]', 'measure = "shake_um": must be one of residual_um'),
         ("median = 0.02, ", "", "give mean and sd (or percent)"),
+        ("{ mean = 46.0, sd = 2.0 }", "{ triangular = [45.0] }", "frequency_hz\": triangular: no such key here"),
+        ("{ mean = 46.0, sd = 2.0 }", "{ triangular = [45.0, 47.0] }", ": triangular: no such key here: give mean and"),
+        ("{ mean = 46.0, sd = 2.0 }", "46.0", "frequency_hz\" = 46.0: must be a list or a table: give mean and sd"),
+        ("{ mean = 46.0, sd = 2.0 }", "{ mean = nan, sd = 2.0 }", "mean = nan: must be a finite number"),
+        ("axes.y.modes.1.damping_ratio", "axes.x.modes.1.frequency_hz", "given twice, in quotes and without"),
+        ("n = 40", "n = 100000000", "STUDY.toml:3: n = 100000000: must be 1000000 or less"),
+        ("[0.0, 0.008]", "[0.0, 0.008]\ncontroller.block_time_s = [0.004, 0.02]\nemission.block_period_s = [0.005]",
+         "emission.block_period_s = 0.005: must not be below controller.block_time_s = 0.02"),
         ("part.nc", "nothing.nc", "no such file"),
     ],
-)
+)  # fmt: skip
 def test_bad_files_name_key_value_and_limit(tmp_path: Path, old: str, new: str, said: str) -> None:
     done = run(written(tmp_path, STUDY.replace(old, new)), "study", "STUDY.toml", "--csv", "s.csv")
     assert done.returncode == 2
@@ -448,6 +456,19 @@ def test_bad_arguments_name_key_value_and_limit() -> None:
         ask({X_HZ: [45.0]}, sampling="monte carlo")
     with pytest.raises(MachineError, match=r"axes\.x\.mode: no such key"):
         ask({"axes.x.mode": [45.0]})
+    for keys in ([X_HZ], {1: [45.0]}):
+        with pytest.raises(ArgumentError, match=r"vary = .*: must go by keys of the machine file"):
+            ask(keys)
+    with pytest.raises(ArgumentError, match=r"n = 1000000000000: .* at most 1000000"):
+        ask({X_HZ: [45.0]}, n=10**12)
+    with pytest.raises(ArgumentError, match="seed = -1: must be a whole number, 0 or more"):
+        ask({X_HZ: [45.0]}, seed=-1)
+    with pytest.raises(ArgumentError, match="at_least = nan: must be a probability"):
+        ask({X_HZ: [45.0]}, at_least=math.nan)
+    with pytest.raises(ArgumentError, match="'zv': must be a list of values"):
+        sg.listed("zv")
+    with pytest.raises(ArgumentError, match="percent = 5: must be of a mean that is not 0: give sd"):
+        sg.normal(0, percent=5)
     with pytest.raises(ArgumentError, match="mean = nan: must be a finite number"):
         sg.normal(math.nan, 1)
     with pytest.raises(ArgumentError, match="high = 2: must be above low = 3"):
@@ -528,6 +549,10 @@ def test_more_choices_than_conversions_are_searched() -> None:
         ask(probability=1.5)
     with pytest.raises(ArgumentError, match="most = 0: must be a whole number of conversions, 1 or more"):
         ask(most=0)
+    with pytest.raises(ArgumentError, match="most = '3': must be a whole number of conversions"):
+        ask(most="3")
+    with pytest.raises(ArgumentError, match=r"choose = \['zv'\]: must go by keys of the machine file"):
+        ask(choose=["zv"])
     with pytest.raises(ArgumentError, match="must be a list of one value or more"):
         ask(choose={"shaping.family": []})
     with pytest.raises(MachineError, match=r"shaping\.family = \"soft\": must be"):

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
+from shapegcode.studies.varied import check_keys
 
 __all__ = ["Choices", "checked_choices", "search", "usual_choices"]
 
@@ -61,6 +62,7 @@ def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
     """
     if not choices:
         raise ArgumentError("choose: nothing to choose: give a list of values for one key or more")
+    check_keys("choose", choices)
     for key, values in choices.items():
         if isinstance(values, str) or not isinstance(values, Sequence) or not values:
             raise ArgumentError(f"choose: {key} = {values!r}: must be a list of one value or more")
@@ -80,12 +82,7 @@ def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float
 
     Yields:
         Ranks of the values of each key, each combination once.
-
-    Raises:
-        ArgumentError: fewer than one conversion.
     """
-    if isinstance(most, bool) or not isinstance(most, int) or most < 1:
-        raise ArgumentError(f"most = {most!r}: must be a whole number of conversions, 1 or more")
     sizes = [len(values) for values in choices.values()]
     if math.prod(sizes) <= most:
         yield from itertools.product(*(range(size) for size in sizes))

@@ -208,8 +208,10 @@ def listed(values: Sequence[object], *, known: bool | None = None) -> Listed:
         The distribution.
 
     Raises:
-        ArgumentError: there are none.
+        ArgumentError: no list, or an empty one.
     """
+    if isinstance(values, str) or not isinstance(values, Sequence):
+        raise ArgumentError(f"{values!r}: must be a list of values")
     if not values:
         raise ArgumentError("a list of values is empty: give two or more")
     return Listed(tuple(values), known=known)
@@ -227,4 +229,6 @@ def _spread(sd: float | None, percent: float | None, whole: float) -> float:
     name, given = ("sd", sd) if percent is None else ("percent", percent)
     if _number(name, given) <= 0.0:
         raise ArgumentError(f"{name} = {given:g}: must be > 0")
+    if percent is not None and whole == 0.0:
+        raise ArgumentError(f"percent = {percent:g}: must be of a mean that is not 0: give sd")
     return _number(name, given) * (1.0 if percent is None else whole / 100.0)

@@ -81,6 +81,8 @@ def optimize(
         OSError: its file cannot be read.
     """
     check_probability("probability", probability)
+    if isinstance(most, bool) or not isinstance(most, int) or most < 1:
+        raise ArgumentError(f"most = {most!r}: must be a whole number of conversions, 1 or more")
     varied = varied_values(machine, vary)
     choices = checked_choices(usual_choices(machine) if choose is None else choose, [each.key for each in varied])
     for each in varied:

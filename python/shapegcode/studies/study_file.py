@@ -17,15 +17,25 @@ shaping.family = ["zv", "zvd", "ei"]
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_origin
 
 from pydantic import BeforeValidator, ConfigDict, Field, Strict, model_validator
 
-from shapegcode.errors import ArgumentError, FileError
+from shapegcode.errors import ArgumentError, FileError, Problem
 from shapegcode.machine import Machine
-from shapegcode.settings.keys import Bool, Float, InlineTable, Positive, Text, TomlTable, key
+from shapegcode.settings.keys import (
+    Bool,
+    Float,
+    InlineTable,
+    Positive,
+    Text,
+    TomlTable,
+    item_type,
+    key,
+    table_type,
+)
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem
 from shapegcode.settings.schema import keys_schema, toml_schema
@@ -48,7 +58,13 @@ class StudyFileError(FileError):
 
 def _as_table(value: object) -> object:
     """A list of choices as what it stands for."""
-    return {"one_of": value} if isinstance(value, list) else value
+    if isinstance(value, list):
+        return {"one_of": value}
+    if not isinstance(value, dict):
+        raise ValueError(f"must be a list or a table: {_GIVE}")
+    if unknown := sorted(value.keys() - DrawnValue.model_fields):
+        raise ValueError(f"{', '.join(unknown)}: no such key here: {_GIVE}")
+    return value
 
 
 class DrawnValue(InlineTable):
@@ -104,14 +120,42 @@ class DrawnValue(InlineTable):
 _LEAVES = frozenset(DrawnValue.model_fields)
 
 
-def _flat(value: Mapping[str, object], prefix: str = "") -> dict[str, object]:
-    """Tables below tables as dotted keys; a table with the keys of `DrawnValue` is a value."""
-    found: dict[str, object] = {}
-    for name, entry in value.items():
-        if isinstance(entry, dict) and entry and not entry.keys() & _LEAVES:
-            found |= _flat(entry, f"{prefix}{name}.")
+def _flat(given: Mapping[str, object], above: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
+    """Tables below tables as dotted keys; what stands for a value of the machine file stays whole."""
+    for name, entry in given.items():
+        parts = (*above, *name.split("."))
+        if isinstance(entry, dict) and entry and not entry.keys() & _LEAVES and not _is_value(parts):
+            yield from _flat(entry, parts)
         else:
-            found[f"{prefix}{name}"] = entry
+            yield ".".join((*above, name)), entry
+
+
+def _is_value(parts: Sequence[str]) -> bool:
+    """Whether these are the parts of a key of the machine file that holds no table."""
+    table: type[TomlTable] | None = Machine
+    field = None
+    for part in parts:
+        if table is None:
+            return False
+        if field is not None and item_type(field) is not None and part.isdigit():
+            field = None
+            continue
+        field = table.model_fields.get(part)
+        if field is None:
+            return False
+        below = table_type(field)
+        if below is None and get_origin(field.annotation) is dict:
+            return False
+        table = below
+    return table is None
+
+
+def _flattened(data: dict[str, Any], table: str, path: str) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for name, entry in _flat(data[table]):
+        if name in found:
+            raise StudyFileError(path, (Problem(f"{table}.{name}", "", "given twice, in quotes and without"),))
+        found[name] = entry
     return found
 
 
@@ -203,7 +247,7 @@ def load_study(path: str | Path) -> StudyFile:
     data = parsed(text, str(path), StudyFileError)
     for table in ("vary", "choose"):
         if isinstance(data.get(table), dict):
-            data[table] = _flat(data[table])
+            data[table] = _flattened(data, table, str(path))
     # In quotes, as they are said in messages, so that these find their lines.
     quoted = _DOTTED.sub(r'\1"\2"\3', text)
     found = validated(StudyFile, data, str(path), quoted, StudyFileError)

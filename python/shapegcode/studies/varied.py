@@ -15,7 +15,7 @@ from shapegcode.machine import Machine
 from shapegcode.settings.change import missing_row
 from shapegcode.studies.distributions import Distribution, listed
 
-__all__ = ["Varied", "Vary", "drawn_machine", "varied_values"]
+__all__ = ["Varied", "Vary", "check_keys", "drawn_machine", "varied_values"]
 
 Vary = Mapping[str, Distribution | Sequence[object]]
 """What each key is drawn from."""
@@ -58,6 +58,21 @@ class Varied:
         return not _SWINGS.fullmatch(self.key)
 
 
+def check_keys(name: str, given: object) -> None:
+    """Refuse what does not go by keys of the machine file.
+
+    Args:
+        name: of the argument.
+        given: for it.
+
+    Raises:
+        ArgumentError: with both.
+    """
+    if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
+        said = f"{name} = {given!r}: must go by keys of the machine file"
+        raise ArgumentError(f'{said}, such as {{"axes.x.modes.1.frequency_hz": ...}}')
+
+
 def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
     """What is varied, checked against the keys that there are.
 
@@ -75,6 +90,7 @@ def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
     """
     if not vary:
         raise ArgumentError("vary: nothing is varied: name at least one key of the machine file")
+    check_keys("vary", vary)
     held = {value.key: value for value in machine.values()}
     found = []
     for key, given in vary.items():
