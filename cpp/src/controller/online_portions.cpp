@@ -88,7 +88,7 @@ void OnlinePlan::visit() noexcept {
       if (next_++ >= newest_) absorb(first_, 1);
       return;
     case Stage::zones:
-      left_ -= 2;
+      left_ -= next_ >= absorbed_ ? first_visit : 2;
       return visit_zones();
     case Stage::pieces:
       left_ -= 5;
