@@ -68,7 +68,9 @@ def _place(file: Path, book: Path) -> Path:
     if name in HOUSE:
         return book / "house" / HOUSE[name]
     copy = book / "files" / name
-    if file.is_file():
+    if file.suffix == ".md":  # a page of its own, which stands in no table of contents
+        write(copy, f"---\norphan: true\n---\n\n{relinked(file.read_text('utf-8'), file, copy, book)}")
+    elif file.is_file():
         write(copy, file.read_bytes())
     return copy
 
