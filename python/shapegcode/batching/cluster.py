@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.batching.process import begin_host
 from shapegcode.errors import ArgumentError
 from shapegcode.results.made import this_version
 
@@ -24,13 +25,14 @@ _WAIT_S = 30
 
 @contextlib.contextmanager
 def cluster_executor(
-    scheduler: str, *, processes: int, tls_ca: str = "", tls_cert: str = "", tls_key: str = ""
+    scheduler: str, *, processes: int, command: str = "", tls_ca: str = "", tls_cert: str = "", tls_key: str = ""
 ) -> Iterator[tuple[Executor, int]]:
     """An executor of a Dask cluster, whose workers were found to have this version of shapegcode.
 
     Args:
         scheduler: its address, such as ``tcp://host:8786``; "local": a cluster of this machine, as long as this lasts.
         processes: workers of a local cluster.
+        command: of the jobs; the workers load it while the first is packed; empty: they are no commands.
         tls_ca: certificate of the authority, as Dask takes it; likewise the next two.
         tls_cert: of this client.
         tls_key: of this client.
@@ -65,6 +67,8 @@ def cluster_executor(
         except (OSError, ValueError, TypeError) as error:
             raise ArgumentError(f"--scheduler {scheduler}: no scheduler answers there ({error})") from None
         slots = _checked_slots(client, scheduler)
+        if command:
+            client.run(begin_host, command)
         executor = client.get_executor(pure=False, retries=_RETRIES)
         try:
             yield executor, slots

@@ -21,7 +21,17 @@ from typing import Any
 from shapegcode.batching.job import FAILED_CODES, Ending, JobOutcome, Packed
 from shapegcode.results.made import this_version
 
-__all__ = ["Hosts", "run_packed"]
+__all__ = ["Hosts", "begin_host", "run_packed"]
+
+
+_ENVIRONMENT = {
+    "OPENBLAS_NUM_THREADS": "1",  # other runs have the other cores
+    "LD_BIND_NOW": "1",  # functions are linked once, not in each run anew
+    # Memory that is returned comes back page by page: what glibc would find out in a long run stands from the start.
+    "MALLOC_ARENA_MAX": "1",
+    "MALLOC_MMAP_THRESHOLD_": "33554432",
+    "MALLOC_TRIM_THRESHOLD_": "67108864",
+}
 
 
 class _Host:
@@ -32,6 +42,7 @@ class _Host:
             [sys.executable, "-m", "shapegcode.cli.host", command],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            env={**_ENVIRONMENT, **os.environ},
             # Ctrl-C of a terminal is for the batch alone, which ends its hosts itself.
             start_new_session=True,
         )
@@ -48,8 +59,10 @@ class _Host:
             return None
         return json.loads(line) if line.endswith(b"\n") else None
 
-    def end(self) -> None:
-        """End it, and the job that it runs."""
+    def end(self, *, at_once: bool = False) -> None:
+        """End it, and the job that it runs; at once if it runs none."""
+        if at_once:
+            self._process.kill()
         # It ends its job when its input ends.
         with contextlib.suppress(OSError, ValueError):
             if self._process.stdin is not None:
@@ -71,7 +84,17 @@ class Hosts:
         self._own = threading.local()
         self._lock = threading.Lock()
         self._all: set[_Host] = set()
+        self._ready: dict[str, _Host] = {}
         self._ended = False
+
+    def begin(self, command: str) -> None:
+        """Have one load while its first job is still looked for.
+
+        Args:
+            command: of the jobs.
+        """
+        host = self._ready[command] = _Host(command)
+        self._all.add(host)
 
     def run(self, packed: Packed) -> JobOutcome:
         """Run a job in a process of its own, in a folder that is gone afterwards.
@@ -100,7 +123,7 @@ class Hosts:
             hosts = list(self._all)
             self._all.clear()
         for host in hosts:
-            host.end()
+            host.end(at_once=host in self._ready.values())
 
     def _host(self, command: str) -> _Host | None:
         """That of this thread; None: there shall be none any more."""
@@ -109,7 +132,7 @@ class Hosts:
             if self._ended:
                 return None
             if host is None or host not in self._all:
-                host = self._own.host = _Host(command)
+                host = self._own.host = self._ready.pop(command, None) or _Host(command)
                 self._all.add(host)
             return host
 
@@ -148,6 +171,15 @@ class Hosts:
 
 
 _of_worker = Hosts()
+
+
+def begin_host(command: str) -> None:
+    """Have a Dask worker load what its first run needs.
+
+    Args:
+        command: of the runs.
+    """
+    _of_worker.begin(command)
 
 
 def run_packed(packed: Packed) -> JobOutcome:
