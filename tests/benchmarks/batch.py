@@ -1,9 +1,11 @@
-"""What a batch costs beside the conversions: `python tests/benchmarks/batch.py [--repeat N] [--growth]`.
+"""What a batch costs beside the conversions: `python tests/benchmarks/batch.py [--repeat N] [--each] [--growth]`.
 
 200 programs of several sizes (random polygons of 5 to 600 moves, four samples among them) are converted four ways in
 turn: one after the other within one process (the conversions themselves, with JSON as a batch writes it), as a batch
-with one process, with two, and on a Dask cluster of this machine with two workers. `--growth` checks 100, 1 000 and
-10 000 small programs and tells the client's memory.
+with one process, with two, and on a Dask cluster of this machine with two workers. `--each` does instead one program
+after the other in three ways in turn, so that other work on the machine meets all of them: within a process that has
+converted before, in a process forked for it and nothing else, and as a run of a batch. `--growth` checks 100, 1 000
+and 10 000 small programs instead and tells the client's memory.
 """
 
 from __future__ import annotations
@@ -14,15 +16,21 @@ import os
 import random
 import resource
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from processes import ROOT, launched
 from table import Sample
+
+from shapegcode.batching.inputs import find_programs
+from shapegcode.batching.job import Base, pack
+from shapegcode.batching.plan import plan
+from shapegcode.batching.process import Hosts
 
 COMMAND = Path(sys.executable).with_name("shapegcode")
 SAMPLES = ("TEST_G90.NC", "G83.NC", "VINT_360arc.NC", "helical_bore.nc")
@@ -39,6 +47,26 @@ with open(os.devnull, "w") as nothing, contextlib.redirect_stdout(nothing):
         main(["convert", "parts/" + name, "-m", "vx500", "-o", "loop/" + name, "--json", f"loop/{name}.json", "-q"])
     spent = time.perf_counter() - begin
 print(spent)
+"""
+
+
+ASKED = """
+import json, os, sys, time
+from shapegcode.cli import main
+told = os.fdopen(os.dup(1), "w")
+os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+for rank, line in enumerate(sys.stdin):
+    words = json.loads(line)
+    begin = time.perf_counter()
+    if rank and sys.argv[1] == "forked":
+        pid = os.fork()
+        if not pid:
+            main(words)
+            os._exit(0)
+        os.waitpid(pid, 0)
+    else:
+        main(words)
+    print(time.perf_counter() - begin, file=told, flush=True)
 """
 
 
@@ -117,6 +145,60 @@ def compare(folder: Path, count: int, repeat: int) -> None:
     print(f"Dask / pool, two each: {dask / two}")
 
 
+class Asked:
+    """A process that converts what it is told, with one thread as in a batch: itself, or forked off it."""
+
+    def __init__(self, how: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", ASKED, how], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+            env={**os.environ, "SHAPEGCODE_THREADS": "1"},
+        )  # fmt: skip
+
+    def __call__(self, words: Sequence[str]) -> float:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        print(json.dumps(words), file=self._process.stdin, flush=True)
+        return float(self._process.stdout.readline())
+
+    def end(self) -> None:
+        self._process.communicate()
+
+
+def each(folder: Path, count: int, repeat: int) -> None:
+    """Program by program, the least of its repetitions each."""
+    make(folder, count, SIZES)
+    os.chdir(folder)
+    Path("scratch").mkdir()
+    Path("out").mkdir()
+    planned = plan(find_programs(["parts"], "out"), ["vx500"], "out", "convert", [], None, Base(str(folder)))
+    within, forked, hosts = Asked("within"), Asked("forked"), Hosts()
+    # What is converted first, within the process, sets up what the others find.
+    for ask in (within, forked):
+        ask(planned.job(0).words)
+    found: dict[str, list[list[float]]] = {"within": [], "forked": [], "batch": []}
+    for rank in range(len(planned)):
+        job = planned.job(rank)
+        for times in found.values():
+            times.append([])
+        for _ in range(repeat):
+            found["within"][-1].append(within(job.words))
+            found["forked"][-1].append(forked(job.words))
+            begin = time.perf_counter()
+            hosts.run(pack(job, planned.files(rank), seconds=3600.0, scratch="scratch"))
+            found["batch"][-1].append(time.perf_counter() - begin)
+    hosts.end()
+    within.end()
+    forked.end()
+    least = {name: [1e3 * min(times) for times in programs] for name, programs in found.items()}
+    print(f"{count} programs in turn, mean of the least of {repeat} of each, ms")
+    for name, values in least.items():
+        print(f"| {name} | {statistics.mean(values):.1f} |")
+    for name in ("within", "forked"):
+        over = [a - b for a, b in zip(least["batch"], least[name], strict=True)]
+        quartiles = ", ".join(f"{each:.1f}" for each in statistics.quantiles(over, n=4))
+        print(f"a run of a batch over {name}: mean {statistics.mean(over):.1f}, quartiles {quartiles}")
+
+
 def growth(folder: Path) -> None:
     """Time per program and the client's memory for ten and a hundred times as many."""
     print("\n| programs | time per program | client's largest memory |\n|--:|--:|--:|")
@@ -138,12 +220,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeat", type=int, default=3, help="how often each way (default: %(default)d)")
     parser.add_argument("--count", type=int, default=200, help="programs (default: %(default)d)")
-    parser.add_argument("--growth", action="store_true", help="100, 1 000 and 10 000 programs as well")
+    parser.add_argument("--each", action="store_true", help="program by program in turn instead")
+    parser.add_argument("--growth", action="store_true", help="100, 1 000 and 10 000 programs instead")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        compare(Path(name), given.count, given.repeat)
-        if given.growth:
+        if given.each:
+            each(Path(name), given.count, given.repeat)
+        elif given.growth:
             growth(Path(name))
+        else:
+            compare(Path(name), given.count, given.repeat)
     print(f"\nlargest memory of a process: {resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024:.0f} MB")
 
 

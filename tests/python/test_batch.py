@@ -9,6 +9,7 @@ import signal
 import subprocess
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import shapegcode as sg
 from command import COMMAND, run
 from shapegcode.batching import runs as batching
 from shapegcode.batching.inputs import called_files, find_programs
+from shapegcode.results.json import plain
 
 HEAD = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\n"
 TAIL = "G0 Z5.\nM30\n%\n"
@@ -145,6 +147,75 @@ def test_an_older_result_of_another_name_goes(folder: Path) -> None:
         assert not (folder / "out/a.nc").exists()
 
 
+def test_resume_from_another_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is done stays done, what is missing gets the bytes of the first folder, and rows are named from here."""
+    (folder / "mine.toml").write_bytes(sg.Machine.builtin_text("vx500").encode())
+    told(folder, "parts", "-m", "mine.toml", "-o", "out", "--html", "pages", "--command", "time")
+    whole = contents(folder / "out", folder / "pages")
+    (folder / "out/a.nc.json").unlink()
+    (folder / "pages/caller.nc.html").unlink()
+    (folder / "elsewhere").mkdir()
+    monkeypatch.chdir(folder / "elsewhere")
+    words = ["../parts", "-m", "../mine.toml", "-o", str(folder / "out"), "--html", "../pages", "--command", "time"]
+    report = told(folder / "elsewhere", *words, "--resume")
+    assert contents(folder / "out", folder / "pages") == whole
+    assert fresh(report) == ["../parts/a.nc", "../parts/caller.nc"]
+    for row in report["rows"]:
+        assert row["report"] == ("" if row["ended"] == "refused" else row["program"].replace("parts", "out") + ".json")
+        assert not row["report"] or Path(row["report"]).exists()
+    assert {file.name for file in Path.cwd().iterdir()} == {"batch.json"}
+
+
+def test_what_pages_share_stays(folder: Path) -> None:
+    """The script beside them, when a program with a page is refused later."""
+    words = ["parts/a.nc", "parts/caller.nc", *ONE, "--html", "pages", "--command", "time", "--resume"]
+    told(folder, *words, code=0)
+    (script,) = (folder / "pages").glob("plotly-*.js")
+    (folder / "parts/a.nc").write_text(BAD)
+    assert fresh(told(folder, *words)) == ["parts/a.nc"]
+    assert script.exists()
+    assert not (folder / "pages/a.nc.html").exists()
+
+
+def test_files_that_cannot_be_read_or_written_are_rows(folder: Path) -> None:
+    """A link that leads nowhere, a name too long, a file where a folder should be; a pipe is no program."""
+    (folder / "parts/link.nc").symlink_to("nowhere.nc")
+    (folder / "parts" / f"{'n' * 250}.nc").write_text(part(7))
+    os.mkfifo(folder / "parts/pipe.nc")
+    (folder / "out").mkdir()
+    (folder / "out/deep").write_text("mine")
+    ended = {row["program"]: row for row in told(folder, "parts", *ONE, "--command", "time")["rows"]}
+    assert len(ended) == 6
+    assert ended["parts/a.nc"]["ended"] == "ok"
+    assert ended["parts/link.nc"]["said"] == "parts/link.nc: No such file or directory"
+    assert ended["parts/deep/a.nc"]["said"] == "out/deep: File exists"
+    assert ended[f"parts/{'n' * 250}.nc"]["said"].endswith("File name too long")
+    assert (folder / "out/deep").read_text() == "mine"
+
+
+def test_rows_from_python(folder: Path) -> None:
+    """They stand in the manifest: the same as a list, in JSON, in pandas, and after a later batch."""
+    found = sg.batch(["parts"], ["vx500"], "out", command="time", jobs=1)
+    rows = list(found.rows)
+    assert [row.program for row in found.rows[1:3]] == ["parts/bad.nc", "parts/caller.nc"]
+    assert found.rows[-1] == rows[-1]
+    assert found.to_dict()["rows"] == list(found.to_json()["rows"]) == [plain(row) for row in rows]
+    assert list(found.to_pandas("rows")["program"]) == [row.program for row in rows]
+    (folder / "parts/a.nc").write_text(BAD)
+    later = sg.batch(["parts"], ["vx500"], "out", command="time", jobs=1)
+    assert list(found.rows) == rows
+    assert later.counts["refused"] == 2
+
+
+def test_the_index_lists_more_than_the_terminal(folder: Path) -> None:
+    """Of many programs each has its link."""
+    found = sg.batch(["parts/a.nc"], ["vx500"], "out", command="time", jobs=1)
+    many = replace(found, rows=(replace(found.rows[0], page="pages/a.nc.html"),) * 30)
+    assert (len(many.tables()[0].rows), many.tables()[0].caption) == (20, f"and 10 more: {found.summary}")
+    (table,) = replace(many, html="pages").tables()
+    assert (len(table.rows), table.caption) == (30, "")
+
+
 def test_a_run_that_takes_too_long_ends_alone(folder: Path) -> None:
     """Time and memory; --resume does them again with other limits."""
     (folder / "parts/long.nc").write_text(HEAD + "".join(f"X{k % 100}. Y{k % 7}.\n" for k in range(200_000)) + TAIL)
@@ -250,6 +321,11 @@ def test_one_batch_at_a_time(folder: Path) -> None:
         (("lib", *ONE), "lib: no program in it; programs end in .nc"),
         (("parts/a.nc", "parts/deep/a.nc", *ONE), "would both be written to a.nc"),
         (("@empty.txt", *ONE), "empty.txt: the list names no program"),
+        (("@gone.txt", *ONE), "gone.txt:3: gone.nc: no such file, folder or match"),
+        (("@nested.txt", *ONE), "nested.txt:1: @gone.txt: a list names no lists"),
+        (("@bytes.txt", *ONE), "bytes.txt: no list of programs: it is no text"),
+        (("parts/d*", *ONE), "parts/d*: no such file, folder or match"),
+        (("only", *ONE), "only/O5: a subprogram (M99)"),
         (("parts", "-m", "mine.toml", "-o", "out"), "mine.toml: no such file"),
         (("parts", "-m", "vx500", "-m", "vx500", "-o", "out"), "two machines would be written to out/vx500"),
         (("parts", *ONE, "--", "--shaper", "none"), "--shaper"),
@@ -268,6 +344,11 @@ def test_what_cannot_be_started(
     (folder / "full").mkdir()
     (folder / "full/batch.jsonl").write_text("{}\n")
     (folder / "empty.txt").write_text("# none yet\n\n")
+    (folder / "gone.txt").write_text("parts/a.nc\n\ngone.nc # it was\n")
+    (folder / "nested.txt").write_text("@gone.txt\n")
+    (folder / "bytes.txt").write_bytes(b"\xff\xfe")
+    (folder / "only").mkdir()
+    (folder / "only/O5").write_text("O5\nM99\n")
     done = run(folder, "batch", *words)
     assert done.returncode == 2
     assert said in done.stderr

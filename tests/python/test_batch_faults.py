@@ -42,8 +42,11 @@ def whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
 
 
 def started() -> subprocess.Popen[bytes]:
-    """A batch as a process of its own."""
-    return subprocess.Popen([COMMAND, *WORDS], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    """A batch as a process of its own, whose first host has begun to load."""
+    client = subprocess.Popen([COMMAND, *WORDS], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not hosts(client.pid) and client.poll() is None:
+        time.sleep(0.02)
+    return client
 
 
 def hosts(client: int) -> list[int]:
@@ -78,7 +81,7 @@ def test_killed_workers(tmp_path: Path, whole: dict[str, bytes]) -> None:
     hit = 0
     for rank in range(TIMES):
         client = started()
-        time.sleep(draw.uniform(0.4, 1.6))
+        time.sleep(draw.uniform(0.0, 1.6))
         victims = hosts(client.pid)
         if rank % 2:
             victims = [child for host in victims for child in children(host)] or victims
@@ -96,7 +99,7 @@ def test_killed_client(tmp_path: Path, whole: dict[str, bytes]) -> None:
     draw = random.Random(11)
     for _ in range(TIMES):
         client = started()
-        time.sleep(draw.uniform(0.4, 1.6))
+        time.sleep(draw.uniform(0.0, 1.6))
         left = hosts(client.pid)
         client.kill()
         client.wait()

@@ -14,15 +14,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shapegcode.batching.inputs import find_programs
-from shapegcode.batching.job import pack
-from shapegcode.batching.manifest import Manifest
+from shapegcode.batching.job import Base, pack
+from shapegcode.batching.manifest import Manifest, begun_in
 from shapegcode.batching.plan import COMMANDS, plan
 from shapegcode.batching.process import Hosts, run_packed
 from shapegcode.batching.result import Batch
+from shapegcode.batching.row import KeptRows
 from shapegcode.batching.runs import OnBatch, Runs
 from shapegcode.batching.summary import summary_lines
 from shapegcode.errors import ArgumentError
-from shapegcode.io.atomic import is_temporary, write_text
+from shapegcode.io.atomic import is_temporary, write_lines
 
 __all__ = ["Cluster", "batch"]
 
@@ -96,36 +97,42 @@ def batch(
     if jobs < 0 or not time_limit_s >= 0.0 or memory_limit_bytes < 0:
         raise ArgumentError(f"jobs {jobs}, time limit {time_limit_s}, memory limit {memory_limit_bytes}: not below 0")
     begin = time.monotonic()
-    sources = find_programs([str(each) for each in programs], output)
-    called = [source.path for source in sources if source.subprogram]
-    sources = tuple(source for source in sources if not source.subprogram)
-    planned = plan(sources, [str(each) for each in machines], str(output), command, options, html)
+    folders = [Path(output), *([Path(html)] if html is not None else [])]
     processes = jobs or os.cpu_count() or 1
     with contextlib.ExitStack() as stack:
+        hosts = Hosts()
+        stack.callback(hosts.end)
+        if cluster is None:
+            hosts.begin(command)  # loads while programs are looked for
+        sources = find_programs([str(each) for each in programs], output)
+        called = [source.path for source in sources if source.subprogram]
+        sources = tuple(source for source in sources if not source.subprogram)
+        if not sources:
+            raise ArgumentError(f"{called[0]}: a subprogram (M99), as all that were named: name what calls them")
+        base = Base(begun_in(output) if resume else os.getcwd())
+        planned = plan(sources, [str(each) for each in machines], str(output), command, options, html, base)
         # A scheduler that does not answer is found before anything is written; processes of this machine end before
         # the folder goes that they work in.
-        remote = None if cluster is None else stack.enter_context(_remote_executor(processes, cluster))
-        manifest = Manifest(Path(output), resume=resume)
+        remote = None if cluster is None else stack.enter_context(_remote_executor(command, processes, cluster))
+        manifest = Manifest(Path(output), resume=resume, base=base.folder)
         stack.callback(manifest.close)
         if html is not None:
             Path(html).mkdir(parents=True, exist_ok=True)
         scratch = Path(output) / _SCRATCH
-        _sweep(scratch, [Path(output), *([Path(html)] if html else [])])
+        _sweep(scratch, folders)
         scratch.mkdir()
         stack.callback(shutil.rmtree, scratch, ignore_errors=True)
-        hosts = Hosts()
         executor, slots = remote or stack.enter_context(_local_executor(processes, hosts))
         prepare = functools.partial(
-            pack, seconds=time_limit_s, memory_bytes=memory_limit_bytes, scratch="" if cluster else str(scratch),
-            kept=planned.shared,
-        )  # fmt: skip
-        run = Runs(planned.jobs, manifest, [Path(output), *([Path(html)] if html else [])], resume, on_progress)
+            pack, seconds=time_limit_s, memory_bytes=memory_limit_bytes, scratch="" if cluster else str(scratch)
+        )
+        run = Runs(planned, manifest, folders, resume, on_progress)
         stopped = run.all(executor, slots, prepare, run_packed if cluster else hosts.run)
-    rows = tuple(run.rows[job.key] for job in planned.jobs if job.key in run.rows)
+    rows = KeptRows(manifest.path, planned, run.places, run.earlier)
     summary = Path(output) / _SUMMARY
-    write_text(summary, "".join(summary_lines(rows)))
+    write_lines(summary, summary_lines(rows))
     return Batch(
-        command, str(output), rows, str(summary), len(planned.jobs) - len(rows), stopped,
+        command, str(output), rows, str(summary), len(planned) - len(rows), stopped,
         _warnings(stopped, called), time.monotonic() - begin, slots,
     )  # fmt: skip
 
@@ -147,11 +154,11 @@ def _warnings(stopped: str, called: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _remote_executor(processes: int, cluster: Cluster) -> AbstractContextManager[tuple[Executor, int]]:
+def _remote_executor(command: str, processes: int, cluster: Cluster) -> AbstractContextManager[tuple[Executor, int]]:
     from shapegcode.batching.cluster import cluster_executor
 
     tls = {name: getattr(cluster, name) for name in ("tls_ca", "tls_cert", "tls_key")}
-    return cluster_executor(cluster.scheduler, processes=processes, **tls)
+    return cluster_executor(cluster.scheduler, processes=processes, command=command, **tls)
 
 
 @contextlib.contextmanager

@@ -5,12 +5,12 @@ from __future__ import annotations
 import glob
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.batching.manifest import MANIFEST
+from shapegcode.batching.manifest import MANIFEST, short
 from shapegcode.errors import ArgumentError
 from shapegcode.program.reading import PROGRAM_SUFFIXES, program_loader
 from shapegcode.program.several import is_subprogram
@@ -21,12 +21,13 @@ if TYPE_CHECKING:
 __all__ = ["Source", "called_files", "find_programs"]
 
 _NUMBERED = re.compile(r"[Oo]\d{1,8}")
+_COMMENT = re.compile(r"(?:^|\s)#.*")
 _CALL = re.compile(rb"(?:M *0*(?:98|198)|G *0*(?:65|66))(?!\d)", re.IGNORECASE)
 _NUMBER = re.compile(rb"P *0*(\d{1,8})", re.IGNORECASE)
 _COMPUTED = re.compile(rb"P *[\[#]", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Source:
     """A program of a batch.
 
@@ -56,43 +57,62 @@ def find_programs(given: Sequence[str], output: str | Path) -> tuple[Source, ...
         ArgumentError: something names no program, or two programs would have the same results.
         OSError: a list or a folder cannot be read.
     """
-    found: dict[str, Source] = {}
-    avoid = Path(output).absolute()
-    for source in _each(given, avoid):
-        found.setdefault(os.path.realpath(source.path), source)
-    places: dict[str, Source] = {}
-    for source in found.values():
-        other = places.setdefault(os.path.normcase(source.place), source)
-        if other is not source:
+    found: list[Source] = []
+    files, places = set[bytes](), set[bytes]()
+    for source in _each(given, Path(output).absolute()):
+        if (file := short(os.path.realpath(source.path))) in files:
+            continue
+        files.add(file)
+        if (place := short(os.path.normcase(source.place))) in places:
+            other = next(each for each in found if short(os.path.normcase(each.place)) == place)
             raise ArgumentError(
                 f"{other.path} and {source.path} would both be written to {source.place}: "
                 "give the folder above them, or rename one"
             )
-    return tuple(found.values())
+        places.add(place)
+        found.append(source)
+    return tuple(found)
 
 
-def _each(given: Sequence[str], avoid: Path, base: Path | None = None) -> Iterator[Source]:
+def _each(given: Iterable[str], avoid: Path) -> Iterator[Source]:
     for word in given:
-        path = word if base is None or os.path.isabs(word) else str(base / word)
         if word.startswith("@"):
-            file = Path(word[1:])
-            lines = (line.split("#", 1)[0].strip() for line in file.read_text().splitlines())
-            entries = [line for line in lines if line]
-            if not entries:
-                raise ArgumentError(f"{file}: the list names no program")
-            yield from _each(entries, avoid, file.parent)
-        elif os.path.isdir(path):
-            yield from _in_folder(Path(path), avoid)
-        elif os.path.isfile(path):
-            yield Source(path, os.path.basename(path))
-        elif matches := sorted(glob.glob(path, recursive=True)):
-            root = _fixed_part(path)
-            files = [
-                match for match in matches if os.path.isfile(match) and avoid not in Path(match).absolute().parents
-            ]
-            yield from (Source(file, os.path.relpath(file, root)) for file in files)
+            yield from _listed(Path(word[1:]), avoid)
+        elif os.path.isdir(word):
+            yield from _in_folder(Path(word), avoid)
+        elif os.path.isfile(word):
+            yield Source(word, os.path.basename(word))
         else:
-            raise ArgumentError(f"{path}: no such file, folder or match")
+            yield from _matching(word, avoid)
+
+
+def _listed(file: Path, avoid: Path) -> Iterator[Source]:
+    """What a list names; a message says where it stands."""
+    try:
+        text = file.read_text()
+    except UnicodeDecodeError:
+        raise ArgumentError(f"{file}: no list of programs: it is no text") from None
+    lines = [(number, _COMMENT.sub("", line).strip()) for number, line in enumerate(text.splitlines(), 1)]
+    if not any(entry for _, entry in lines):
+        raise ArgumentError(f"{file}: the list names no program")
+    for number, entry in lines:
+        if entry.startswith("@"):
+            raise ArgumentError(f"{file}:{number}: {entry}: a list names no lists")
+        try:
+            yield from _each([str(file.parent / entry)] if entry else [], avoid)
+        except ArgumentError as error:
+            raise ArgumentError(f"{file}:{number}: {error}") from None
+
+
+def _matching(pattern: str, avoid: Path) -> Iterator[Source]:
+    root = _fixed_part(pattern)
+    found = False
+    for file in sorted(glob.glob(pattern, recursive=True)):
+        if os.path.isfile(file) and avoid not in Path(file).absolute().parents:
+            found = True
+            yield Source(file, os.path.relpath(file, root))
+    if not found:
+        raise ArgumentError(f"{pattern}: no such file, folder or match")
 
 
 def _fixed_part(pattern: str) -> str:
@@ -113,14 +133,23 @@ def _in_folder(folder: Path, avoid: Path) -> Iterator[Source]:
         for name in sorted(names):
             stem, suffix = os.path.splitext(name)
             if suffix in PROGRAM_SUFFIXES and (suffix or _NUMBERED.fullmatch(stem)):
-                count += 1
                 path = os.path.join(where, name)
-                yield Source(path, os.path.relpath(path, folder), is_subprogram(Path(path).read_bytes()))
+                if os.path.exists(path) and not os.path.isfile(path):
+                    continue  # a pipe; of a link that leads nowhere its run will say so
+                count += 1
+                yield Source(path, os.path.relpath(path, folder), _only_returns(path))
     if not count:
         raise ArgumentError(f"{folder}: no program in it; programs end in {', '.join(filter(None, PROGRAM_SUFFIXES))}")
 
 
-def called_files(path: str | Path, machine: Machine) -> Iterator[tuple[str, str]]:
+def _only_returns(path: str) -> bool:
+    try:
+        return is_subprogram(Path(path).read_bytes())
+    except OSError:
+        return False  # its run will say why
+
+
+def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterator[tuple[str, str]]:
     """Files of programs that a program may call, and those that these may.
 
     More than are called may be among them: any number behind a P counts, of a program that calls at all.
@@ -128,6 +157,7 @@ def called_files(path: str | Path, machine: Machine) -> Iterator[tuple[str, str]
     Args:
         path: of the program.
         machine: whose folders and macro codes count too.
+        base: folder from which the machine names its folders.
 
     Returns:
         Name of each, beside the program, and the file.
@@ -136,7 +166,7 @@ def called_files(path: str | Path, machine: Machine) -> Iterator[tuple[str, str]
         OSError: a file cannot be read.
     """
     beside = Path(path).parent
-    folders = [beside, *(Path(name).expanduser() for name in machine.input.program_folders)]
+    folders = [beside, *(Path(base, Path(name).expanduser()) for name in machine.input.program_folders)]
     load = program_loader(folders, machine.controller.max_program_bytes)
     bound = machine.input
     numbers = [*bound.g_macros.values(), *bound.m_macros.values(), *bound.m_subprograms.values()]

@@ -16,13 +16,46 @@ from typing import Literal
 
 from shapegcode.results.made import this_version
 
-__all__ = ["FAILED_CODES", "BatchJob", "Ending", "JobOutcome", "Packed", "pack", "working_name"]
+__all__ = ["FAILED_CODES", "Base", "BatchJob", "Ending", "JobOutcome", "Packed", "pack"]
 
 Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
 """How a run ended: by itself with an exit code, or not."""
 
 FAILED_CODES = {97: "crashed", 98: "out of memory"}
 """Exit codes of a run that are no command's."""
+
+
+@dataclass(frozen=True)
+class Base:
+    """The folder in which a batch was begun: a run sees names from there, also when it goes on from another folder.
+
+    Attributes:
+        folder: its absolute path.
+    """
+
+    folder: str
+
+    def name_of(self, path: str | Path) -> str:
+        """Name of a file in the folder of a run.
+
+        Args:
+            path: as it was given, absolute or from the current folder.
+
+        Returns:
+            A relative name with as few dots as there can be.
+        """
+        return os.path.relpath(path, self.folder)
+
+    def path_of(self, name: str) -> str:
+        """The inverse of it.
+
+        Args:
+            name: in the folder of a run.
+
+        Returns:
+            The path from the current folder.
+        """
+        return os.path.normpath(os.path.join(os.path.relpath(self.folder), name))
 
 
 @dataclass(frozen=True)
@@ -33,17 +66,13 @@ class BatchJob:
         program: what it is of, as it was given.
         machine: likewise.
         words: of the command line.
-        files: what it reads: name in its folder, and the file.
         output: its main file, as a name in its folder; the JSON is beside it.
-        size_bytes: of the program.
     """
 
     program: str
     machine: str
     words: tuple[str, ...]
-    files: tuple[tuple[str, str], ...]
     output: str
-    size_bytes: int
 
     @property
     def key(self) -> str:
@@ -104,44 +133,21 @@ class JobOutcome:
     peak_bytes: int = 0
 
 
-def working_name(path: str | Path) -> str:
-    """Name of a file in the folder of a run: as it was given, an absolute one from the folder of the batch.
-
-    Args:
-        path: as it was given.
-
-    Returns:
-        A relative name with as few dots as there can be.
-    """
-    given = os.fspath(path)
-    return os.path.normpath(os.path.relpath(given) if os.path.isabs(given) else given)
-
-
 def pack(
-    job: BatchJob,
-    *,
-    seconds: float = 0.0,
-    memory_bytes: int = 0,
-    scratch: str = "",
-    kept: Mapping[str, bytes] | None = None,
+    job: BatchJob, files: Mapping[str, bytes], *, seconds: float = 0.0, memory_bytes: int = 0, scratch: str = ""
 ) -> Packed:
-    """Read what a run reads.
+    """A run that can travel.
 
     Args:
         job: the run.
+        files: what it reads: content by name.
         seconds: see `Packed`.
         memory_bytes: see `Packed`.
         scratch: see `Packed`.
-        kept: content of files that many runs read, such as the machine's, by name.
 
     Returns:
         The run with its files.
-
-    Raises:
-        OSError: a file cannot be read.
     """
-    kept = kept or {}
-    files = {name: kept[name] if name in kept else Path(path).read_bytes() for name, path in job.files}
     version = this_version()
     return Packed(
         job.words, files, version, _fingerprint(job.words, files, version), seconds, memory_bytes, scratch

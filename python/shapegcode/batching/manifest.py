@@ -1,29 +1,65 @@
 """What a batch has done, row by row: a file of JSON lines that outlives it.
 
-The first line says what the file is. Each further one is the row of a run, written when its files are complete; of
-several with one key the last counts. A row that was cut off in the middle is not there.
+The first line says what the file is, and in which folder the batch was begun. Each further one is the row of a run,
+written when its files are complete; of several with one key the last counts. A row that was cut off in the middle is
+not there. Rows stay on the disk: in memory is where they stand.
 """
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import fcntl
+import hashlib
 import json
 import os
+from array import array
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import named_errors, write_lines
 
-__all__ = ["MANIFEST", "Manifest"]
+__all__ = ["MANIFEST", "Manifest", "begun_in", "short"]
 
 MANIFEST = "batch.jsonl"
 """Name of the file, in the output folder."""
 
-_FORMAT = 1
-_HEAD = {"shapegcode": "batch", "format": _FORMAT}
+_HEAD = {"shapegcode": "batch", "format": 2}
+_FOLDER = "folder"
+
+
+def begun_in(output: str | Path) -> str:
+    """The folder in which the batch of an output folder was begun.
+
+    Args:
+        output: folder of the results.
+
+    Returns:
+        Its absolute path; the current folder if there is no batch yet.
+
+    Raises:
+        ArgumentError: what lies there is no manifest of this version.
+        OSError: it cannot be read.
+    """
+    try:
+        with (Path(output) / MANIFEST).open("rb") as stream:
+            return _base_of(stream, output) or os.getcwd()
+    except (FileNotFoundError, NotADirectoryError):
+        return os.getcwd()
+
+
+def short(text: str) -> bytes:
+    """Sixteen bytes that stand for a text of any length.
+
+    Args:
+        text: a key or a path.
+
+    Returns:
+        Its hash.
+    """
+    return hashlib.blake2b(os.fsencode(text), digest_size=16).digest()
 
 
 class Manifest:
@@ -32,17 +68,21 @@ class Manifest:
     Args:
         folder: of the results; it is made.
         resume: keep the rows that are there; False: forget them.
+        base: folder in which the batch was begun; empty: the current one.
 
     Raises:
         ArgumentError: another batch writes into the folder, or the file is no manifest of this version.
         OSError: it cannot be written.
     """
 
-    def __init__(self, folder: Path, *, resume: bool) -> None:
+    def __init__(self, folder: Path, *, resume: bool, base: str = "") -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.path = folder / MANIFEST
         # The folder itself is locked: that leaves no file behind, however the batch ends.
         self._lock = os.open(folder, os.O_RDONLY)
+        self._before: BinaryIO | None = None
+        self._known: dict[bytes, int] = {}
+        self._old, self._new = array("q"), array("q")
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -51,38 +91,54 @@ class Manifest:
                 f"{folder}: another batch is writing there; wait for it or name another folder"
             ) from None
         try:
-            self.earlier: dict[str, dict[str, Any]] = {row["key"]: row for row in self._read()}
-            """Rows of earlier batches by key, also of those that are forgotten: their files are known by them."""
-            kept = self.earlier.values() if resume else ()
-            lines = (json.dumps(row, sort_keys=True) + "\n" for row in (_HEAD, *kept))
-            write_lines(self.path, lines)
+            # The file of before stays open, so that its rows can be read though a new one has its name.
+            with contextlib.suppress(FileNotFoundError):
+                self._before = self.path.open("rb")
+                _base_of(self._before, folder)
+                self._known = {short(row["key"]): at for at, row in self._rows()}
+            head = json.dumps(_HEAD | {_FOLDER: os.path.relpath(base or ".", folder)}) + "\n"
+            self._old = array("q", sorted(self._known.values() if resume else ()))
+            write_lines(self.path, self._kept(head))
             self._stream = self.path.open("ab")
         except BaseException:
             self.close()
             raise
 
-    def _read(self) -> Iterator[dict[str, Any]]:
-        try:
-            lines = self.path.read_bytes().splitlines(keepends=True)
-        except FileNotFoundError:
-            return
-        head: object = None
-        if lines:
-            with contextlib.suppress(ValueError):
-                head = json.loads(lines[0])
-        if head != _HEAD:
-            raise ArgumentError(f"{self.path}: not a manifest of this version; name another folder or remove it")
-        for line in lines[1:]:
-            with contextlib.suppress(ValueError):
-                row = json.loads(line)
-                if line.endswith(b"\n") and isinstance(row, dict) and isinstance(row.get("key"), str):
-                    yield row
+    def earlier(self, key: str) -> dict[str, Any] | None:
+        """The row of an earlier batch, also one that is forgotten: its files are known by it.
 
-    def add(self, row: Mapping[str, Any]) -> None:
+        Args:
+            key: of a run.
+
+        Returns:
+            The row; None: there is none.
+        """
+        at = self._known.get(short(key))
+        if at is None or self._before is None:
+            return None
+        self._before.seek(at)
+        row: dict[str, Any] = json.loads(self._before.readline())
+        return row
+
+    def kept_at(self, key: str) -> int:
+        """Where the row of an earlier batch stands now.
+
+        Args:
+            key: of a run that has one, which is not forgotten.
+
+        Returns:
+            Where it begins in the file.
+        """
+        return self._new[bisect.bisect_left(self._old, self._known[short(key)])]
+
+    def add(self, row: Mapping[str, Any]) -> int:
         """Write a row, to the disk itself.
 
         Args:
             row: with its "key".
+
+        Returns:
+            Where it begins in the file.
 
         Raises:
             OSError: a full disk; the row is then not there.
@@ -97,9 +153,48 @@ class Manifest:
                 with contextlib.suppress(OSError):
                     os.ftruncate(self._stream.fileno(), end)
                 raise
+        return end
 
     def close(self) -> None:
         """Let others write into the folder."""
         with contextlib.suppress(AttributeError, OSError):
             self._stream.close()
+        if self._before is not None:
+            self._before.close()
         os.close(self._lock)
+
+    def _rows(self) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Rows of before and where they begin, from where the file is read."""
+        assert self._before is not None
+        at = self._before.tell()
+        for line in self._before:
+            with contextlib.suppress(ValueError):
+                row = json.loads(line)
+                if line.endswith(b"\n") and isinstance(row, dict) and isinstance(row.get("key"), str):
+                    yield at, row
+            at += len(line)
+
+    def _kept(self, head: str) -> Iterator[str]:
+        yield head
+        end = len(head)
+        for at in self._old:
+            assert self._before is not None
+            self._before.seek(at)
+            line = self._before.readline()
+            self._new.append(end)
+            end += len(line)
+            yield line.decode()
+
+
+def _base_of(stream: BinaryIO, output: str | Path) -> str:
+    """What the first line says; empty: there is none."""
+    line = stream.readline()
+    head: object = None
+    with contextlib.suppress(ValueError):
+        head = json.loads(line)
+    folder = head.pop(_FOLDER, None) if isinstance(head, dict) else None
+    if line and (head != _HEAD or not isinstance(folder, str)):
+        raise ArgumentError(
+            f"{Path(output) / MANIFEST}: not a manifest of this version; name another folder or remove it"
+        )
+    return os.path.normpath(Path(output).absolute() / folder) if isinstance(folder, str) else ""

@@ -3,37 +3,120 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from shapegcode.batching.inputs import Source, called_files
-from shapegcode.batching.job import BatchJob, working_name
+from shapegcode.batching.job import Base, BatchJob
 from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
 
-__all__ = ["COMMANDS", "Plan", "plan"]
+__all__ = ["COMMANDS", "WRITES", "Plan", "plan"]
 
 COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 """Commands of one program that can be run over many."""
 
-_WRITES = ("convert", "feed")
+WRITES = ("convert", "feed")
+"""Those that write a program."""
 _OF_ONE_RUN = (
     "-o", "--output", "-m", "--machine", "--json", "--html", "--html-script", "--csv", "--npz", "--plots",
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
+class _OnMachine:
+    """What the runs on one machine have in common: its name as given, in a run, and its folder below the results."""
+
+    given: str
+    word: str
+    below: str
+    machine: Machine
+    files: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Plan:
-    """What is to be done.
+    """What is to be done: a run is made when its turn comes, machine by machine.
 
     Attributes:
-        jobs: in the order in which the programs were given, machine by machine.
+        base: folder in which the batch was begun.
+        sources: the programs, in the order in which they were given.
+        lines: one for each machine.
+        command: of `COMMANDS`.
+        words: further ones of each command line.
+        output: folder of the results, as a run sees it.
+        html: likewise of the pages; empty: none.
         shared: content of the files that many of them read, by name.
     """
 
-    jobs: tuple[BatchJob, ...]
+    base: Base
+    sources: Sequence[Source]
+    lines: tuple[_OnMachine, ...]
+    command: str
+    words: tuple[str, ...]
+    output: str
+    html: str
     shared: Mapping[str, bytes]
+
+    def __len__(self) -> int:
+        """How many runs there are."""
+        return len(self.sources) * len(self.lines)
+
+    def job(self, rank: int) -> BatchJob:
+        """A run.
+
+        Args:
+            rank: from 0 on.
+
+        Returns:
+            The run; nothing is read for it.
+        """
+        line, source = self._of(rank)
+        target = os.path.join(self.output, line.below, source.place)
+        page = os.path.join(self.html, line.below, f"{source.place}.html") if self.html else ""
+        words = [self.command, self.base.name_of(source.path), "-m", line.word]
+        words += ["-o", target] if self.command in WRITES else []
+        words += ["--json", f"{target}.json", *(["--html", page, "--html-script", "beside"] if page else [])]
+        words += [*([] if _says_how_much(self.words) else ["-q"]), *self.words]
+        return BatchJob(source.path, line.given, tuple(words), target)
+
+    def files(self, rank: int) -> dict[str, bytes]:
+        """What a run reads.
+
+        Args:
+            rank: of the run.
+
+        Returns:
+            Content by name in the folder of the run.
+
+        Raises:
+            OSError: a file cannot be read.
+        """
+        line, source = self._of(rank)
+        name = self.base.name_of(source.path)
+        found = {name: Path(source.path).read_bytes()}
+        for called, path in called_files(source.path, line.machine, self.base.path_of(".")):
+            found[self.base.name_of(called)] = Path(path).read_bytes()
+        return found | {key: content for key, content in self.shared.items() if key in line.files}
+
+    def size_bytes(self, rank: int) -> int:
+        """How large the program of a run is.
+
+        Args:
+            rank: of the run.
+
+        Returns:
+            Its size; 0 if nobody may read it.
+        """
+        try:
+            return os.path.getsize(self._of(rank)[1].path)
+        except OSError:
+            return 0
+
+    def _of(self, rank: int) -> tuple[_OnMachine, Source]:
+        line, source = divmod(rank, len(self.sources))
+        return self.lines[line], self.sources[source]
 
 
 def plan(
@@ -43,6 +126,7 @@ def plan(
     command: str,
     options: Sequence[str],
     html: str | Path | None,
+    base: Base,
 ) -> Plan:
     """The runs of programs on machines.
 
@@ -53,6 +137,7 @@ def plan(
         command: of `COMMANDS`.
         options: further words of each command line.
         html: folder of the pages; None: none.
+        base: folder in which the batch was begun.
 
     Returns:
         The runs.
@@ -60,55 +145,37 @@ def plan(
     Raises:
         ArgumentError: there is no machine, or two would have the same folder.
         MachineError: one is none.
-        OSError: a file cannot be read.
+        OSError: a file of a machine or an option cannot be read.
     """
     if not machines:
         raise ArgumentError("no machine: name one with -m")
     labels = [Path(machine).stem for machine in machines]
     if twice := {label for label in labels if labels.count(label) > 1}:
         raise ArgumentError(f"two machines would be written to {output}/{min(twice)}: rename one of the files")
-    loaded = [Machine.load(machine) for machine in machines]
     for word in options:
         if word.partition("=")[0] in _OF_ONE_RUN:
             raise ArgumentError(f"{word} behind --: names a file of one run; a batch has -m, -o and --html itself")
-    words, given = _with_files(options)
+    words, given = _with_files(options, base)
     shared = {name: Path(path).read_bytes() for name, path in given}
-    jobs: list[BatchJob] = []
-    for name, label, machine in zip(machines, labels, loaded, strict=True):
+    lines: list[_OnMachine] = []
+    for name, label in zip(machines, labels, strict=True):
+        machine = Machine.load(name)
+        own = [base.name_of(name)] if os.path.exists(name) else []
+        shared |= {key: Path(name).read_bytes() for key in own}
         below = label if len(machines) > 1 else ""
-        own = [(working_name(name), name)] if os.path.exists(name) else []
-        shared |= {key: Path(path).read_bytes() for key, path in own}
-        machine_word = own[0][0] if own else name
-        for source in sources:
-            target = os.path.join(working_name(output), below, source.place)
-            page = os.path.join(working_name(html), below, f"{source.place}.html") if html else ""
-            program = working_name(source.path)
-            line = [command, program, "-m", machine_word, *(["-o", target] if command in _WRITES else [])]
-            line += ["--json", f"{target}.json", *(["--html", page, "--html-script", "beside"] if page else [])]
-            line += [*([] if _says_how_much(words) else ["-q"]), *words]
-            files = dict(_read_by(source, machine))
-            jobs.append(
-                BatchJob(
-                    source.path, name, tuple(line), (*files.items(), *own, *given), target, os.path.getsize(source.path)
-                )
-            )
-    return Plan(tuple(jobs), shared)
+        lines.append(_OnMachine(name, own[0] if own else name, below, machine, (*own, *(key for key, _ in given))))
+    page = base.name_of(html) if html else ""
+    return Plan(base, sources, tuple(lines), command, tuple(words), base.name_of(output), page, shared)
 
 
-def _read_by(source: Source, machine: Machine) -> Iterator[tuple[str, str]]:
-    yield working_name(source.path), source.path
-    for name, file in called_files(source.path, machine):
-        yield working_name(name), file
-
-
-def _with_files(options: Sequence[str]) -> tuple[list[str], list[tuple[str, str]]]:
+def _with_files(options: Sequence[str], base: Base) -> tuple[list[str], list[tuple[str, str]]]:
     """The words as a run sees them, and the files among them, by name."""
     words: list[str] = []
     files: list[tuple[str, str]] = []
     for word in options:
         option, sign, value = word.partition("=") if word.startswith("--") else ("", "", word)
         if value and os.path.isfile(value):
-            name = working_name(value)
+            name = base.name_of(value)
             files.append((name, value))
             words.append(f"{option}{sign}{name}")
         else:

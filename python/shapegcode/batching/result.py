@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import heapq
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Any, ClassVar, Literal
 
-from shapegcode.results.json import hidden
+from shapegcode.results.json import Streamed, hidden, plain
 from shapegcode.results.outcome import Pair
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
@@ -19,6 +22,7 @@ Ended = Literal["ok", "not ok", "refused", "failed"]
 """Within tolerance; done, but not; the input is bad; it did not end by itself."""
 
 _SHOWN = 20
+_LISTED = 2000
 
 
 @dataclass(frozen=True)
@@ -166,7 +170,7 @@ class Batch(Result):
 
     command: str
     output: str
-    rows: tuple[BatchRow, ...]
+    rows: Sequence[BatchRow]
     summary: str
     not_done: int
     stopped: str = ""
@@ -178,12 +182,20 @@ class Batch(Result):
     @property
     def counts(self) -> dict[str, int]:
         """How many runs ended how."""
-        return {name: sum(row.ended == name for row in self.rows) for name in ("ok", "not ok", "refused", "failed")}
+        return {name: self._tally[name] for name in ("ok", "not ok", "refused", "failed")}
+
+    @cached_property
+    def _tally(self) -> Counter[str]:
+        """Of one look at the rows: how they ended, which were done earlier, and the machines."""
+        found = Counter[str]()
+        for row in self.rows:
+            found.update([row.ended, f"on {row.machine}", *(["earlier"] if row.earlier else [])])
+        return found
 
     @property
     def ok(self) -> bool:
         """Every run was done, and is within tolerance."""
-        return not self.not_done and all(row.ended == "ok" for row in self.rows)
+        return not self.not_done and self.counts["ok"] == len(self.rows)
 
     @property
     def answer(self) -> str:
@@ -191,7 +203,7 @@ class Batch(Result):
         counts, whole = self.counts, len(self.rows) + self.not_done
         trouble = [f"{count} {name}" for name, count in counts.items() if count and name != "ok"]
         trouble += [f"{self.not_done} not begun"] if self.not_done else []
-        earlier = sum(row.earlier for row in self.rows)
+        earlier = self._tally["earlier"]
         before = f", {earlier} of them by an earlier batch" if earlier else ""
         tail = f"; {', '.join(trouble)}" if trouble else ""
         return f"{counts['ok']} of {whole} runs of {self.command} are ok{before}{tail} ({self.wall_s:.1f} s)"
@@ -210,6 +222,12 @@ class Batch(Result):
             f"open {self.summary} in a spreadsheet."
         )  # fmt: skip
 
+    def to_json(self) -> dict[str, Any]:
+        """As `to_dict`, row by row."""
+        names = [each.name for each in fields(self) if each.name != "rows" and not each.metadata.get("hidden")]
+        found: dict[str, Any] = plain({name: getattr(self, name) for name in (*names, *self.json_extra)})
+        return found | {"rows": Streamed(self.rows)}
+
     def key_figures(self) -> tuple[Figure, ...]:
         """How many runs ended how."""
         return tuple(
@@ -219,9 +237,12 @@ class Batch(Result):
         )
 
     def tables(self) -> list[Table]:
-        """What needs somebody, and what was gained; the first twenty of each."""
-        bad = sorted((row for row in self.rows if row.ended != "ok"), key=lambda row: list(_RED).index(row.ended))
-        good = sorted((row for row in self.rows if row.ended == "ok"), key=lambda row: -row.gain_um)
+        """What needs somebody, and what was gained; the first twenty of each, on an index of pages two thousand."""
+        worst, counts, shown = list(_RED), self.counts, _LISTED if self.html else _SHOWN
+        bad = heapq.nsmallest(
+            shown, (row for row in self.rows if row.ended != "ok"), key=lambda row: worst.index(row.ended)
+        )
+        good = heapq.nsmallest(shown, (row for row in self.rows if row.ended == "ok"), key=lambda row: -row.gain_um)
         names = (
             Column("program", value="program", left=True, link=self._link, priority=0),
             Column("machine", value="machine", left=True, priority=4),
@@ -229,18 +250,20 @@ class Batch(Result):
         why = (Column("", value="ended", left=True, priority=0), Column("why", value="said", text=True))
         tables = []
         if bad:
-            tables.append(self._table("what needs somebody", (*names, *why), bad, lambda row: _RED[row.ended]))
+            left = len(self.rows) - counts["ok"] - shown
+            tables.append(self._table("what needs somebody", (*names, *why), bad, left, lambda row: _RED[row.ended]))
         if good:
-            tables.append(self._table("what is ok, by gain", (*names, *_FIGURES), good))
+            tables.append(self._table("what is ok, by gain", (*names, *_FIGURES), good, counts["ok"] - shown))
         return tables
 
     def _link(self, row: BatchRow) -> str:
         """From the index to the page of a run."""
         return os.path.relpath(row.page, self.html) if row.page and self.html else ""
 
-    def _table(self, title: str, columns: tuple[Column, ...], rows: list[BatchRow], style: Any = None) -> Table:
-        left = len(rows) - _SHOWN
+    def _table(
+        self, title: str, columns: tuple[Column, ...], rows: list[BatchRow], left: int, style: Any = None
+    ) -> Table:
         caption = f"and {left} more: {self.summary}" if left > 0 else ""
-        if len({row.machine for row in self.rows}) == 1:
+        if sum(name.startswith("on ") for name in self._tally) == 1:
             columns = tuple(column for column in columns if column.name != "machine")
-        return Table(title, columns, rows[:_SHOWN], caption, row_style=style)
+        return Table(title, columns, rows, caption, row_style=style)

@@ -1,19 +1,23 @@
-"""From the outcome of a run to its row, and a row read back from the manifest."""
+"""From the outcome of a run to its row, and rows read back from the manifest."""
 
 from __future__ import annotations
 
 import errno
 import json
 import os
-from collections.abc import Mapping
+import weakref
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
-from typing import Any
+from pathlib import Path
+from typing import Any, overload
 
 from shapegcode.batching.job import BatchJob, JobOutcome
+from shapegcode.batching.plan import Plan
 from shapegcode.batching.result import BatchRow, Ended, figures_of
 from shapegcode.results.outcome import Pair
 
-__all__ = ["row_of", "row_read"]
+__all__ = ["KeptRows", "row_of", "row_read"]
 
 _ENDED: dict[int, Ended] = {0: "ok", 1: "not ok", 2: "refused"}
 _PAIRS = ("residual_um", "contour_um", "cycle_time_s")
@@ -79,3 +83,53 @@ def row_read(row: Mapping[str, Any], *, earlier: bool) -> BatchRow:
         field.name: row[field.name] for field in fields(BatchRow) if field.name not in (*_PAIRS, "earlier")
     }
     return BatchRow(**values, **pairs, earlier=earlier)
+
+
+class KeptRows(Sequence[BatchRow]):
+    """KeptRows of a batch that stand in its manifest and are read when somebody looks at them.
+
+    A later batch writes another file, so that these stay what they were.
+
+    Args:
+        manifest: the file.
+        planned: the runs.
+        places: where the row of each run begins in the file; -1: there is none.
+        earlier: of each run: not 0 if an earlier batch did it.
+    """
+
+    def __init__(self, manifest: Path, planned: Plan, places: Sequence[int], earlier: Sequence[int]) -> None:
+        self._stream = manifest.open("rb")
+        weakref.finalize(self, self._stream.close)
+        self._planned, self._places, self._earlier = planned, places, earlier
+        self._ranks = array("q", (rank for rank, at in enumerate(places) if at >= 0))
+
+    def __len__(self) -> int:
+        """How many runs are done."""
+        return len(self._ranks)
+
+    def __iter__(self) -> Iterator[BatchRow]:
+        """One after the other."""
+        return map(self._row, self._ranks)
+
+    @overload
+    def __getitem__(self, rank: int) -> BatchRow: ...
+
+    @overload
+    def __getitem__(self, rank: slice) -> list[BatchRow]: ...
+
+    def __getitem__(self, rank: int | slice) -> BatchRow | list[BatchRow]:
+        """One of them, or several."""
+        ranks = self._ranks[rank]
+        return self._row(ranks) if isinstance(ranks, int) else [self._row(each) for each in ranks]
+
+    def __reduce__(self) -> tuple[type, tuple[list[BatchRow]]]:
+        """Elsewhere there is no file."""
+        return list, (list(self),)
+
+    def _row(self, rank: int) -> BatchRow:
+        self._stream.seek(self._places[rank])
+        row = json.loads(self._stream.readline())
+        job, base = self._planned.job(rank), self._planned.base
+        files = {name: base.path_of(row[name]) for name in ("output", "report", "page") if row[name]}
+        given = {"program": job.program, "machine": job.machine}
+        return row_read(row | files | given, earlier=bool(self._earlier[rank]))

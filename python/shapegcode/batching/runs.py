@@ -10,18 +10,20 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
 from shapegcode.batching.job import BatchJob, JobOutcome, Packed
 from shapegcode.batching.manifest import Manifest
-from shapegcode.batching.result import BatchRow
-from shapegcode.batching.row import row_of, row_read
+from shapegcode.batching.plan import Plan
+from shapegcode.batching.row import row_of
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_bytes
 from shapegcode.results.json import plain
+from shapegcode.results.page.html import is_shared
 
 __all__ = ["OnBatch", "Runs"]
 
@@ -31,6 +33,7 @@ OnBatch = Callable[[float, str], None]
 _AHEAD = 2
 """Runs that are ready for each process, so that none waits for files."""
 _TOLD_EVERY_S = 1.0
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class _CtrlC:
@@ -65,39 +68,51 @@ class _CtrlC:
 
 
 class Runs:
-    """The runs of one batch."""
+    """The runs of one batch.
+
+    Args:
+        planned: what is to be done.
+        manifest: where it is written down.
+        folders: in which runs may write.
+        resume: leave what is done.
+        on_progress: see `OnBatch`.
+    """
 
     def __init__(
-        self, jobs: Sequence[BatchJob], manifest: Manifest, folders: Sequence[Path], resume: bool, on_progress: OnBatch
+        self, planned: Plan, manifest: Manifest, folders: Sequence[Path], resume: bool, on_progress: OnBatch
     ) -> None:
-        self.rows: dict[str, BatchRow] = {}
-        self._jobs, self._manifest, self._resume, self._on_progress = jobs, manifest, resume, on_progress
+        self.places = array("q", [-1]) * len(planned)
+        self.earlier = bytearray(len(planned))
+        self._planned, self._manifest, self._resume, self._on_progress = planned, manifest, resume, on_progress
+        self._path_of = planned.base.path_of
         self._allowed = tuple(os.path.join(os.path.realpath(folder), "") for folder in folders)
-        self._whole_bytes = sum(job.size_bytes for job in jobs) or 1
-        self._done_bytes, self._told = 0, 0.0
+        self._whole_bytes = sum(map(planned.size_bytes, range(len(planned)))) or 1
+        self._done = self._failed = self._done_bytes = 0
+        self._told = 0.0
+        self._shared: dict[str, str] = {}  # scripts that many pages need are written once
         self._ctrl_c = _CtrlC()
 
     def all(
         self,
         executor: Executor,
         slots: int,
-        prepare: Callable[[BatchJob], Packed],
+        prepare: Callable[[BatchJob, Mapping[str, bytes]], Packed],
         run: Callable[[Packed], JobOutcome],
     ) -> str:
         """Do them; gives why it stopped before the end, or nothing."""
-        waiting: dict[Future[JobOutcome], tuple[BatchJob, str]] = {}
+        waiting: dict[Future[JobOutcome], tuple[int, str]] = {}
         self._ctrl_c.begin()
         try:
-            for job in self._jobs:
+            for rank in range(len(self._planned)):
+                job = self._planned.job(rank)
                 try:
-                    packed = prepare(job)
+                    packed = prepare(job, self._planned.files(rank))
                 except OSError as error:
-                    outcome = JobOutcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {})
-                    self._keep(job, "", outcome)
+                    self._keep(rank, "", JobOutcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {}))
                     continue
-                if self._is_done(job, packed.fingerprint):
+                if self._is_done(rank, job.key, packed.fingerprint):
                     continue
-                waiting[executor.submit(run, packed)] = (job, packed.fingerprint)
+                waiting[executor.submit(run, packed)] = (rank, packed.fingerprint)
                 if len(waiting) >= slots * _AHEAD:
                     self._collect(waiting, slots)
             while waiting:
@@ -105,7 +120,7 @@ class Runs:
         except KeyboardInterrupt:
             return "Ctrl-C"
         except OSError as error:
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            if error.errno not in _FULL:
                 raise
             return f"{error.filename or 'scratch'}: {error.strerror}"
         finally:
@@ -114,7 +129,7 @@ class Runs:
                 future.cancel()
         return ""
 
-    def _collect(self, waiting: dict[Future[JobOutcome], tuple[BatchJob, str]], slots: int) -> None:
+    def _collect(self, waiting: dict[Future[JobOutcome], tuple[int, str]], slots: int) -> None:
         """Wait for one of them at least, and keep what came back."""
         while True:
             self._tell(min(slots, len(waiting)))
@@ -124,58 +139,85 @@ class Runs:
             if done:
                 break
         for future in done:
-            job, fingerprint = waiting.pop(future)
+            rank, fingerprint = waiting.pop(future)
             try:
                 outcome = future.result()
             except OSError as error:
-                if error.errno in (errno.ENOSPC, errno.EDQUOT):
+                if error.errno in _FULL:
                     raise
                 outcome = JobOutcome("crashed", 0, "", str(error), {})
             except Exception as error:
                 outcome = JobOutcome("killed", 0, "", f"{type(error).__name__}: {error}".splitlines()[0], {})
-            self._keep(job, fingerprint, outcome)
+            self._keep(rank, fingerprint, outcome)
 
-    def _is_done(self, job: BatchJob, fingerprint: str) -> bool:
+    def _is_done(self, rank: int, key: str, fingerprint: str) -> bool:
         """An earlier batch did the same, and its files are there as it left them."""
-        row = self._manifest.earlier.get(job.key) if self._resume else None
+        row = self._manifest.earlier(key) if self._resume else None
         if row is None or row.get("fingerprint") != fingerprint or row["ended"] == "failed":
             return False
-        if any(_hash_of(name) != sha256 for name, sha256 in row["files"].items()):
+        if any(_hash_of(self._path_of(name)) != sha256 for name, sha256 in row["files"].items()):
             return False
-        self._done_bytes += job.size_bytes
-        self.rows[job.key] = row_read(row, earlier=True)
+        self.earlier[rank] = 1
+        self._count(rank, self._manifest.kept_at(key), row["ended"])
         return True
 
-    def _keep(self, job: BatchJob, fingerprint: str, outcome: JobOutcome) -> None:
-        """Write what a run wrote, then its row."""
+    def _keep(self, rank: int, fingerprint: str, outcome: JobOutcome) -> None:
+        """Write what a run wrote, then its row; where its files cannot be written, a row that says so."""
+        job = self._planned.job(rank)
         row, written = row_of(job, outcome)
         if row.ended == "failed" and os.strerror(errno.ENOSPC) in outcome.complained:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), job.program)
         for name in written:
-            if not os.path.realpath(name).startswith(self._allowed):
+            if not self._is_allowed(name):
                 raise ArgumentError(f"{name}: a worker wants to write outside of the output folder")
-        with self._ctrl_c.later():
-            self._write(job, fingerprint, row, written)
-
-    def _write(self, job: BatchJob, fingerprint: str, row: BatchRow, written: Mapping[str, bytes]) -> None:
-        for name, content in written.items():
-            Path(name).parent.mkdir(parents=True, exist_ok=True)
-            write_bytes(name, content)
-        # What an earlier run wrote and this one did not: nobody may take it for a result of this one.
-        for name in self._manifest.earlier.get(job.key, {}).get("files", {}):
-            if name not in written and os.path.realpath(name).startswith(self._allowed):
-                Path(name).unlink(missing_ok=True)
         hashes = {name: hashlib.sha256(content).hexdigest() for name, content in written.items()}
-        self._manifest.add({**plain(row), "key": job.key, "fingerprint": fingerprint, "files": hashes})
-        self.rows[job.key] = row
-        self._done_bytes += job.size_bytes
+        with self._ctrl_c.later():
+            try:
+                self._write(job, written, hashes)
+            except OSError as error:
+                if error.errno in _FULL:
+                    raise
+                row, hashes = (
+                    row_of(job, JobOutcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {}))[0],
+                    {},
+                )
+                self._remove(written)
+                self._write(job, {}, hashes)
+            line = {**plain(row), "key": job.key, "fingerprint": fingerprint, "files": hashes}
+            self._count(rank, self._manifest.add(line), row.ended)
+
+    def _write(self, job: BatchJob, written: Mapping[str, bytes], hashes: Mapping[str, str]) -> None:
+        for name, content in written.items():
+            if self._shared.get(name) == hashes[name]:
+                continue
+            Path(self._path_of(name)).parent.mkdir(parents=True, exist_ok=True)
+            write_bytes(self._path_of(name), content)
+            if is_shared(name):
+                self._shared[name] = hashes[name]
+        # What an earlier run wrote and this one did not: nobody may take it for a result of this one.
+        earlier = (self._manifest.earlier(job.key) or {}).get("files", {})
+        self._remove(name for name in earlier if name not in written)
+
+    def _remove(self, names: Iterable[str]) -> None:
+        for name in names:
+            if self._is_allowed(name) and not is_shared(name):
+                with contextlib.suppress(OSError):  # it may be gone, or never have been there
+                    os.unlink(self._path_of(name))
+
+    def _is_allowed(self, name: str) -> bool:
+        return os.path.realpath(self._path_of(name)).startswith(self._allowed)
+
+    def _count(self, rank: int, at: int, ended: str) -> None:
+        self.places[rank] = at
+        self._done += 1
+        self._failed += ended in ("failed", "refused")
+        self._done_bytes += self._planned.size_bytes(rank)
 
     def _tell(self, running: int) -> None:
         if time.monotonic() - self._told < _TOLD_EVERY_S / 5:
             return
         self._told = time.monotonic()
-        failed = sum(row.ended in ("failed", "refused") for row in self.rows.values())
-        text = f"{len(self.rows)} of {len(self._jobs)} done, {running} running, {failed} failed"
+        text = f"{self._done} of {len(self._planned)} done, {running} running, {self._failed} failed"
         self._on_progress(self._done_bytes / self._whole_bytes, text)
 
 

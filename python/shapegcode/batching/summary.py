@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -14,7 +14,7 @@ from shapegcode.results.json import plain
 __all__ = ["summary_lines"]
 
 
-def summary_lines(rows: Sequence[BatchRow]) -> Iterator[str]:
+def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
     """The rows as CSV.
 
     Args:

@@ -111,6 +111,7 @@ def run(args: argparse.Namespace) -> int:
             memory_limit_bytes=args.memory_limit,
             on_progress=tell,
         )
+    tables = result.tables()
     if html is not None:
         args.html = str(Path(html) / _INDEX)
         result = replace(result, html=str(html))
@@ -118,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
     if result.stopped:
         words = [word for word in args.typed if word != "--resume"]
         notes.append(f"go on with: {shlex.join(['shapegcode', 'batch', '--resume', *words[1:]])}")
-    code = runner.finish(result, args, notes=notes, wrote=[result.summary])
+    code = runner.finish(result, args, tables=tables, notes=notes, wrote=[result.summary])
     return ExitCode.INTERRUPTED if result.stopped == "Ctrl-C" else code
 
 

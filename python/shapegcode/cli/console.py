@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import json
 import os
 import shutil
@@ -14,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TextIO
 
-from shapegcode.io.atomic import write_text
+from shapegcode.io.atomic import write_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,6 +31,7 @@ __all__ = [
 ]
 
 _PIPE_WIDTH = 120
+_PIECES = 4096
 _PROGRESS_DELAY_S = 1.0
 
 
@@ -85,11 +87,10 @@ def write_json(data: object, target: str | Path) -> None:
         ValueError: a number in it is NaN or infinite.
         OSError: the file cannot be written; what was there before stays.
     """
-    text = json.dumps(data, sort_keys=True, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    if target == "-":
-        sys.stdout.write(text)
-    else:
-        write_text(target, text)
+    encoder = json.JSONEncoder(sort_keys=True, indent=2, allow_nan=False, ensure_ascii=False)
+    pieces = itertools.chain(encoder.iterencode(data), ["\n"])
+    # Not word by word, nor all at once: there may be millions.
+    write_lines(str(target), iter(lambda: "".join(itertools.islice(pieces, _PIECES)), ""))
 
 
 class ProgressBar:

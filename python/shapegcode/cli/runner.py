@@ -155,7 +155,7 @@ def finish(
     Raises:
         OSError: a file cannot be written.
     """
-    report = result.to_dict()
+    report = result.to_json()
     plots = getattr(args, "plots", None)
     pictures: list[str] = []
     if plots is not None:

@@ -113,7 +113,12 @@ def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
         FileExistsError: the file exists and *overwrite* is False.
         OSError: with the name of *path* and the reason, for example a full disk or a missing folder.
     """
-    write_bytes(path, text.encode(), overwrite=overwrite)
+    write_bytes(path, _encoded(text), overwrite=overwrite)
+
+
+def _encoded(text: str) -> bytes:
+    """As UTF-8; of names of files that are none JSON understands what then stands there."""
+    return text.encode(errors="backslashreplace")
 
 
 def write_lines(path: str | Path, lines: Iterable[str]) -> None:
@@ -131,7 +136,7 @@ def write_lines(path: str | Path, lines: Iterable[str]) -> None:
         return
     with named_errors(path), replaced_file(path) as stream:
         for line in lines:
-            stream.write(line.encode())
+            stream.write(_encoded(line))
 
 
 def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = True) -> None:

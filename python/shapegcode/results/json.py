@@ -15,7 +15,7 @@ import json
 import math
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
@@ -23,7 +23,7 @@ import numpy as np
 
 from shapegcode.results.made import Made
 
-__all__ = ["exact", "hidden", "plain", "schema", "sparse", "to_text"]
+__all__ = ["Streamed", "exact", "hidden", "plain", "schema", "sparse", "to_text"]
 
 _DIGITS = 9
 _NOTHING = 1e-9  # of a unit in which nobody measures so little
@@ -43,6 +43,28 @@ def exact() -> dict[str, Any]:
 def sparse() -> dict[str, Any]:
     """Metadata of a field whose key is left out where its value is None: ``field(default=None, metadata=sparse())``."""
     return {"sparse": True}
+
+
+class Streamed(list[Any]):
+    """Many entries that become plain one by one, while `json.JSONEncoder.iterencode` goes over them.
+
+    `json.dumps` would find it empty.
+
+    Args:
+        entries: as they are.
+    """
+
+    def __init__(self, entries: Sequence[object]) -> None:
+        super().__init__()
+        self._entries = entries
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._entries)
+
+    def __iter__(self) -> Iterator[Any]:
+        """Each as `plain` makes it."""
+        return map(plain, self._entries)
 
 
 def plain(value: object) -> Any:

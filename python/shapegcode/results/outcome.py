@@ -109,6 +109,10 @@ class Outcome:
         found: dict[str, Any] = plain(self)
         return found
 
+    def to_json(self) -> dict[str, Any]:
+        """`to_dict` for who writes it at once: very many rows may be `shapegcode.results.json.Streamed`."""
+        return self.to_dict()
+
     def tables(self) -> list[Table]:
         """What the command shows below its answer, in this order."""
         return []

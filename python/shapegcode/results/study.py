@@ -96,7 +96,7 @@ def _fields(value: object) -> Sequence[dataclasses.Field[Any]]:
 
 
 def _is_list_of_rows(value: object) -> bool:
-    if not isinstance(value, tuple | list) or not value:
+    if not isinstance(value, Sequence) or isinstance(value, str | bytes) or not value:
         return False
     return all(dataclasses.is_dataclass(row) or isinstance(row, Mapping) for row in value)
 

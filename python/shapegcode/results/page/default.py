@@ -226,7 +226,7 @@ def page_of(
     Returns:
         The page.
     """
-    report: dict[str, Any] = result.to_dict()
+    report: dict[str, Any] = result.to_json()
     if made is not None:
         report["made"] = plain(made)
         sections = (*sections, made_section(made))

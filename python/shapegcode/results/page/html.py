@@ -10,8 +10,10 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
+import io
 import json
 import re
+from collections.abc import Mapping
 from functools import cache
 from html import escape
 from importlib import metadata, resources
@@ -20,11 +22,12 @@ from typing import Any
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_bytes, write_text
+from shapegcode.results.json import Streamed
 from shapegcode.results.page.markup import light_sign, prose, section_of
 from shapegcode.results.page.model import Page, Script
 from shapegcode.results.page.scene import packed
 
-__all__ = ["SCRIPTS", "STYLES", "plotly_name", "save", "to_html"]
+__all__ = ["SCRIPTS", "STYLES", "is_shared", "plotly_name", "save", "to_html"]
 
 SCRIPTS = tuple(
     f"{name}.js" for name in ("page", "decode", "view", "pixels", "axes", "stage", "programs", "charts", "scene")
@@ -154,6 +157,18 @@ def plotly_name() -> str:
     return f"plotly-{metadata.version('plotly')}.min.js"
 
 
+def is_shared(name: str) -> bool:
+    """Whether a file is such a script, of any version of Plotly.
+
+    Args:
+        name: with or without its folder.
+
+    Returns:
+        True if pages beside it may need it.
+    """
+    return re.fullmatch(r"plotly-[\w.]+\.min\.js", name.rpartition("/")[2]) is not None
+
+
 @cache
 def _plotly_source() -> str:
     """Read as a file: importing Plotly's package takes longer."""
@@ -196,7 +211,13 @@ def _hash(script: str) -> str:
 
 def _data(key: str, value: Any) -> str:
     """JSON inside of HTML: what could end the element or start another one is written by its number."""
-    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    encoder = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    if isinstance(value, Mapping) and any(isinstance(each, Streamed) for each in value.values()):
+        stream = io.StringIO()
+        stream.writelines(encoder.iterencode(value))
+        text = stream.getvalue()
+    else:
+        text = encoder.encode(value)
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return f'<script type="application/json" id="{key}">{text}</script>'
