@@ -1,5 +1,7 @@
 #include <pybind11/stl.h>
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,31 +18,43 @@ namespace py = pybind11;
 namespace shapegcode::bindings {
 namespace {
 
+constexpr double arc_step_rad = 0.05;
+
 // Points along the path for pictures: segment ends, arcs in steps of `step_rad`.
-py::array polyline(const Path& path, double step_rad) {
+template <typename Take>
+void for_each_point(const Path& path, double step_rad, Take take) {
   if (!(step_rad > 0.0)) {
     throw Error(ErrorKind::argument, "step_rad is " + std::to_string(step_rad) + ", must be > 0");
   }
   constexpr double most_pieces = 1e7;
-  std::vector<Vector3> points;
+  if (path.size() > 0) take(path.start_mm(0));
   for (const Segment& segment : path.segments()) {
-    if (points.empty()) {
-      points.push_back(segment.start_mm);
-    }
     const double steps = segment.kind == SegmentKind::arc ? std::ceil(std::abs(segment.sweep_rad) / step_rad) : 1.0;
     if (!(steps <= most_pieces)) {
       throw Error(ErrorKind::argument, "an arc in steps of step_rad takes more than 10000000 points");
     }
     const int pieces = std::max(1, static_cast<int>(steps));
     for (int i = 1; i <= pieces; ++i) {
-      points.push_back(point_at(segment, segment.length_mm * i / pieces));
+      take(point_at(segment, segment.length_mm * i / pieces));
     }
   }
+}
+
+py::array polyline(const Path& path, double step_rad) {
+  std::vector<Vector3> points;
+  for_each_point(path, step_rad, [&](const Vector3& point) { points.push_back(point); });
   Eigen::MatrixXd matrix(static_cast<Eigen::Index>(points.size()), axis_count);
   for (std::size_t i = 0; i < points.size(); ++i) {
     matrix.row(static_cast<Eigen::Index>(i)) = points[i];
   }
   return take(std::move(matrix));
+}
+
+// Size of the box around the points of its polyline.
+Vector3 extent(const Path& path) {
+  Eigen::AlignedBox3d box;
+  for_each_point(path, arc_step_rad, [&](const Vector3& point) { box.extend(point); });
+  return box.isEmpty() ? Vector3(Vector3::Zero()) : Vector3(box.sizes());
 }
 
 // One number per segment.
@@ -112,11 +126,11 @@ void register_path(py::module_& module) {
           py::arg("index"), "Segment at an index.")
       .def_property_readonly("length_mm", &Path::length_mm, "Whole length, mm.")
       .def_property_readonly(
-          "start_mm", [](const Path& self) { return self.size() > 0 ? self[0].start_mm : Vector3(Vector3::Zero()); },
+          "start_mm", [](const Path& self) { return self.size() > 0 ? self.start_mm(0) : Vector3(Vector3::Zero()); },
           "Start, shape (3,), mm.")
       .def_property_readonly(
           "end_mm",
-          [](const Path& self) { return self.size() > 0 ? self[self.size() - 1].end_mm : Vector3(Vector3::Zero()); },
+          [](const Path& self) { return self.size() > 0 ? self.end_mm(self.size() - 1) : Vector3(Vector3::Zero()); },
           "End, shape (3,), mm.")
       .def_property_readonly(
           "slowest_feed_mm_per_s",
@@ -164,21 +178,23 @@ void register_path(py::module_& module) {
           "Distance of each segment's end from the start, (n,), mm.")
       .def_property_readonly(
           "segment_feeds_mm_per_s",
-          [](const Path& self) { return of_segments(self, [&](std::size_t i) { return self[i].feed_mm_per_s; }); },
+          [](const Path& self) { return of_segments(self, [&](std::size_t i) { return self.feed_mm_per_s(i); }); },
           "Programmed feed of each segment, (n,), mm/s.")
       .def_property_readonly(
           "segment_lines",
-          [](const Path& self) { return of_segments(self, [&](std::size_t i) { return self[i].line; }); },
+          [](const Path& self) { return of_segments(self, [&](std::size_t i) { return self.line(i); }); },
           "Source line of each segment, (n,), from 1.")
       .def_property_readonly(
           "arcs_in_xy",
           [](const Path& self) {
-            return std::all_of(self.segments().begin(), self.segments().end(), [](const Segment& segment) {
+            const Segments segments = self.segments();
+            return std::all_of(segments.begin(), segments.end(), [](const Segment& segment) {
               return segment.kind != SegmentKind::arc || segment.normal == 2;
             });
           },
           "Whether every arc lies in the XY plane (G17).")
-      .def("polyline", &polyline, py::arg("step_rad") = 0.05,
+      .def_property_readonly("extent_mm", &extent, "Size of the box around it, shape (3,), mm; arcs as in `polyline`.")
+      .def("polyline", &polyline, py::arg("step_rad") = arc_step_rad,
            "Points along the path, (n, 3), mm: segment ends, arcs in steps of `step_rad`.");
 }
 

@@ -129,6 +129,16 @@ void register_simulation(py::module_& module) {
       "the programmed path (None: the path itself).");
 
   module.def(
+      "play_planned",
+      [](const std::shared_ptr<Path>& path, const MotionLimits& limits, const PlaybackOptions& options,
+         const std::shared_ptr<Path>& programmed) {
+        const py::gil_scoped_release release;
+        return std::make_shared<PlaybackFigures>(play_planned(path, limits, *programmed, options));
+      },
+      py::arg("path").none(false), py::arg("limits"), py::arg("options"), py::arg("programmed").none(false),
+      "play_path under the profile of plan_speed, which is not kept as a whole where it need not be.");
+
+  module.def(
       "play_blocks",
       [](const std::shared_ptr<Path>& blocks, const std::shared_ptr<Path>& path, BlockEnd block_end,
          double override_ratio, const PlaybackOptions& options) {

@@ -25,6 +25,34 @@ py::bytes slice(const Program& program, std::size_t begin, std::size_t end) {
   return py::bytes(program.text.data() + begin, end - begin);
 }
 
+std::int64_t find(const Program& program, const py::bytes& what, std::size_t begin) {
+  const std::size_t at = program.text.find(static_cast<std::string_view>(what), begin);
+  return at == std::string::npos ? -1 : static_cast<std::int64_t>(at);
+}
+
+void overwrite(Program& program, std::size_t begin, const py::bytes& with) {
+  const auto text = static_cast<std::string_view>(with);
+  if (begin > program.text.size() || text.size() > program.text.size() - begin) {
+    throw Error(ErrorKind::argument, "a text is not overwritten beyond its end");
+  }
+  std::ranges::copy(text, program.text.begin() + static_cast<std::ptrdiff_t>(begin));
+}
+
+// One text of parts that are given up one by one, so that it stands in memory once.
+std::string joined(const py::list& parts) {
+  std::size_t size = 0;
+  for (const py::handle part : parts)
+    size += py::reinterpret_borrow<py::bytes>(part).operator std::string_view().size();
+  std::string text;
+  text.reserve(size);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    text += static_cast<std::string_view>(py::bytes(parts[i]));
+    parts[i] = py::none();
+  }
+  parts.attr("clear")();
+  return text;
+}
+
 // The cutting moves of a range of lines of the source as one path (the regions there, put together).
 std::shared_ptr<const Path> cutting_path(const Program& program, std::uint32_t first_line, std::uint32_t last_line) {
   const auto source_line = [&program](std::uint32_t line) {
@@ -43,11 +71,11 @@ std::shared_ptr<const Path> cutting_path(const Program& program, std::uint32_t f
   if (inside.size() == 1) {
     return inside.front()->path;
   }
-  std::vector<Segment> segments;
+  PathBuilder joined;
   for (const auto& region : inside) {
-    segments.insert(segments.end(), region->path->segments().begin(), region->path->segments().end());
+    for (const Segment& segment : region->path->segments()) joined.add(segment);
   }
-  return std::make_shared<const Path>(std::move(segments));
+  return std::make_shared<const Path>(joined.path());
 }
 
 std::shared_ptr<Region> one_line_region(const std::shared_ptr<Path>& path, const ModalState& entry,
@@ -268,8 +296,20 @@ void register_gcode(py::module_& module) {
                     "The program switched a look-ahead mode on before it (G05.1 Q1, G08 P1, G05 P10000).")
       .def_readonly("blocks", &Region::blocks, "Source blocks with a cutting move.");
 
-  py::class_<Program, std::shared_ptr<Program>>(module, "ProgramText",
+  py::class_<Program, std::shared_ptr<Program>>(module, "ProgramText", py::buffer_protocol(),
                                                 "A program read: its text to the letter and its regions.")
+      .def_buffer([](Program& self) {
+        return py::buffer_info(reinterpret_cast<unsigned char*>(self.text.data()),  // NOLINT: bytes
+                               static_cast<py::ssize_t>(self.text.size()), true);
+      })
+      .def(
+          "view", [](const py::object& self) { return py::memoryview(self); }, "The text without a copy of it.")
+      .def_property_readonly(
+          "unexpanded", [](const Program& self) { return py::bytes(self.unexpanded); },
+          "The text as handed over, where `text` is what it comes to; else empty.")
+      .def("find", &find, py::arg("what"), py::arg("begin") = 0, "First place of bytes in the text, or -1.")
+      .def("overwrite", &overwrite, py::arg("begin"), py::arg("what"),
+           "Put bytes in the place of as many. Raises ArgumentError beyond the text's end.")
       .def_property_readonly(
           "text", [](const Program& self) { return py::bytes(self.text); }, "The whole text.")
       .def("slice", &slice, py::arg("begin"), py::arg("end"), "Bytes of the text between two offsets.")
@@ -358,6 +398,17 @@ void register_gcode(py::module_& module) {
       },
       py::arg("text"), py::arg("options") = ReaderOptions(),
       "Read a program text (bytes). Raises ProgramError with line and column.");
+
+  module.def(
+      "read_parts",
+      [](const py::list& parts, const ReaderOptions& options) {
+        std::string text = joined(parts);
+        const py::gil_scoped_release release;
+        return std::make_shared<Program>(read_program(std::move(text), options));
+      },
+      py::arg("parts"), py::arg("options"),
+      "The same of a text in parts (a list of bytes); the list is empty behind it, so that the text stands in memory "
+      "once.");
 }
 
 }  // namespace shapegcode::bindings

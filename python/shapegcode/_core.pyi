@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_planned', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -599,6 +599,11 @@ class Path:
     def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         End, shape (3,), mm.
+        """
+    @property
+    def extent_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Size of the box around it, shape (3,), mm; arcs as in `polyline`.
         """
     @property
     def fastest_feed_mm_per_s(self) -> float:
@@ -1982,13 +1987,25 @@ class ProgramText:
         """
         The cutting moves of the regions within a range of lines of the source, as one path.
         """
+    def find(self, what: bytes, begin: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
+        """
+        First place of bytes in the text, or -1.
+        """
     def origin(self, line: typing.SupportsInt | typing.SupportsIndex) -> tuple:
         """
         (line, file) of the source from which a line of `text` comes.
         """
+    def overwrite(self, begin: typing.SupportsInt | typing.SupportsIndex, what: bytes) -> None:
+        """
+        Put bytes in the place of as many. Raises ArgumentError beyond the text's end.
+        """
     def slice(self, begin: typing.SupportsInt | typing.SupportsIndex, end: typing.SupportsInt | typing.SupportsIndex) -> bytes:
         """
         Bytes of the text between two offsets.
+        """
+    def view(self) -> memoryview:
+        """
+        The text without a copy of it.
         """
     @property
     def alarms(self) -> list:
@@ -2099,6 +2116,11 @@ class ProgramText:
     def text(self) -> bytes:
         """
         The whole text.
+        """
+    @property
+    def unexpanded(self) -> bytes:
+        """
+        The text as handed over, where `text` is what it comes to; else empty.
         """
     @property
     def warnings(self) -> list:
@@ -6509,6 +6531,10 @@ def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions, progr
     """
     Play a path under a speed profile (a controller with look-ahead) through filters and plant, measured against the programmed path (None: the path itself).
     """
+def play_planned(path: Path, limits: MotionLimits, options: PlaybackOptions, programmed: Path) -> PlaybackFigures:
+    """
+    play_path under the profile of plan_speed, which is not kept as a whole where it need not be.
+    """
 def play_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: PlaybackOptions) -> PlaybackFigures:
     """
     Play set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.
@@ -6564,6 +6590,10 @@ def rapid_samples(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float
 def rapid_time_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> float:
     """
     Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: signed way of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.
+    """
+def read_parts(parts: list, options: ReaderOptions) -> ProgramText:
+    """
+    The same of a text in parts (a list of bytes); the list is empty behind it, so that the text stands in memory once.
     """
 def read_program(text: bytes, options: ReaderOptions = ...) -> ProgramText:
     """

@@ -30,7 +30,8 @@ std::vector<std::vector<Segment>> cutting_paths(const char* file, double feed_mm
   const Program program = read_program(std::string(std::istreambuf_iterator<char>(in), {}), options);
   std::vector<std::vector<Segment>> paths;
   for (const auto& region : program.regions) {
-    std::vector<Segment> segments = region->path->segments();
+    const Segments all = region->path->segments();
+    std::vector<Segment> segments(all.begin(), all.end());
     if (segments.empty()) continue;
     for (Segment& segment : segments) {
       if (feed_mm_per_s > 0.0) segment.feed_mm_per_s = feed_mm_per_s;

@@ -124,7 +124,7 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
         Row("convert_cpu", "conversion, whole process, CPU", "s", Sample.of([run.cpu_s for run in conversions]), peer,
             Sample.of([run.cpu_s for run in peers])),
         Row("convert_memory", "conversion, peak memory", "MB", Sample.of([run.peak_mb for run in conversions]),
-            at_most=1000),
+            at_most=300),
         Row("look_ahead", "look-ahead alone", unit, rate(look_ahead), peer, peer_rate),
         Row("emission", "emission alone: fit of blocks and text", unit, rate(emission), peer, peer_rate),
         Row("shape_region", "look-ahead, sampling, filter, emission", unit, rate(shaping), peer, peer_rate),

@@ -14,8 +14,11 @@ _FENCE_MM = 190.0  # beyond it the path is steered back, so that it stays within
 _STEERING_RAD = 0.1  # per line, at most
 
 
-def write_program(file: Path, lines: int) -> None:
-    """Write a smooth wandering curve in X Y Z of `lines` G01 blocks, as a finishing program is."""
+def write_program(file: Path, lines: int, *, scale: float = 1.0) -> None:
+    """Write a smooth wandering curve in X Y Z of `lines` G01 blocks, as a finishing program is.
+
+    `scale`: 1 for lines of .1 to .5 mm.
+    """
     draw = random.Random(_SEED)
     x = y = z = 0.0
     heading, pitch = 0.3, 0.0
@@ -23,7 +26,7 @@ def write_program(file: Path, lines: int) -> None:
         out.write("%\nO0001\nG21 G17 G90 G94 G40 G49 G80\nG0 X0.000 Y0.000 Z0.000\n")
         feed = " F3000."
         for _ in range(lines):
-            length = draw.uniform(_SHORTEST_MM, _LONGEST_MM)
+            length = scale * draw.uniform(_SHORTEST_MM, _LONGEST_MM)
             heading += draw.gauss(0.0, _TURN_RAD)
             pitch = _STEEPNESS_KEPT * pitch + draw.gauss(0.0, _TURN_RAD)
             x += length * math.cos(pitch) * math.cos(heading)

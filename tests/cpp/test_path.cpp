@@ -82,3 +82,51 @@ TEST_CASE("path: empty, and with segments of no length") {
   CHECK(path.point(1.0, cursor) == Vector3(1.0, 0.0, 0.0));
   CHECK(path.point(2.0, cursor) == Vector3(2.0, 0.0, 0.0));
 }
+
+TEST_CASE("path: every segment comes back as it went in, to the bit") {
+  std::mt19937_64 generator(7);
+  std::uniform_real_distribution<double> place(-100.0, 100.0);
+  std::vector<Segment> segments;
+  Vector3 at = Vector3::Zero();
+  for (std::uint32_t i = 0; i < 5000; ++i) {
+    const Vector3 to(place(generator), place(generator), i % 5 == 0 ? -0.0 : place(generator));
+    // Feeds and lines that stay for a while, and some that do not.
+    const double feed = i < 2000 ? 50.0 : 50.0 + 0.1 * static_cast<double>(i % 37);
+    Segment segment = make_line(at, to, feed, i < 3000 ? i + 1 : 7 * (i / 3));
+    if (i % 11 == 3) {
+      const Vector3 centre(0.5 * (at[0] + to[0]), 0.5 * (at[1] + to[1]), at[2]);
+      segment = make_arc(at, to, centre, std::numbers::pi, 2, feed, i);
+    }
+    if (i % 101 == 0) segment.stop_at_end = true;
+    if (i % 211 == 0) segment.length_mm *= 1.0 + 1e-15;
+    if (i % 307 == 0) segment.kind = shapegcode::SegmentKind::rapid;
+    segments.push_back(segment);
+    at = to;
+    if (i % 401 == 0) at[0] += 5e-7;  // a gap that is allowed
+  }
+  const Path path(segments);
+  REQUIRE(path.size() == segments.size());
+  double distance = 0.0;
+  std::size_t differing = 0;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    const Segment& was = segments[i];
+    const Segment now = path[i];
+    const bool same = was.start_mm == now.start_mm && was.end_mm == now.end_mm && was.centre_mm == now.centre_mm &&
+                      was.start_radius_mm == now.start_radius_mm && was.end_radius_mm == now.end_radius_mm &&
+                      was.start_angle_rad == now.start_angle_rad && was.sweep_rad == now.sweep_rad &&
+                      was.length_mm == now.length_mm && was.feed_mm_per_s == now.feed_mm_per_s &&
+                      was.line == now.line && was.kind == now.kind && was.normal == now.normal &&
+                      was.stop_at_end == now.stop_at_end && std::signbit(was.end_mm[2]) == std::signbit(now.end_mm[2]);
+    const bool one_by_one = path.start_mm(i) == was.start_mm && path.end_mm(i) == was.end_mm &&
+                            path.feed_mm_per_s(i) == was.feed_mm_per_s && path.line(i) == was.line &&
+                            path.is_arc(i) == (was.kind == shapegcode::SegmentKind::arc) &&
+                            path.distance_mm(i) == distance;
+    differing += same && one_by_one ? 0U : 1U;
+    distance += was.length_mm;
+  }
+  CHECK(differing == 0);
+  CHECK(path.length_mm() == distance);
+  const Path copy = path;
+  CHECK(copy[17].end_mm == segments[17].end_mm);
+  CHECK(path.segments().part(100, 3).back().line == segments[102].line);
+}

@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -27,6 +28,7 @@ using shapegcode::Path;
 using shapegcode::plan_speed;
 using shapegcode::play_blocks;
 using shapegcode::play_path;
+using shapegcode::play_planned;
 using shapegcode::play_samples;
 using shapegcode::PlaybackFigures;
 using shapegcode::PlaybackOptions;
@@ -506,6 +508,37 @@ TEST_CASE("playback: a planned path measured against the one it was made from") 
   CHECK(own.command.max_abs_mm == 0.0);
   CHECK(figures.duration_s == own.duration_s);
   CHECK(figures.residual_mm == own.residual_mm);
+}
+
+TEST_CASE("playback: a plan that is not kept is played as one that is, bit for bit") {
+  std::mt19937_64 generator(3);
+  std::uniform_real_distribution<double> length(0.01, 3.0);
+  std::uniform_real_distribution<double> turn(-1.0, 1.0);
+  std::uniform_real_distribution<double> feed(1.0, 120.0);
+  std::vector<Segment> segments;
+  Vector3 at = Vector3::Zero();
+  double heading = 0.0;
+  for (int i = 0; i < 3000; ++i) {
+    heading += i % 50 == 0 ? turn(generator) : 0.05 * turn(generator);
+    const Vector3 to = at + length(generator) * Vector3(std::cos(heading), std::sin(heading), 0.1);
+    segments.push_back(make_line(at, to, i % 3 == 0 ? feed(generator) : 60.0));
+    at = to;
+  }
+  const PathPointer path = path_of(segments);
+  for (const auto law : {shapegcode::AccelerationLaw::constant_time, shapegcode::AccelerationLaw::jerk_limited}) {
+    MotionLimits limits;
+    limits.law = law;
+    limits.max_acceleration_mm_per_s2 = Vector3::Constant(2000.0);
+    limits.corner_speed_difference_mm_per_s = Vector3::Constant(8.0);
+    PlaybackOptions options = vertical_machine(1e-3);
+    options.record_samples = 10'000'000;
+    const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*path, limits));
+    const PlaybackFigures kept = play_path(path, profile, *path, options);
+    const PlaybackFigures passed = play_planned(path, limits, *path, options);
+    CHECK(passed.duration_s == kept.duration_s);
+    CHECK(passed.recorded_command.positions_mm == kept.recorded_command.positions_mm);
+    CHECK(passed.response.sum_of_squares_mm2 == kept.response.sum_of_squares_mm2);
+  }
 }
 
 TEST_CASE("playback: the response alone is measured as it is beside the command") {

@@ -139,7 +139,8 @@ TEST_CASE("played stream: a path gives what playback records, bit for bit, in pi
 }
 
 TEST_CASE("played stream: blocks give what playback records, bit for bit, with the line of each") {
-  auto segments = some_path()->segments();
+  const shapegcode::Segments all = some_path()->segments();
+  std::vector<Segment> segments(all.begin(), all.end());
   for (std::size_t i = 0; i < segments.size(); ++i) segments[i].line = static_cast<std::uint32_t>(10 * (i + 1));
   const auto blocks = std::make_shared<const Path>(segments);
   PlaybackOptions options = vertical_machine();

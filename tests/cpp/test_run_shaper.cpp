@@ -218,7 +218,8 @@ TEST_CASE("run shaper: a run that is longer than what is kept in memory") {
 }
 
 TEST_CASE("run shaper: a region cut into pieces is the region, bit for bit") {
-  std::vector<Segment> segments = paper_path(180.0)->segments();
+  const shapegcode::Segments paper = paper_path(180.0)->segments();
+  std::vector<Segment> segments(paper.begin(), paper.end());
   segments.push_back(make_line({40, 40, 0}, {10, 40, 0}, 180.0));
   segments.push_back(make_arc({10, 40, 0}, {5, 35, 0}, {10, 35, 0}, std::numbers::pi / 2, 2, 180.0));
   segments.push_back(make_line({5, 35, 0}, {5, 20, 0}, 180.0));

@@ -35,7 +35,7 @@ enum class BlockEnd : std::uint8_t {
 class BlockPlayer {
  public:
   /// `override_ratio` scales every feed. Throws Error(argument) on period or ratio <= 0, or a segment without feed.
-  BlockPlayer(std::span<const Segment> blocks, double period_s, BlockEnd block_end, double override_ratio = 1.0);
+  BlockPlayer(Segments blocks, double period_s, BlockEnd block_end, double override_ratio = 1.0);
 
   /// Stop for so long behind a block, as where the block buffer runs empty: the set-points stay at its end, then the
   /// next block follows. One pause per player, a later call takes the place of an earlier one. Under `ceil` whole
@@ -59,7 +59,8 @@ class BlockPlayer {
   /// Passes over a group of blocks that ends within the time elapsed; false if none begins here that does.
   bool leap(double slack) noexcept;
 
-  std::span<const Segment> blocks_;
+  Segments blocks_;
+  Segment open_;  // of the blocks, the one under way
   double period_s_;
   double ratio_;
   BlockEnd block_end_;
@@ -76,7 +77,7 @@ class BlockPlayer {
 };
 
 /// Sum of block durations in s.
-[[nodiscard]] double play_duration_s(std::span<const Segment> blocks, double period_s, BlockEnd block_end,
+[[nodiscard]] double play_duration_s(const Segments& blocks, double period_s, BlockEnd block_end,
                                      double override_ratio = 1.0);
 
 /// Where the controller accelerates a cutting move.

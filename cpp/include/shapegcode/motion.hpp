@@ -70,6 +70,12 @@ struct SpeedPhase {
   double distance_mm = 0.0;  ///< along the path at its begin
   double speed_mm_per_s = 0.0;
   double acceleration_mm_per_s2 = 0.0;
+
+  /// Distance along the path at a time within it.
+  [[nodiscard]] double distance_at(double time_s) const noexcept {
+    const double t = time_s - start_s;
+    return distance_mm + t * (speed_mm_per_s + 0.5 * acceleration_mm_per_s2 * t);
+  }
 };
 
 /// Distance along a path as a function of time. Constant after construction.
@@ -137,7 +143,7 @@ struct SpeedCaps {
 /// across it (a plunge or retract), which a shaper must not mix; corners that the filter behind cannot pass within the
 /// contour tolerance at any speed; and exact stops. `axis_angle_rad`: how far a side may lean from the tool axis Z and
 /// still count as plunge; `corner_angle_rad`: least change of direction of such a corner.
-[[nodiscard]] std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
+[[nodiscard]] std::vector<std::size_t> forced_stops(const Segments& segments, double axis_angle_rad,
                                                     double corner_angle_rad, const MotionLimits& limits,
                                                     const FilterTolerance& filter = {});
 
@@ -158,11 +164,14 @@ class Interpolator {
   [[nodiscard]] double distance_mm() const noexcept { return distance_mm_; }
   /// Segment of the set-point last given.
   [[nodiscard]] std::size_t segment() const noexcept { return path_cursor_; }
+  [[nodiscard]] const Segment& on() const noexcept { return on_; }
   /// Number of set-points from start to end.
   [[nodiscard]] std::size_t sample_count() const noexcept { return sample_count_; }
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
 
  private:
+  void take_segment() noexcept;
+
   std::shared_ptr<const Path> path_;
   std::shared_ptr<const SpeedProfile> profile_;
   FirStream smoothing_;
@@ -171,6 +180,9 @@ class Interpolator {
   std::size_t sample_count_ = 0;
   std::size_t index_ = 0;
   std::size_t path_cursor_ = 0;
+  Segment on_;                // of the path, at the cursor
+  double on_begin_mm_ = 0.0;  // distance of its start and its end along the path
+  double on_end_mm_ = 0.0;
   std::size_t phase_cursor_ = 0;
   double distance_mm_ = 0.0;
 };

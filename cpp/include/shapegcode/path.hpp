@@ -2,8 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
+#include <iterator>
+#include <memory>
+#include <span>
+#include <utility>
 #include <vector>
 
+#include "shapegcode/columns.hpp"
 #include "shapegcode/samples.hpp"
 
 namespace shapegcode {
@@ -29,7 +35,16 @@ struct Segment {
 };
 
 /// A straight move.
-[[nodiscard]] Segment make_line(const Vector3& start, const Vector3& end, double feed_mm_per_s, std::uint32_t line = 0);
+[[nodiscard]] inline Segment make_line(const Vector3& start, const Vector3& end, double feed_mm_per_s,
+                                       std::uint32_t line = 0) {
+  Segment segment;
+  segment.start_mm = start;
+  segment.end_mm = end;
+  segment.length_mm = (end - start).norm();
+  segment.feed_mm_per_s = feed_mm_per_s;
+  segment.line = line;
+  return segment;
+}
 
 /// An arc or helix about `centre`; `sweep_rad` signed (see Segment). Throws Error(argument) on a zero radius.
 [[nodiscard]] Segment make_arc(const Vector3& start, const Vector3& end, const Vector3& centre, double sweep_rad,
@@ -51,27 +66,159 @@ struct Nearest {
 };
 [[nodiscard]] Nearest nearest_on(const Segment& segment, const Vector3& p) noexcept;
 
-/// A connected run of segments with the distance of each from the start. Constant after construction.
+/// Segments in a row, of a path or of an array, by value. An array must outlive it.
+class Segments;
+
+/// A connected run of segments with the distance of each from the start. Constant after construction; a copy is the
+/// same path, not another one. A line takes its start, its distance and, where they change, feed and line: its length
+/// is worked out when it is asked for. Arcs, and what else is no plain line, are kept in whole beside it.
 class Path {
  public:
   Path() = default;
   /// Throws Error(argument) if a segment does not start where its predecessor ends (1e-6 mm) or a number is not finite.
-  explicit Path(std::vector<Segment> segments);
+  explicit Path(Segments segments);
 
-  [[nodiscard]] const std::vector<Segment>& segments() const noexcept { return segments_; }
-  [[nodiscard]] std::size_t size() const noexcept { return segments_.size(); }
-  [[nodiscard]] const Segment& operator[](std::size_t i) const noexcept { return segments_[i]; }
+  [[nodiscard]] Segments segments() const noexcept;
+  [[nodiscard]] std::size_t size() const noexcept { return data_ ? data_->feeds.size() : 0; }
+  [[nodiscard]] Segment operator[](std::size_t i) const noexcept;
   /// Distance of segment i's start from the path's start; `distance(size())` is the whole length.
-  [[nodiscard]] double distance_mm(std::size_t i) const noexcept { return distance_mm_[i]; }
-  [[nodiscard]] double length_mm() const noexcept { return distance_mm_.empty() ? 0.0 : distance_mm_.back(); }
+  [[nodiscard]] double distance_mm(std::size_t i) const noexcept { return data_->nodes[i].distance_mm; }
+  [[nodiscard]] double length_mm() const noexcept { return size() == 0 ? 0.0 : distance_mm(size()); }
+  // One number of segment i, without the others.
+  [[nodiscard]] const Vector3& start_mm(std::size_t i) const noexcept { return data_->nodes[i].start_mm; }
+  [[nodiscard]] const Vector3& end_mm(std::size_t i) const noexcept;
+  [[nodiscard]] double feed_mm_per_s(std::size_t i) const noexcept { return data_->feeds[i]; }
+  [[nodiscard]] std::uint32_t line(std::size_t i) const noexcept;
+  [[nodiscard]] bool is_arc(std::size_t i) const noexcept;
+  /// Whether it is a line that ends where the next one starts.
+  [[nodiscard]] bool is_plain(std::size_t i) const noexcept { return data_->places[i].kept == 0; }
 
   /// Position at `s_mm` from the start. `cursor` is the segment index of the previous call: amortised O(1) on a
   /// monotonous walk, and real-time safe.
   [[nodiscard]] Vector3 point(double s_mm, std::size_t& cursor) const noexcept;
+  /// Moves `cursor` to the segment at `s_mm` from the start.
+  void seek(double s_mm, std::size_t& cursor) const noexcept;
 
  private:
-  std::vector<Segment> segments_;
-  std::vector<double> distance_mm_;  // size()+1 entries
+  friend class PathBuilder;
+
+  struct Node {
+    Vector3 start_mm;    // of a segment; the last one is the path's end
+    double distance_mm;  // from the path's start
+  };
+  struct Place {
+    std::uint32_t line;  // of the source, less the index of the segment
+    std::uint32_t kept;  // 1 + index into `kept`; 0: a plain line
+
+    friend bool operator==(const Place&, const Place&) = default;
+  };
+  struct Data {
+    Column<Node> nodes;
+    SteadyColumn<double> feeds;
+    SteadyColumn<Place> places;
+    std::vector<Segment> kept;
+  };
+
+  std::shared_ptr<const Data> data_;
 };
+
+/// Makes a path segment by segment, without an array of them.
+class PathBuilder {
+ public:
+  /// Throws Error(argument) as `Path` does.
+  void add(const Segment& segment);
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  /// The path of what was added; the builder is then as new.
+  [[nodiscard]] Path path();
+
+ private:
+  void put(const Vector3& next_mm);
+
+  std::shared_ptr<Path::Data> data_ = std::make_shared<Path::Data>();
+  Segment last_;  // not yet put: where the next one starts is not known
+  std::size_t size_ = 0;
+  double distance_mm_ = 0.0;  // of the start of `last_`
+};
+
+class Segments {
+ public:
+  using value_type = Segment;
+
+  class Iterator {
+   public:
+    using iterator_category = std::input_iterator_tag;
+    using value_type = Segment;
+    using difference_type = std::ptrdiff_t;
+    using pointer = const Segment*;
+    using reference = Segment;
+
+    Iterator(const Segments* of, std::size_t at) noexcept : of_(of), at_(at) {}
+    Segment operator*() const noexcept { return (*of_)[at_]; }
+    Iterator& operator++() noexcept {
+      ++at_;
+      return *this;
+    }
+    Iterator operator++(int) noexcept { return {of_, at_++}; }
+    friend bool operator==(const Iterator& a, const Iterator& b) noexcept { return a.at_ == b.at_; }
+
+   private:
+    const Segments* of_;
+    std::size_t at_;
+  };
+
+  // What takes segments takes both.  NOLINTBEGIN(google-explicit-constructor)
+  Segments(Path path) noexcept : path_(std::move(path)), count_(path_.size()) {}
+  Segments(std::span<const Segment> array) noexcept : array_(array.data()), count_(array.size()) {}
+  Segments(const std::vector<Segment>& array) noexcept : Segments(std::span<const Segment>(array)) {}
+  Segments(std::initializer_list<Segment> array) noexcept : Segments(std::span<const Segment>(array)) {}
+  // NOLINTEND(google-explicit-constructor)
+
+  [[nodiscard]] std::size_t size() const noexcept { return count_; }
+  [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
+  [[nodiscard]] Segment operator[](std::size_t i) const noexcept {
+    return array_ == nullptr ? path_[first_ + i] : array_[first_ + i];
+  }
+  [[nodiscard]] Segment front() const noexcept { return (*this)[0]; }
+  [[nodiscard]] Segment back() const noexcept { return (*this)[count_ - 1]; }
+  [[nodiscard]] Iterator begin() const noexcept { return {this, 0}; }
+  [[nodiscard]] Iterator end() const noexcept { return {this, count_}; }
+  /// From `first` on, so many.
+  [[nodiscard]] Segments part(std::size_t first, std::size_t count) const noexcept {
+    Segments part = *this;
+    part.first_ += first;
+    part.count_ = count;
+    return part;
+  }
+
+ private:
+  Path path_;
+  const Segment* array_ = nullptr;
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+};
+
+inline Segments Path::segments() const noexcept { return *this; }
+
+inline Segment Path::operator[](std::size_t i) const noexcept {
+  const Place place = data_->places[i];
+  if (place.kept != 0) return data_->kept[place.kept - 1];
+  Segment segment = make_line(start_mm(i), start_mm(i + 1), data_->feeds[i]);
+  segment.line = place.line + static_cast<std::uint32_t>(i);
+  return segment;
+}
+
+inline const Vector3& Path::end_mm(std::size_t i) const noexcept {
+  const Place place = data_->places[i];
+  return place.kept == 0 ? start_mm(i + 1) : data_->kept[place.kept - 1].end_mm;
+}
+
+inline std::uint32_t Path::line(std::size_t i) const noexcept {
+  return data_->places[i].line + static_cast<std::uint32_t>(i);
+}
+
+inline bool Path::is_arc(std::size_t i) const noexcept {
+  const Place place = data_->places[i];
+  return place.kept != 0 && data_->kept[place.kept - 1].kind == SegmentKind::arc;
+}
 
 }  // namespace shapegcode

@@ -104,9 +104,14 @@ struct PlaybackFigures {
                                         std::shared_ptr<const SpeedProfile> profile, const Path& programmed,
                                         const PlaybackOptions& options);
 
+/// The same with the profile that `plan_speed` gives under the limits, which is not kept where it need not be: of the
+/// plan then stands in memory a number per segment.
+[[nodiscard]] PlaybackFigures play_planned(const std::shared_ptr<const Path>& path, const MotionLimits& limits,
+                                           const Path& programmed, const PlaybackOptions& options);
+
 /// Plays blocks at their feed (a controller without look-ahead), measured against the programmed `path`. Throws
 /// Error(argument) on starved blocks that do not ascend or do not exist, and together with `last_seconds`.
-[[nodiscard]] PlaybackFigures play_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
+[[nodiscard]] PlaybackFigures play_blocks(const Segments& blocks, const Path& path, BlockEnd block_end,
                                           double override_ratio, const PlaybackOptions& options);
 
 /// Any set-points, (n, 3), measured against the programmed `path` (empty: no contour figures).
@@ -114,7 +119,7 @@ struct PlaybackFigures {
 
 /// Where a stop between two blocks excites most: for each axis the block at whose end its speed is largest, the last
 /// block (which ends in a stop) left out. Ascending, each once; an axis that never moves there has none.
-[[nodiscard]] std::vector<std::size_t> fastest_block_ends(std::span<const Segment> blocks);
+[[nodiscard]] std::vector<std::size_t> fastest_block_ends(const Segments& blocks);
 
 /// Blocks that a controller with look-ahead would run slower than programmed: per-axis speed step at a border over the
 /// corner limit, feed over an axis limit.
@@ -122,7 +127,7 @@ struct LookAheadLimits {
   Vector3 corner_speed_difference_mm_per_s;
   Vector3 max_feed_mm_per_s;
 };
-[[nodiscard]] std::size_t count_slowed_blocks(std::span<const Segment> blocks, const LookAheadLimits& limits);
+[[nodiscard]] std::size_t count_slowed_blocks(const Segments& blocks, const LookAheadLimits& limits);
 
 /// What a run is looked at with.
 struct TravelOptions {
@@ -148,7 +153,7 @@ struct Travel {
                                  std::span<const double> stations_mm, const TravelOptions& options);
 
 /// Blocks at their feed (a controller without look-ahead), followed along `along`, of which they are made.
-[[nodiscard]] Travel travel_blocks(std::span<const Segment> blocks, const Path& along, BlockEnd block_end,
+[[nodiscard]] Travel travel_blocks(const Segments& blocks, const Path& along, BlockEnd block_end,
                                    std::span<const double> stations_mm, const TravelOptions& options);
 
 }  // namespace shapegcode

@@ -179,6 +179,7 @@ struct Program {
   /// The text holds calls, macro statements or coordinate modes: `text` is the plain program that they come to, and
   /// line numbers of regions and steps count its lines; `origins` leads back.
   bool expanded = false;
+  std::string unexpanded;                     ///< the text as handed over, if expanded
   std::vector<LineOrigin> origins;            ///< one per line of `text`; empty if not expanded
   std::vector<std::string> files;             ///< names; the first is empty and stands for the program's own file
   std::vector<std::int64_t> program_numbers;  ///< all O numbers in the file

@@ -11,6 +11,7 @@
 //
 // A control needs less: "shapegcode/controller.hpp", or "shapegcode/prototype.hpp" for a path that is known as a whole.
 
+#include "shapegcode/columns.hpp"
 #include "shapegcode/command.hpp"
 #include "shapegcode/control.hpp"
 #include "shapegcode/controller.hpp"

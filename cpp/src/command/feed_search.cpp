@@ -75,7 +75,7 @@ class FeedSearch {
     // Corners that do not answer to a lower speed: what bends them is the change of speed around them.
     for (std::size_t i = 1; i < path_->size(); ++i) {
       if (caps_.at_junction[i] < none && deviation_.at_junction[i] > tolerance_ &&
-          junction_change(*path_, i) >= corner_change) {
+          junction_change((*path_)[i - 1], (*path_)[i]) >= corner_change) {
         last.stops.push_back(i);
       }
     }
@@ -91,10 +91,6 @@ class FeedSearch {
     RunShaper shaper(path_, plan.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
     const std::size_t rows = 2 * static_cast<std::size_t>(shaper.periods()) + 1;
     const bool keeps = rows <= most_rows_kept;
-    if (keeps) {
-      plan.rows.positions.reserve(rows);
-      plan.rows.arc_normals.reserve(rows / 2);
-    }
     Vector3 position;
     for (std::size_t row = 0; row < rows; ++row) {
       shaper.next(position);
@@ -128,7 +124,7 @@ class FeedSearch {
       changed = true;
     };
     for (std::size_t i = 0; i < path_->size(); ++i) {
-      const Segment& segment = (*path_)[i];
+      const Segment segment = (*path_)[i];
       const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
       if (segment.kind == SegmentKind::arc) {
         const float clear = deviation_.on_segment[i];
@@ -138,8 +134,8 @@ class FeedSearch {
       if (i == 0) {
         continue;
       }
-      const Segment& before = (*path_)[i - 1];
-      const double change = junction_change(*path_, i);
+      const Segment before = (*path_)[i - 1];
+      const double change = junction_change(before, segment);
       if (change < 1e-6) {
         continue;  // an arc that begins or ends tangentially is slowed as a whole
       }
@@ -164,7 +160,7 @@ class FeedSearch {
   bool slow_lines() {
     bool changed = false;
     for (std::size_t i = 0; i < path_->size(); ++i) {
-      const Segment& segment = (*path_)[i];
+      const Segment segment = (*path_)[i];
       const auto deviation = static_cast<double>(deviation_.on_segment[i]);
       if (segment.kind == SegmentKind::arc || deviation <= tolerance_) {
         continue;

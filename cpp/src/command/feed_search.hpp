@@ -17,8 +17,8 @@ namespace shapegcode {
 
 /// A shaped run as `RunShaper` gives it out.
 struct RunRows {
-  std::vector<Vector3> positions;        ///< one per row
-  std::vector<std::int8_t> arc_normals;  ///< one per block period
+  Column<Vector3> positions;              ///< one per row
+  SteadyColumn<std::int8_t> arc_normals;  ///< one per block period
 };
 
 /// A run with the speed at which it keeps the contour tolerance.

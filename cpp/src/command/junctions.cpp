@@ -2,14 +2,23 @@
 
 namespace shapegcode {
 
-double junction_change(const Path& path, std::size_t i) noexcept {
-  const Segment& before = path[i - 1];
-  return (tangent_at(path[i], 0.0) - tangent_at(before, before.length_mm)).norm();
+double junction_change(const Segment& before, const Segment& after) noexcept {
+  return (tangent_at(after, 0.0) - tangent_at(before, before.length_mm)).norm();
 }
 
-bool passes_corner(const Path& path, std::size_t before, std::size_t after) noexcept {
+Corners::Corners(const Path& path) : at_(path.size(), false) {
+  if (path.size() == 0) return;
+  Segment before = path[0];
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const Segment after = path[i];
+    at_[i] = junction_change(before, after) >= corner_change;
+    before = after;
+  }
+}
+
+bool Corners::passed(std::size_t before, std::size_t after) const noexcept {
   for (std::size_t i = before + 1; i <= after; ++i) {
-    if (junction_change(path, i) >= corner_change) {
+    if (at_[i]) {
       return true;
     }
   }

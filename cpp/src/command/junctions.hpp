@@ -1,18 +1,27 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "shapegcode/path.hpp"
 
 namespace shapegcode {
 
-/// Change of direction as segment `i` >= 1 of a path is entered: the length of the difference of the unit tangents.
-[[nodiscard]] double junction_change(const Path& path, std::size_t i) noexcept;
+/// Change of direction where two segments meet: the length of the difference of the unit tangents.
+[[nodiscard]] double junction_change(const Segment& before, const Segment& after) noexcept;
 
 /// From this `junction_change` on a junction is a corner: 5 degrees. Smoother junctions of polylines are curves.
 inline constexpr double corner_change = 0.0872;
 
-/// Whether there is a corner on the way from one segment to a later one.
-[[nodiscard]] bool passes_corner(const Path& path, std::size_t before, std::size_t after) noexcept;
+/// The corners of a path, a bit each.
+class Corners {
+ public:
+  explicit Corners(const Path& path);
+  /// Whether there is a corner on the way from one segment to a later one.
+  [[nodiscard]] bool passed(std::size_t before, std::size_t after) const noexcept;
+
+ private:
+  std::vector<bool> at_;  // where a segment is entered
+};
 
 }  // namespace shapegcode

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "command/junctions.hpp"
-
 namespace shapegcode {
 namespace {
 
@@ -26,7 +24,7 @@ Vector3 DeviationMeter::as_block(std::size_t row) const noexcept {
   const auto half = static_cast<std::ptrdiff_t>(half_);
   bool bends = row % 2 == 0;
   for (std::size_t k = rows_.segment(at - half); k <= rows_.segment(at + half); ++k) {
-    bends = bends || rows_.path()[k].kind == SegmentKind::arc;
+    bends = bends || rows_.path().is_arc(k);
   }
   Vector3 position;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
@@ -73,15 +71,15 @@ void DeviationMeter::measure(std::size_t row) {
   const auto at = static_cast<std::ptrdiff_t>(row);
   const std::uint32_t behind = rows_.segment(at - static_cast<std::ptrdiff_t>(around));
   const std::uint32_t before = rows_.segment(at - static_cast<std::ptrdiff_t>(around) - 1);
-  if (behind != before && passes_corner(rows_.path(), before, behind)) {
-    size = std::max(size, missed_by(rows_.path()[behind].start_mm, row));
+  if (behind != before && rows_.corners().passed(before, behind)) {
+    size = std::max(size, missed_by(rows_.path().start_mm(behind), row));
   }
   const auto found = static_cast<float>(size);
   // A corner's deviation is no reason to slow the whole arc beside it.
   const auto half = static_cast<std::ptrdiff_t>(half_);
   const std::uint32_t first = rows_.segment(at - half);
   const std::uint32_t last = rows_.segment(at + half);
-  std::vector<float>& on = passes_corner(rows_.path(), first, last) ? measured_.near_corner : measured_.on_segment;
+  std::vector<float>& on = rows_.corners().passed(first, last) ? measured_.near_corner : measured_.on_segment;
   for (std::uint32_t k = first; k <= last; ++k) {
     on[k] = std::max(on[k], found);
     if (k > first) {

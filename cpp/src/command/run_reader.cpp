@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "command/junctions.hpp"
-
 namespace shapegcode {
 namespace {
 
@@ -19,6 +17,7 @@ double smooth_step(double x) noexcept { return x * x * (3.0 - 2.0 * x); }
 RunReader::RunReader(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
                      const RunFilter& filter, std::size_t steps_per_half, bool keeps_places)
     : path_(std::move(path)),
+      corners_(*path_),
       filter_(filter),
       steps_per_half_(steps_per_half),
       keeps_places_(keeps_places),
@@ -60,7 +59,7 @@ void RunReader::read_command() {
     command_[axis].push_back(position[static_cast<Eigen::Index>(axis)]);
     correction_[axis].push_back(0.0);
   }
-  const Segment& on = (*path_)[ahead_.segment()];
+  const Segment& on = ahead_.on();
   if (read_ == 0) feed_.assign(static_cast<std::size_t>(history_), on.feed_mm_per_s);
   feed_.push_back(on.feed_mm_per_s);
   if (filter_.following) {
@@ -79,7 +78,7 @@ void RunReader::read_error() {
   const std::size_t segment = ahead_.segment();
   // Near a corner the place along the path matters too: it is where both legs meet.
   const double delay_rows = std::max(1.0, filter_.mean_delay_s / filter_.half_period_s);
-  if (passes_corner(*path_, segment_before_, segment)) {
+  if (corners_.passed(segment_before_, segment)) {
     since_corner_ = 0.0;
   }
   segment_before_ = segment;
@@ -92,7 +91,7 @@ void RunReader::read_error() {
     target_->step(wanted);
   }
   const std::size_t at = target_->segment();
-  const Vector3 tangent = tangent_at((*path_)[at], target_->distance_mm() - path_->distance_mm(at));
+  const Vector3 tangent = tangent_at(target_->on(), target_->distance_mm() - path_->distance_mm(at));
   Vector3 error;
   const std::size_t row = index(read_ - 1);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {

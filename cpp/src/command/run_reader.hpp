@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "command/junctions.hpp"
 #include "command/run_filter.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/path.hpp"
@@ -27,6 +28,7 @@ class RunReader {
             std::size_t steps_per_half, bool keeps_places);
 
   [[nodiscard]] const Path& path() const noexcept { return *path_; }
+  [[nodiscard]] const Corners& corners() const noexcept { return corners_; }
   [[nodiscard]] const RunFilter& filter() const noexcept { return filter_; }
   /// Whole block periods of the shaped run.
   [[nodiscard]] std::uint32_t periods() const noexcept { return periods_; }
@@ -86,6 +88,7 @@ class RunReader {
   }
 
   std::shared_ptr<const Path> path_;
+  Corners corners_;
   const RunFilter& filter_;
   std::size_t steps_per_half_;
   bool keeps_places_;

@@ -21,9 +21,7 @@ std::shared_ptr<const Path> sub_path(const std::shared_ptr<const Path>& path, st
   if (first == 0 && last == path->size()) {
     return path;
   }
-  const std::vector<Segment>& segments = path->segments();
-  return std::make_shared<const Path>(std::vector<Segment>(segments.begin() + static_cast<std::ptrdiff_t>(first),
-                                                           segments.begin() + static_cast<std::ptrdiff_t>(last)));
+  return std::make_shared<const Path>(path->segments().part(first, last - first));
 }
 
 // The rows of a piece; a piece without periods has the one row on which it rests.
@@ -46,7 +44,7 @@ class Run {
   // `filter` stays the caller's.
   Run(PlannedRun plan, const RunFilter& filter, const RunLimits& limits, std::size_t steps_per_half)
       : plan_(std::move(plan)) {
-    if (plan_.rows.positions.empty()) shaper_.emplace(plan_.path, plan_.profile, filter, limits, steps_per_half);
+    if (plan_.rows.positions.size() == 0) shaper_.emplace(plan_.path, plan_.profile, filter, limits, steps_per_half);
   }
 
   [[nodiscard]] const PlannedRun& plan() const noexcept { return plan_; }
@@ -59,7 +57,8 @@ class Run {
     if (shaper_) {
       shaper_->next(position);
     } else {
-      position = plan_.rows.positions[row_++];
+      position = plan_.rows.positions[row_];
+      plan_.rows.positions.forget_before(row_++);  // each is asked for once
     }
   }
 

@@ -56,62 +56,76 @@ double DeviationStats::rms_mm() const noexcept {
 
 std::shared_ptr<const ContourTracker::Geometry> ContourTracker::geometry_of(const Path& path) {
   auto geometry = std::make_shared<Geometry>();
-  auto& [pieces, arc_of, arcs] = *geometry;
   if (path.size() == 0) refuse("contour error needs a path with at least one segment");
-  pieces.reserve(path.size());
-  arc_of.reserve(path.size());
-  Vector3 direction = Vector3::Zero();
+  geometry->path = path;
   for (std::size_t i = 0; i < path.size(); ++i) {
-    const Segment& segment = path[i];
-    if (segment.length_mm > 0.0) direction = tangent_at(segment, 0.0);
-    pieces.push_back({segment.start_mm, direction, segment.length_mm, path.distance_mm(i)});
-    arc_of.push_back(-1);
-    if (segment.kind != SegmentKind::arc || !(segment.length_mm > 0.0)) continue;
-    Arc arc;
-    arc.segment = segment;
-    arc.n = segment.normal;
-    arc.a = ArcFrame(arc.n).a;
-    arc.b = ArcFrame(arc.n).b;
-    arc.cosine = std::cos(segment.start_angle_rad);
-    arc.sine = std::sin(segment.start_angle_rad);
-    arc.sense = segment.sweep_rad < 0.0 ? -1.0 : 1.0;
-    arc.turn = std::abs(segment.sweep_rad);
-    arc.radius_rate = (segment.end_radius_mm - segment.start_radius_mm) / arc.turn;
-    arc.pitch = (segment.end_mm[arc.n] - segment.start_mm[arc.n]) / arc.turn;
-    // Radii that differ by rounding only are one circle.
-    if (std::abs(arc.radius_rate) * arc.turn < 1e-12 * segment.start_radius_mm) arc.radius_rate = 0.0;
-    arc.start_tangent = tangent_at(segment, 0.0);
-    arc.end_tangent = tangent_at(segment, segment.length_mm);
-    direction = arc.end_tangent;
-    arc_of.back() = static_cast<std::int32_t>(arcs.size());
-    arcs.push_back(arc);
-  }
-  // Pieces without length at the start take the direction that follows.
-  for (std::size_t i = pieces.size() - 1; i-- > 0;) {
-    if (pieces[i].direction.isZero(0.0)) pieces[i].direction = pieces[i + 1].direction;
+    std::int32_t index = -1;
+    if (path.is_arc(i) && path[i].length_mm > 0.0) {
+      index = static_cast<std::int32_t>(geometry->arcs.size());
+      geometry->arcs.push_back(arc_of(path[i]));
+    }
+    geometry->arc_of.push_back(index);
   }
   return geometry;
 }
 
-ContourTracker::ContourTracker(const Path& path) : geometry_(geometry_of(path)) {
-  last_ = geometry_->pieces.front().start;
+ContourTracker::Arc ContourTracker::arc_of(const Segment& segment) noexcept {
+  Arc arc;
+  arc.segment = segment;
+  arc.n = segment.normal;
+  arc.a = ArcFrame(arc.n).a;
+  arc.b = ArcFrame(arc.n).b;
+  arc.cosine = std::cos(segment.start_angle_rad);
+  arc.sine = std::sin(segment.start_angle_rad);
+  arc.sense = segment.sweep_rad < 0.0 ? -1.0 : 1.0;
+  arc.turn = std::abs(segment.sweep_rad);
+  arc.radius_rate = (segment.end_radius_mm - segment.start_radius_mm) / arc.turn;
+  arc.pitch = (segment.end_mm[arc.n] - segment.start_mm[arc.n]) / arc.turn;
+  // Radii that differ by rounding only are one circle.
+  if (std::abs(arc.radius_rate) * arc.turn < 1e-12 * segment.start_radius_mm) arc.radius_rate = 0.0;
+  arc.start_tangent = tangent_at(segment, 0.0);
+  arc.end_tangent = tangent_at(segment, segment.length_mm);
+  return arc;
 }
 
-Vector3 ContourTracker::start_tangent(std::size_t piece) const noexcept { return geometry_->pieces[piece].direction; }
+ContourTracker::Piece ContourTracker::piece_of(std::size_t i) const noexcept {
+  const Path& path = geometry_->path;
+  if (path.is_plain(i)) {
+    const Vector3& start = path.start_mm(i);
+    const Vector3 along = path.start_mm(i + 1) - start;
+    const double length = along.norm();
+    if (length > 0.0) return {start, along / length, length, path.distance_mm(i)};
+  }
+  const Segment segment = path[i];
+  Piece piece{segment.start_mm, tangent_at(segment, 0.0), segment.length_mm, path.distance_mm(i)};
+  // Pieces without length take the direction of the end before them; at the start the one that follows.
+  for (std::size_t k = i; !(piece.length > 0.0) && piece.direction.isZero(0.0) && k-- > 0;) {
+    const Segment before = path[k];
+    piece.direction = tangent_at(before, before.length_mm);
+  }
+  for (std::size_t k = i; !(piece.length > 0.0) && piece.direction.isZero(0.0) && ++k < path.size();) {
+    piece.direction = tangent_at(path[k], 0.0);
+  }
+  return piece;
+}
+
+ContourTracker::ContourTracker(const Path& path) : geometry_(geometry_of(path)) { last_ = path.start_mm(0); }
+
+Vector3 ContourTracker::start_tangent(std::size_t piece) const noexcept { return at(piece).direction; }
 
 Vector3 ContourTracker::end_tangent(std::size_t piece) const noexcept {
   const std::int32_t arc = geometry_->arc_of[piece];
-  return arc < 0 ? geometry_->pieces[piece].direction : geometry_->arcs[static_cast<std::size_t>(arc)].end_tangent;
+  return arc < 0 ? at(piece).direction : geometry_->arcs[static_cast<std::size_t>(arc)].end_tangent;
 }
 
-const Vector3& ContourTracker::direction_at(std::size_t piece, const Foot& foot) const noexcept {
-  return geometry_->arc_of[piece] < 0 ? geometry_->pieces[piece].direction : foot.tangent;
+Vector3 ContourTracker::direction_at(std::size_t piece, const Foot& foot) const noexcept {
+  return geometry_->arc_of[piece] < 0 ? at(piece).direction : foot.tangent;
 }
 
 inline ContourTracker::Foot ContourTracker::foot_on(std::size_t piece, const Vector3& p,
                                                     const Window& window) const noexcept {
   if (geometry_->arc_of[piece] >= 0) return foot_on_arc(piece, p, window);
-  const Piece& line = geometry_->pieces[piece];
+  const Piece& line = at(piece);
   Foot foot;
   const Vector3 from_start = p - line.start;
   const double along = std::clamp(from_start.dot(line.direction), 0.0, line.length);
@@ -160,7 +174,7 @@ double ContourTracker::refined_foot(const Arc& arc, const Vector3& p, const Pola
 // Angles `u` count from the arc's start in the sense of its turning, without wrapping.
 ContourTracker::Foot ContourTracker::foot_on_arc(std::size_t piece, const Vector3& p,
                                                  const Window& window) const noexcept {
-  const Piece& base = geometry_->pieces[piece];
+  const Piece& base = at(piece);
   const Arc& arc = geometry_->arcs[static_cast<std::size_t>(geometry_->arc_of[piece])];
   const double rad_per_mm = arc.turn / base.length;
   const double first = std::clamp((window.begin - base.s) * rad_per_mm, 0.0, arc.turn);
@@ -212,16 +226,14 @@ ContourTracker::Foot ContourTracker::foot_on_arc(std::size_t piece, const Vector
 }
 
 bool ContourTracker::is_beyond(std::size_t first, std::size_t size, const Vector3& p, double limit2) const noexcept {
-  const std::vector<Piece>& pieces = geometry_->pieces;
-  const double length = pieces[first + size].s - pieces[first].s;
-  const double nearest = (p - pieces[first].start).norm() - length * (1.0 + group_slack) - group_slack_mm;
+  const double length = begin_mm(first + size) - begin_mm(first);
+  const double nearest = (p - geometry_->path.start_mm(first)).norm() - length * (1.0 + group_slack) - group_slack_mm;
   return nearest > 0.0 && nearest * nearest >= limit2;
 }
 
 std::size_t ContourTracker::group_from(std::size_t first, const Vector3& p, double limit2) const noexcept {
   std::size_t passed = 0;
-  for (std::size_t size = group_size; first % size == 0 && first + size < geometry_->pieces.size();
-       size *= group_size) {
+  for (std::size_t size = group_size; first % size == 0 && first + size < pieces(); size *= group_size) {
     if (!is_beyond(first, size, p, limit2)) break;
     passed = size;
   }
@@ -230,8 +242,7 @@ std::size_t ContourTracker::group_from(std::size_t first, const Vector3& p, doub
 
 std::size_t ContourTracker::group_before(std::size_t end, const Vector3& p, double limit2) const noexcept {
   std::size_t passed = 0;
-  for (std::size_t size = group_size; end % size == 0 && end >= size && end < geometry_->pieces.size();
-       size *= group_size) {
+  for (std::size_t size = group_size; end % size == 0 && end >= size && end < pieces(); size *= group_size) {
     if (!is_beyond(end - size, size, p, limit2)) break;
     passed = size;
   }
@@ -242,16 +253,16 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
                                              double bound) const noexcept {
   Found best{foot_on(cursor_, p, window), cursor_, 0.0};
   const Foot start = best.foot;
-  const double advance = geometry_->pieces[cursor_].s + best.foot.along - s_;
+  const double advance = begin_mm(cursor_) + best.foot.along - s_;
   bool retreats = advance < 0.0;
   Window forward = window;
   // A filtered command turns back before it reaches the tip: the return leg lies as far behind the tip.
-  const double to_tip = geometry_->pieces[cursor_].length - best.foot.along;
+  const double to_tip = at(cursor_).length - best.foot.along;
   if (advance < 0.5 * move && to_tip < longest_turn_mm) {
-    const double tip = geometry_->pieces[cursor_].s + geometry_->pieces[cursor_].length;
+    const double tip = begin_mm(cursor_) + at(cursor_).length;
     forward.end = std::max(forward.end, std::min(tip + to_tip + window_margin_mm, bound));
   }
-  for (std::size_t i = cursor_ + 1; i < geometry_->pieces.size() && geometry_->pieces[i].s <= forward.end; ++i) {
+  for (std::size_t i = cursor_ + 1; i < pieces() && begin_mm(i) <= forward.end; ++i) {
     const double limit = retreats ? best.foot.distance2 * (1.0 + retreat_tie_relative) + retreat_tie_absolute_mm2
                                   : best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
     if (const std::size_t passed = group_from(i, p, limit); passed > 0) {
@@ -264,13 +275,13 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
     // point was before it, and nearer: a vibration along the path is no reason to jump.
     const bool nearer = foot.distance2 < best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
     const bool back = direction_at(i, foot).dot(direction_at(cursor_, start)) < 0.0;
-    const bool within = geometry_->pieces[i].s + foot.along <= window.end;
+    const bool within = begin_mm(i) + foot.along <= window.end;
     if (within ? nearer || back : nearer && back && i == cursor_ + 1 && 2.0 * foot.along > to_tip) {
       best = {foot, i, 0.0};
       retreats = false;
     }
   }
-  for (std::size_t i = cursor_; i-- > 0 && geometry_->pieces[i].s + geometry_->pieces[i].length >= window.begin;) {
+  for (std::size_t i = cursor_; i-- > 0 && begin_mm(i) + at(i).length >= window.begin;) {
     const double limit = best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
     if (const std::size_t passed = group_before(i + 1, p, limit); passed > 0) {
       i -= passed - 1;
@@ -279,19 +290,19 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
     const Foot foot = foot_on(i, p, window);
     if (foot.distance2 < limit) best = {foot, i, 0.0};
   }
-  best.s = geometry_->pieces[best.piece].s + best.foot.along;
+  best.s = begin_mm(best.piece) + best.foot.along;
   return best;
 }
 
 // 1 left, -1 right; 0 where the deviation or the travel is along Z only.
 double ContourTracker::lateral_side(const Found& found, double distance) const noexcept {
-  const Piece& piece = geometry_->pieces[found.piece];
+  const Piece& piece = at(found.piece);  // its neighbours have other slots
   const double from_start = found.foot.along;
   Vector3 travel = geometry_->arc_of[found.piece] < 0 ? piece.direction : found.foot.tangent;
   // At a corner one leg alone may see the point on the wrong side: the mean direction decides.
   if (from_start <= 0.0 && found.piece > 0) {
     travel = start_tangent(found.piece) + end_tangent(found.piece - 1);
-  } else if (from_start >= piece.length && found.piece + 1 < geometry_->pieces.size()) {
+  } else if (from_start >= piece.length && found.piece + 1 < pieces()) {
     travel = end_tangent(found.piece) + start_tangent(found.piece + 1);
   }
   const Vector3& offset = found.foot.offset;

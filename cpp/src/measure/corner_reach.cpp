@@ -25,14 +25,16 @@ double distance2(const Vector3& p, const Vector3& from, const Vector3& to) noexc
 
 CornerReach::CornerReach(const Path& path, double least_angle_rad) {
   const double straight = std::cos(least_angle_rad);
-  for (std::size_t i = 1; i < path.size(); ++i) {
-    const Vector3 before = tangent_at(path[i - 1], path[i - 1].length_mm);
-    if (before.dot(tangent_at(path[i], 0.0)) <= straight) {
-      corners_.push_back({path[i].start_mm, path.distance_mm(i), std::numeric_limits<double>::infinity()});
+  Vector3 before = Vector3::Zero();  // direction at the end of the segment before
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const Segment segment = path[i];
+    if (i > 0 && before.dot(tangent_at(segment, 0.0)) <= straight) {
+      corners_.push_back({segment.start_mm, path.distance_mm(i), std::numeric_limits<double>::infinity()});
     }
+    before = tangent_at(segment, segment.length_mm);
   }
   if (path.size() > 0) {
-    corners_.push_back({path[path.size() - 1].end_mm, path.length_mm(), std::numeric_limits<double>::infinity()});
+    corners_.push_back({path.end_mm(path.size() - 1), path.length_mm(), std::numeric_limits<double>::infinity()});
   }
 }
 

@@ -29,10 +29,10 @@ double clipped_area(double u0, double e0, double u1, double e1, double turn) noe
 }  // namespace
 
 OrbitError::OrbitError(const Path& path) {
-  arc_of_.assign(path.size(), -1);
   for (std::size_t i = 0; i < path.size(); ++i) {
-    const Segment& segment = path[i];
-    if (segment.kind != SegmentKind::arc) continue;
+    arc_of_.push_back(path.is_arc(i) ? static_cast<std::int32_t>(arcs_.size()) : -1);
+    if (!path.is_arc(i)) continue;
+    const Segment segment = path[i];
     Arc arc{};
     arc.a = ArcFrame(segment.normal).a;
     arc.b = ArcFrame(segment.normal).b;
@@ -47,7 +47,6 @@ OrbitError::OrbitError(const Path& path) {
     const double r0 = segment.start_radius_mm;
     const double r1 = segment.end_radius_mm;
     arc.sector_area = arc.turn * (r0 * r0 + r0 * r1 + r1 * r1) / 6.0;
-    arc_of_[i] = static_cast<std::int32_t>(arcs_.size());
     arcs_.push_back(arc);
   }
 }

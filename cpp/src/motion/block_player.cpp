@@ -30,8 +30,8 @@ double block_periods(double length_mm, double feed_mm_per_s, double period_s, Bl
   return block_end == BlockEnd::carry ? exact : whole_periods(exact);
 }
 
-BlockPlayer::BlockPlayer(std::span<const Segment> blocks, double period_s, BlockEnd block_end, double override_ratio)
-    : blocks_(blocks), period_s_(period_s), ratio_(override_ratio), block_end_(block_end) {
+BlockPlayer::BlockPlayer(Segments blocks, double period_s, BlockEnd block_end, double override_ratio)
+    : blocks_(std::move(blocks)), period_s_(period_s), ratio_(override_ratio), block_end_(block_end) {
   require_period(period_s);
   require_above_zero(override_ratio, "override", "");
   for (const Segment& block : blocks_) {
@@ -48,7 +48,7 @@ BlockPlayer::BlockPlayer(std::span<const Segment> blocks, double period_s, Block
 void BlockPlayer::find_crowds() {
   const auto duration_of = [this](std::size_t first) {
     double sum = 0.0;
-    for (const Segment& block : blocks_.subspan(first, group_size)) {
+    for (const Segment& block : blocks_.part(first, group_size)) {
       sum += block_duration_s(block);
     }
     return sum;
@@ -109,7 +109,8 @@ double BlockPlayer::block_duration_s(const Segment& segment) const noexcept {
 }
 
 void BlockPlayer::open_block() noexcept {
-  duration_s_ = block_duration_s(blocks_[block_]);
+  open_ = blocks_[block_];
+  duration_s_ = block_duration_s(open_);
   if (block_ == paused_block_) {
     duration_s_ += pause_s_;
   }
@@ -159,12 +160,11 @@ bool BlockPlayer::step(Vector3& position) noexcept {
     }
     open_block();
   }
-  const Segment& segment = blocks_[block_];
-  position = point_at(segment, std::min(segment.length_mm, segment.feed_mm_per_s * ratio_ * elapsed_s_));
+  position = point_at(open_, std::min(open_.length_mm, open_.feed_mm_per_s * ratio_ * elapsed_s_));
   return true;
 }
 
-double play_duration_s(std::span<const Segment> blocks, double period_s, BlockEnd block_end, double override_ratio) {
+double play_duration_s(const Segments& blocks, double period_s, BlockEnd block_end, double override_ratio) {
   const BlockPlayer player(blocks, period_s, block_end, override_ratio);
   double total = 0.0;
   for (const Segment& block : blocks) {

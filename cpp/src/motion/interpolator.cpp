@@ -30,6 +30,13 @@ Interpolator::Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<con
   const double ramps = std::ceil((profile_->ramp_duration_s() + delay_s) / period_s - 1e-9);
   sample_count_ = static_cast<std::size_t>(require_count(ramps, most_set_points, "a path", "set-points")) + 1 +
                   static_cast<std::size_t>(smoothing_.fir().duration_samples());
+  if (path_->size() > 0) take_segment();
+}
+
+void Interpolator::take_segment() noexcept {
+  on_ = (*path_)[path_cursor_];
+  on_begin_mm_ = path_->distance_mm(path_cursor_);
+  on_end_mm_ = path_->distance_mm(path_cursor_ + 1);
 }
 
 bool Interpolator::step(Vector3& position) noexcept {
@@ -41,7 +48,16 @@ bool Interpolator::step(Vector3& position) noexcept {
     smoothing_.step({&distance, 1}, {&distance, 1});
     distance_mm_ = index_ == sample_count_ ? path_->length_mm() : distance;
   }
-  position = path_->point(distance_mm_, path_cursor_);
+  if (path_->size() == 0) {
+    position = Vector3::Zero();
+    return moving;
+  }
+  // As Path::point, with the segment at hand.
+  if (distance_mm_ < on_begin_mm_ || distance_mm_ >= on_end_mm_) {
+    path_->seek(distance_mm_, path_cursor_);
+    take_segment();
+  }
+  position = point_at(on_, distance_mm_ - on_begin_mm_);
   return moving;
 }
 

@@ -296,20 +296,23 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
   return speed;
 }
 
-std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
-                                      double corner_angle_rad, const MotionLimits& limits,
-                                      const FilterTolerance& filter) {
+std::vector<std::size_t> forced_stops(const Segments& segments, double axis_angle_rad, double corner_angle_rad,
+                                      const MotionLimits& limits, const FilterTolerance& filter) {
   const double along = std::cos(axis_angle_rad);
   const double turned = std::cos(corner_angle_rad);
   std::vector<std::size_t> stops;
+  if (segments.empty()) return stops;
+  Segment last = segments[0];
   for (std::size_t i = 1; i < segments.size(); ++i) {
-    const Vector3 before = tangent_at(segments[i - 1], segments[i - 1].length_mm);
-    const Vector3 after = tangent_at(segments[i], 0.0);
+    const Segment next = segments[i];
+    const Vector3 before = tangent_at(last, last.length_mm);
+    const Vector3 after = tangent_at(next, 0.0);
     const bool plunges = std::abs(before[2]) >= along || std::abs(after[2]) >= along;
-    if (segments[i - 1].stop_at_end || (plunges && before.dot(after) <= turned) ||
-        corner_speed_limit(segments[i - 1], segments[i], limits, filter) <= 0.0) {
+    if (last.stop_at_end || (plunges && before.dot(after) <= turned) ||
+        corner_speed_limit(last, next, limits, filter) <= 0.0) {
       stops.push_back(i);
     }
+    last = next;
   }
   return stops;
 }

@@ -34,9 +34,7 @@ double SpeedProfile::distance_mm(double time_s, std::size_t& cursor) const noexc
     return 0.0;
   }
   seek(time_s, cursor);
-  const SpeedPhase& phase = phases_[cursor];
-  const double t = time_s - phase.start_s;
-  return phase.distance_mm + t * (phase.speed_mm_per_s + 0.5 * phase.acceleration_mm_per_s2 * t);
+  return phases_[cursor].distance_at(time_s);
 }
 
 double SpeedProfile::speed_mm_per_s(double time_s, std::size_t& cursor) const noexcept {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -13,50 +14,89 @@
 namespace shapegcode {
 namespace {
 
-constexpr std::size_t few_segments = 512;
+bool same(double a, double b) noexcept { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
+
+bool same(const Vector3& a, const Vector3& b) noexcept {
+  return same(a[0], b[0]) && same(a[1], b[1]) && same(a[2], b[2]);
+}
+
+// Whether a segment is what `make_line` makes of its ends, to the bit, and ends where the next one starts.
+bool is_plain(const Segment& segment, const Vector3& next_mm) noexcept {
+  const Segment line = make_line(segment.start_mm, next_mm, segment.feed_mm_per_s, segment.line);
+  return segment.kind == line.kind && same(segment.end_mm, next_mm) && same(segment.length_mm, line.length_mm) &&
+         segment.normal == line.normal && segment.stop_at_end == line.stop_at_end &&
+         same(segment.centre_mm, line.centre_mm) && same(segment.start_radius_mm, 0.0) &&
+         same(segment.end_radius_mm, 0.0) && same(segment.start_angle_rad, 0.0) && same(segment.sweep_rad, 0.0);
+}
 
 }  // namespace
 
-Path::Path(std::vector<Segment> segments) : segments_(std::move(segments)) {
-  // A vector that grew holds room for as many again. Of a large one that room was never touched, and so is no memory.
-  if (segments_.size() < few_segments) {
-    segments_.shrink_to_fit();
+Path::Path(Segments segments) {
+  PathBuilder builder;
+  for (std::size_t i = 0; i < segments.size(); ++i) builder.add(segments[i]);
+  *this = builder.path();
+}
+
+void PathBuilder::add(const Segment& segment) {
+  if (!std::isfinite(segment.length_mm) || !segment.start_mm.allFinite() || !segment.end_mm.allFinite()) {
+    throw Error(ErrorKind::argument, fmt::format("path segment {} has a coordinate that is not finite", size_),
+                segment.line);
   }
-  distance_mm_.reserve(segments_.size() + 1);
-  double distance = 0.0;
-  distance_mm_.push_back(distance);
-  for (std::size_t i = 0; i < segments_.size(); ++i) {
-    const Segment& segment = segments_[i];
-    if (!std::isfinite(segment.length_mm) || !segment.start_mm.allFinite() || !segment.end_mm.allFinite()) {
-      throw Error(ErrorKind::argument, fmt::format("path segment {} has a coordinate that is not finite", i),
+  if (size_ > 0) {
+    const double gap = (segment.start_mm - last_.end_mm).norm();
+    if (gap > largest_gap_mm) {
+      throw Error(ErrorKind::argument,
+                  fmt::format("path segment {} starts {:.3g} mm from the end of its predecessor (limit {} mm)", size_,
+                              gap, largest_gap_mm),
                   segment.line);
     }
-    if (i > 0) {
-      const double gap = (segment.start_mm - segments_[i - 1].end_mm).norm();
-      if (gap > largest_gap_mm) {
-        throw Error(ErrorKind::argument,
-                    fmt::format("path segment {} starts {:.3g} mm from the end of its predecessor (limit {} mm)", i,
-                                gap, largest_gap_mm),
-                    segment.line);
-      }
-    }
-    distance += segment.length_mm;
-    distance_mm_.push_back(distance);
+    put(segment.start_mm);
+  }
+  last_ = segment;
+  ++size_;
+}
+
+void PathBuilder::put(const Vector3& next_mm) {
+  Path::Data& data = *data_;
+  const std::uint32_t line = last_.line - static_cast<std::uint32_t>(data.feeds.size());
+  std::uint32_t kept = 0;
+  if (!is_plain(last_, next_mm)) {
+    data.kept.push_back(last_);
+    kept = static_cast<std::uint32_t>(data.kept.size());
+  }
+  data.nodes.push_back({last_.start_mm, distance_mm_});
+  data.feeds.push_back(last_.feed_mm_per_s);
+  data.places.push_back({line, kept});
+  distance_mm_ += last_.length_mm;
+}
+
+Path PathBuilder::path() {
+  if (size_ > 0) put(last_.end_mm);
+  data_->nodes.push_back({last_.end_mm, distance_mm_});
+  data_->nodes.fit();
+  data_->kept.shrink_to_fit();
+  Path path;
+  path.data_ = std::move(data_);
+  *this = PathBuilder();
+  return path;
+}
+
+void Path::seek(double s_mm, std::size_t& cursor) const noexcept {
+  cursor = std::min(cursor, size() - 1);
+  while (cursor > 0 && s_mm < distance_mm(cursor)) {
+    --cursor;
+  }
+  while (cursor + 1 < size() && s_mm >= distance_mm(cursor + 1)) {
+    ++cursor;
   }
 }
 
 Vector3 Path::point(double s_mm, std::size_t& cursor) const noexcept {
-  if (segments_.empty()) {
+  if (size() == 0) {
     return Vector3::Zero();
   }
-  cursor = std::min(cursor, segments_.size() - 1);
-  while (cursor > 0 && s_mm < distance_mm_[cursor]) {
-    --cursor;
-  }
-  while (cursor + 1 < segments_.size() && s_mm >= distance_mm_[cursor + 1]) {
-    ++cursor;
-  }
-  return point_at(segments_[cursor], s_mm - distance_mm_[cursor]);
+  seek(s_mm, cursor);
+  return point_at((*this)[cursor], s_mm - distance_mm(cursor));
 }
 
 }  // namespace shapegcode

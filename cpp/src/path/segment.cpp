@@ -86,17 +86,6 @@ Nearest nearest_on_arc(const Segment& segment, const Vector3& p) noexcept {
 
 }  // namespace
 
-Segment make_line(const Vector3& start, const Vector3& end, double feed_mm_per_s, std::uint32_t line) {
-  Segment segment;
-  segment.kind = SegmentKind::line;
-  segment.start_mm = start;
-  segment.end_mm = end;
-  segment.length_mm = (end - start).norm();
-  segment.feed_mm_per_s = feed_mm_per_s;
-  segment.line = line;
-  return segment;
-}
-
 // Each is one of the arc's own numbers.  NOLINTNEXTLINE(readability-function-size)
 Segment make_arc(const Vector3& start, const Vector3& end, const Vector3& centre, double sweep_rad, int normal,
                  double feed_mm_per_s, std::uint32_t line) {

@@ -42,28 +42,28 @@ void FeedMeter::step(const Vector3& command, const ContourTracker& tracker, doub
 void FeedMeter::compare(const Row& from, const Row& to, double time_s) noexcept {
   const double speed = (to.travelled_mm - from.travelled_mm - slack_mm_) / time_s;
   const auto beats = [&](double feed) { return speed > largest_.ratio() * (1.0 + least_gain) * feed; };
-  if (!(speed > 0.0) || !beats((*path_)[to.segment].feed_mm_per_s)) {
+  if (!(speed > 0.0) || !beats(path_->feed_mm_per_s(to.segment))) {
     return;
   }
   // A place is as good as the motion is near the path: of short segments that all lie there each may be meant.
   const double near = 2.0 * std::max(from.deviation_mm, to.deviation_mm) + slack_mm_;
   std::size_t first = std::min(from.segment, to.segment);
   std::size_t last = std::max(from.segment, to.segment);
-  while (first > 0 && (from.position - (*path_)[first].start_mm).norm() <= near) {
+  while (first > 0 && (from.position - path_->start_mm(first)).norm() <= near) {
     --first;
   }
-  while (last + 1 < path_->size() && (to.position - (*path_)[last].end_mm).norm() <= near) {
+  while (last + 1 < path_->size() && (to.position - path_->end_mm(last)).norm() <= near) {
     ++last;
   }
   std::size_t fastest = first;
   for (std::size_t i = first + 1; i <= last; ++i) {
-    if ((*path_)[i].feed_mm_per_s > (*path_)[fastest].feed_mm_per_s) {
+    if (path_->feed_mm_per_s(i) > path_->feed_mm_per_s(fastest)) {
       fastest = i;
     }
   }
-  const Segment& programmed = (*path_)[fastest];
-  if (beats(programmed.feed_mm_per_s)) {
-    largest_ = {speed, programmed.feed_mm_per_s, programmed.line};
+  const double programmed = path_->feed_mm_per_s(fastest);
+  if (beats(programmed)) {
+    largest_ = {speed, programmed, path_->line(fastest)};
   }
 }
 

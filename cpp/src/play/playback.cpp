@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/checks.hpp"
+#include "motion/planned_motion.hpp"
 #include "play/axis_plant.hpp"
 #include "play/feed_meter.hpp"
 #include "play/filter_chain.hpp"
@@ -263,7 +264,7 @@ StarvedFigures starve(Recorder recorder, BlockPlayer player, const PlaybackOptio
   return figures;
 }
 
-void check_starved(std::span<const Segment> blocks, const PlaybackOptions& options) {
+void check_starved(const Segments& blocks, const PlaybackOptions& options) {
   const std::vector<std::size_t>& starved = options.starved_blocks;
   if (starved.empty()) {
     return;
@@ -283,13 +284,14 @@ void check_starved(std::span<const Segment> blocks, const PlaybackOptions& optio
   }
 }
 
-std::span<const Segment> last_blocks(std::span<const Segment> blocks, double seconds) {
+Segments last_blocks(const Segments& blocks, double seconds) {
   std::size_t first = blocks.size();
   while (first > 0 && seconds > 0.0) {
     --first;
-    seconds -= blocks[first].length_mm / blocks[first].feed_mm_per_s;
+    const Segment block = blocks[first];
+    seconds -= block.length_mm / block.feed_mm_per_s;
   }
-  return blocks.subspan(first);
+  return blocks.part(first, blocks.size() - first);
 }
 
 }  // namespace
@@ -307,13 +309,20 @@ PlaybackFigures play_path(const std::shared_ptr<const Path>& path, std::shared_p
   return play(programmed, options, false, [&](Vector3& position) { return interpolator.step(position); });
 }
 
-PlaybackFigures play_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
-                            double override_ratio, const PlaybackOptions& options) {
-  check_starved(blocks, options);
-  if (options.last_seconds > 0.0) {
-    blocks = last_blocks(blocks, options.last_seconds * override_ratio);
+PlaybackFigures play_planned(const std::shared_ptr<const Path>& path, const MotionLimits& limits,
+                             const Path& programmed, const PlaybackOptions& options) {
+  if (!PlainPlan::serves(limits) || !(path->length_mm() > 0.0)) {
+    return play_path(path, std::make_shared<const SpeedProfile>(plan_speed(*path, limits)), programmed, options);
   }
-  BlockPlayer player(blocks, options.period_s, block_end, override_ratio);
+  PlannedMotion motion(*path, limits, options.period_s);
+  return play(programmed, options, false, [&](Vector3& position) { return motion.step(position); });
+}
+
+PlaybackFigures play_blocks(const Segments& blocks, const Path& path, BlockEnd block_end, double override_ratio,
+                            const PlaybackOptions& options) {
+  check_starved(blocks, options);
+  const double last_s = options.last_seconds * override_ratio;
+  BlockPlayer player(last_s > 0.0 ? last_blocks(blocks, last_s) : blocks, options.period_s, block_end, override_ratio);
   Recorder recorder(path, options, false);
   std::vector<StarvedFigures> starved;
   Vector3 position = Vector3::Zero();
@@ -338,7 +347,7 @@ PlaybackFigures play_samples(const Samples& samples, const Path& path, const Pla
   });
 }
 
-std::vector<std::size_t> fastest_block_ends(std::span<const Segment> blocks) {
+std::vector<std::size_t> fastest_block_ends(const Segments& blocks) {
   std::vector<std::size_t> ends;
   Vector3 fastest = Vector3::Zero();
   std::array<std::size_t, axis_count> where{};
@@ -347,10 +356,11 @@ std::vector<std::size_t> fastest_block_ends(std::span<const Segment> blocks) {
     --last;
   }
   for (std::size_t i = 0; i + 1 < last; ++i) {
-    if (blocks[i].length_mm <= 0.0) {
+    const Segment block = blocks[i];
+    if (block.length_mm <= 0.0) {
       continue;
     }
-    const Vector3 speed = (tangent_at(blocks[i], blocks[i].length_mm) * blocks[i].feed_mm_per_s).cwiseAbs();
+    const Vector3 speed = (tangent_at(block, block.length_mm) * block.feed_mm_per_s).cwiseAbs();
     for (Eigen::Index axis = 0; axis < axis_count; ++axis) {
       if (speed[axis] > fastest[axis]) {
         fastest[axis] = speed[axis];
@@ -368,7 +378,7 @@ std::vector<std::size_t> fastest_block_ends(std::span<const Segment> blocks) {
   return ends;
 }
 
-std::size_t count_slowed_blocks(std::span<const Segment> blocks, const LookAheadLimits& limits) {
+std::size_t count_slowed_blocks(const Segments& blocks, const LookAheadLimits& limits) {
   std::size_t slowed = 0;
   Vector3 speed_before = Vector3::Zero();
   for (const Segment& block : blocks) {

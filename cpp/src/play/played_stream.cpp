@@ -120,9 +120,8 @@ PlayedStream::PlayedStream(std::shared_ptr<const Path> path, std::shared_ptr<con
   auto run = std::make_shared<Run<Interpolator>>(Interpolator(path, std::move(profile), options.period_s), options);
   impl_ = std::make_unique<Impl>(
       [run, path](SetPoint& next) {
-        return run->step(next, [&path](const Interpolator& player) {
-          return path->size() > 0 ? (*path)[player.segment()].line : 0U;
-        });
+        return run->step(
+            next, [&path](const Interpolator& player) { return path->size() > 0 ? path->line(player.segment()) : 0U; });
       },
       options, rest_s);
 }

@@ -60,7 +60,7 @@ class LagAtEnd {
   Vector3 error_ = Vector3::Zero();
 };
 
-const Segment& last_moving(const Path& path) {
+Segment last_moving(const Path& path) {
   std::size_t i = path.size() - 1;
   while (i > 0 && path[i].length_mm <= 0.0) {
     --i;
@@ -241,7 +241,7 @@ void append_rows(const Path& path, const SpeedProfile& profile, double start_s, 
         fastest = std::max(fastest, std::sqrt(std::max(0.0, squared)));
       }
     }
-    rows.push_back({path[i].line, BlockKind::cutting, start_s + time_s, end_s - time_s, to > from ? fastest : 0.0});
+    rows.push_back({path.line(i), BlockKind::cutting, start_s + time_s, end_s - time_s, to > from ? fastest : 0.0});
     time_s = end_s;
   }
 }

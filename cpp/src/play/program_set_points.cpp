@@ -32,7 +32,7 @@ bool ProgramSetPoints::Cut::step(Vector3& position) {
 
 std::uint32_t ProgramSetPoints::Cut::line() const {
   if (const auto* interpolator = std::get_if<Interpolator>(&player)) {
-    return (*path)[interpolator->segment()].line;
+    return path->line(interpolator->segment());
   }
   return blocks[std::get<BlockPlayer>(player).block()].line;
 }
@@ -215,7 +215,8 @@ void ProgramSetPoints::open_cut(const std::shared_ptr<const Path>& programmed, b
     cut.smoothed = profile->jerk_time_s() > 1.5 * model.period_s || !cut.filters->empty();
     cut.player.emplace<Interpolator>(programmed, std::move(profile), model.period_s);
   } else {
-    cut.blocks = programmed->segments();
+    const Segments segments = programmed->segments();
+    cut.blocks.assign(segments.begin(), segments.end());
     for (Segment& block : cut.blocks) {
       block.feed_mm_per_s = checked_feed(block, model);
     }
@@ -257,10 +258,10 @@ void ProgramSetPoints::close_cut(const Cut& cut) {
     active_ = std::monostate{};
     return;
   }
-  const auto& segments = cut.path->segments();
-  const auto last =
-      std::find_if(segments.rbegin(), segments.rend(), [](const Segment& segment) { return segment.length_mm > 0.0; });
-  open_arrival(moved_axes(*last));
+  const Segments segments = cut.path->segments();
+  std::size_t last = segments.size() - 1;
+  while (!(segments[last].length_mm > 0.0)) --last;
+  open_arrival(moved_axes(segments[last]));
 }
 
 void ProgramSetPoints::open_arrival(const std::array<bool, axis_count>& moved) {

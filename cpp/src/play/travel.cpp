@@ -140,7 +140,7 @@ class Follower {
   Vector3 last_ = Vector3::Zero();
 };
 
-const Segment& last_of(std::span<const Segment> segments) {
+Segment last_of(const Segments& segments) {
   if (segments.empty()) {
     throw Error(ErrorKind::argument, "a travel needs a path with at least one segment");
   }
@@ -166,8 +166,8 @@ Travel travel_path(const std::shared_ptr<const Path>& path, const std::shared_pt
   return follow(interpolator, along, last_of(path->segments()).end_mm, stations_mm, options);
 }
 
-Travel travel_blocks(std::span<const Segment> blocks, const Path& along, BlockEnd block_end,
-                     std::span<const double> stations_mm, const TravelOptions& options) {
+Travel travel_blocks(const Segments& blocks, const Path& along, BlockEnd block_end, std::span<const double> stations_mm,
+                     const TravelOptions& options) {
   BlockPlayer player(blocks, options.period_s, block_end);
   return follow(player, along, last_of(blocks).end_mm, stations_mm, options);
 }

@@ -40,7 +40,7 @@ bool is_g(const Word& word, double value) noexcept { return word.letter == 'G' &
 // Calls `use(line, block)` for each line of a region.
 template <typename Use>
 void for_each_line(const Program& program, const Region& region, Use use) {
-  const std::vector<Segment>& segments = region.path->segments();
+  const Segments segments = region.path->segments();
   std::string_view rest = std::string_view(program.text).substr(region.text_begin, region.text_end - region.text_begin);
   bool incremental = region.entry.distance == 91;
   std::size_t segment = 0;
@@ -54,7 +54,7 @@ void for_each_line(const Program& program, const Region& region, Use use) {
     }
     SourceLine line{rest.substr(0, visible), rest.substr(visible, length - visible), number, segment, 0, false};
     rest.remove_prefix(length);
-    while (segment < segments.size() && segments[segment].line == number) {
+    while (segment < segments.size() && region.path->line(segment) == number) {
       ++segment;
       ++line.count;
     }

@@ -34,6 +34,7 @@ _NO_LIMIT = 1e12
 _ROUNDING = 1e-6
 _TICK_SLACK = 1e-5
 _FIRST_PLACES = 20
+_PIECE = 1 << 15  # blocks that are looked at in one go: what bounds the memory
 
 # What a stop between two cutting moves does, worst first.
 _STOPS = "the control stops reading ahead, and the tool stands in the cut"
@@ -198,15 +199,32 @@ def busiest_per_s(durations_s: npt.ArrayLike, amounts: npt.ArrayLike, stretch_s:
     Returns:
         Amount per second.
     """
-    times = np.concatenate([[0.0], np.cumsum(np.asarray(durations_s, dtype=np.float64))])
-    sums = np.concatenate([[0.0], np.cumsum(np.asarray(amounts, dtype=np.float64))])
+    times, sums = _running(durations_s), _running(amounts)
     if times[-1] <= 0.0:
         return 0.0
     stretch = min(stretch_s, float(times[-1]))
-    # The sum over a stretch is piecewise linear in its place: it is largest where a block begins or ends at its edge.
-    begins = np.clip(np.concatenate([times, times - stretch]), 0.0, times[-1] - stretch)
-    amount = np.interp(begins + stretch, times, sums) - np.interp(begins, times, sums)
-    return float(amount.max()) / stretch
+    largest = 0.0
+    # Piece by piece: a program may have a million blocks.
+    for first in range(0, len(times), _PIECE):
+        edges = times[first : first + _PIECE]
+        # The sum over a stretch is piecewise linear in its place: it is largest where a block begins or ends at its
+        # edge.
+        begins = np.clip(np.concatenate([edges, edges - stretch]), 0.0, times[-1] - stretch)
+        # Only the blocks around them count.
+        low = max(0, int(np.searchsorted(times, begins.min(), side="right")) - 1)
+        high = int(np.searchsorted(times, begins.max() + stretch, side="right")) + 1
+        near, passed = times[low:high], sums[low:high]
+        amount = np.interp(begins + stretch, near, passed) - np.interp(begins, near, passed)
+        largest = max(largest, float(amount.max()))
+    return largest / stretch
+
+
+def _running(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """The sums up to each value, from 0 on."""
+    given = np.asarray(values, dtype=np.float64)
+    sums = np.zeros(len(given) + 1)
+    np.cumsum(given, out=sums[1:])
+    return sums
 
 
 def _needed_per_s(

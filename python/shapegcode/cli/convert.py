@@ -139,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
         notes.append(
             f"the verdict rests on nothing that nobody measured: {result.unmeasured_tried} values moved, none matters"
         )
-    return runner.finish(result, args, notes=notes, output=(target, result.text))
+    return runner.finish(result, args, notes=notes, output=(target, result.emitted.view()))
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:

@@ -48,7 +48,7 @@ class Gathered:
         """
         return ", ".join(self.places[index].address for index in sorted(indices))
 
-    def add(self, report: dict[str, Any], output: tuple[Path | str, bytes] | None) -> None:
+    def add(self, report: dict[str, Any], output: tuple[Path | str, bytes | memoryview] | None) -> None:
         """Keep what a run wants written.
 
         Args:
@@ -57,7 +57,7 @@ class Gathered:
         """
         self.reports.append({**report, "program_address": self.address})
         if output is not None:
-            self.written[self.at] = output
+            self.written[self.at] = output[0], bytes(output[1])
 
     def joined(self) -> bytes:
         """The file with every program that was written in its place; all else to the letter."""

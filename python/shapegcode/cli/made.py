@@ -43,7 +43,7 @@ def given_files(args: argparse.Namespace) -> Iterator[tuple[str, str]]:
 def made_by(
     result: Result,
     args: argparse.Namespace,
-    output: tuple[str | Path, bytes] | None = None,
+    output: tuple[str | Path, bytes | memoryview] | None = None,
     wrote: Sequence[str | Path] = (),
 ) -> Made:
     """Of what a command made its result.

@@ -84,7 +84,7 @@ def progress(description: str, args: argparse.Namespace) -> Iterator[terminal.Pr
         yield bar
 
 
-def write_program(target: str | Path, content: bytes) -> None:
+def write_program(target: str | Path, content: bytes | memoryview) -> None:
     """Write a program; "-" is standard output."""
     if str(target) == "-":
         sys.stdout.buffer.write(content)
@@ -92,7 +92,7 @@ def write_program(target: str | Path, content: bytes) -> None:
         write_bytes(target, content)
 
 
-def _write(report: dict[str, Any], json: str | None, output: tuple[str | Path, bytes] | None) -> None:
+def _write(report: dict[str, Any], json: str | None, output: tuple[str | Path, bytes | memoryview] | None) -> None:
     if json not in (None, "-"):
         terminal.write_json(report, str(json))
     if output is not None:
@@ -106,7 +106,7 @@ def _write_page(
     result: Result,
     args: argparse.Namespace,
     report: dict[str, Any],
-    output: tuple[str | Path, bytes] | None,
+    output: tuple[str | Path, bytes | memoryview] | None,
     wrote: Sequence[str | Path],
 ) -> list[str]:
     """Say in the JSON what it was made of, and write --html; gives the files."""
@@ -136,7 +136,7 @@ def finish(
     warnings: Sequence[str] | None = None,
     notes: Sequence[str] = (),
     wrote: Sequence[str | Path] = (),
-    output: tuple[str | Path, bytes] | None = None,
+    output: tuple[str | Path, bytes | memoryview] | None = None,
 ) -> int:
     """Write --json, --html, --plots and the program, and say it: answer, tables, warnings, notes, files, next step.
 

@@ -163,24 +163,30 @@ def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_p
     Returns:
         Bytes, bit/s and blocks/s that it asks for.
     """
-    durations = shaped.periods * grid.block_period_s
+    durations = np.empty(shaped.blocks)
+    np.concatenate(shaped.block_periods, out=durations, casting="same_kind")
+    durations *= grid.block_period_s
     stretch = max(grid.duration_s, grid.block_period_s)
     characters = busiest_per_s(durations, _block_bytes(shaped), stretch)
     return TransferLoad(
-        len(shaped.text) - (region.text_end - region.text_begin),
+        shaped.text.size - (region.text_end - region.text_begin),
         characters * bits_per_character,
-        busiest_per_s(durations, np.ones(len(durations)), stretch),
+        busiest_per_s(durations, np.broadcast_to(1.0, shaped.blocks), stretch),
     )
 
 
 def _block_bytes(shaped: EmittedRegion) -> FloatArray:
     """Characters of each block with its line end; comment lines count with the block that follows."""
-    if shaped.blocks == 0:  # a region shorter than an increment
-        return np.zeros(0)
-    text = np.frombuffer(shaped.text, dtype=np.uint8)[shaped.blocks_begin : shaped.blocks_end]
-    ends = np.flatnonzero(text == ord("\n")) + 1
-    begins = np.concatenate([[0], ends[:-1]])
-    last = ends[text[begins] != ord("(")][: len(shaped.periods)].copy()
-    last[-1] = len(text)  # comments and N words behind the last block
-    sizes: FloatArray = np.diff(last, prepend=0).astype(np.float64)
+    sizes = np.empty(shaped.blocks)
+    filled, open_bytes = 0, 0  # blocks that have their size; bytes behind the last of them
+    for part in shaped.block_parts if shaped.blocks else ():  # else a region shorter than an increment
+        text = np.frombuffer(part, dtype=np.uint8)
+        ends = np.flatnonzero(text == ord("\n")) + 1
+        begins = np.concatenate([[0], ends[:-1]])
+        last = ends[text[begins] != ord("(")][: shaped.blocks - filled]
+        sizes[filled : filled + len(last)] = np.diff(last, prepend=-open_bytes)
+        filled += len(last)
+        open_bytes = len(text) - int(last[-1]) if len(last) else open_bytes + len(text)
+    if filled:
+        sizes[filled - 1] += open_bytes  # comments and N words behind the last block
     return sizes

@@ -24,7 +24,6 @@ from shapegcode.conversion.figures import (
 from shapegcode.conversion.judge import Judge, RegionFigures
 from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids
-from shapegcode.conversion.readback import read_back
 from shapegcode.conversion.rests import RestsOn, rests_on
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.spending import Spending, keepable
@@ -36,7 +35,7 @@ from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.program.compensation import read_for_conversion, require_decision
-from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN, judged
+from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid, choose_grid
 
@@ -125,10 +124,9 @@ def convert(
 
 def _refuse_own_marks(program: Program) -> None:
     """A comment of an original that the emitted program would say of its own blocks."""
-    text = program.core.slice(0, program.core.size)
     for mark in (REGION_MARK.encode(), RAPID_MARK.encode(), STAMP_BEGIN):
-        if (at := text.find(mark)) >= 0:
-            line = text.count(b"\n", 0, at) + 1
+        if (at := program.core.find(mark)) >= 0:
+            line = program.core.slice(0, at).count(b"\n") + 1
             raise _core.ProgramError(
                 f"{program.place(line)}:1: the comment {mark.decode()} is how a shaped program marks its own blocks: "
                 "give it other words"
@@ -213,7 +211,7 @@ class _Run:
             rapids = shape_rapids(
                 settled.emitted, settled.written.placed, self.model, self.grid, self.pool, self.budget
             )
-            written = replace(settled.written, text=rapids.text, placed=rapids.placed)
+            written = replace(settled.written, size=rapids.emitted.size, placed=rapids.placed)
             settled = replace(settled, written=written, emitted=rapids.emitted)
         return self._result(settled, rapids)
 
@@ -243,7 +241,7 @@ class _Run:
             return settled
         # What stays shaped is as before: it is neither shaped nor played again.
         written = self._write(self.grid)
-        return _Settled(written, read_back(written.text, written.placed, self.machine), left)
+        return _Settled(written, written.read_back(self.machine), left)
 
     def _keep(self, index: int, reason: str, gained_um: float) -> None:
         region = self.program.regions[index]
@@ -268,7 +266,7 @@ class _Run:
         for attempt in range(_ATTEMPTS):
             stage = partial(self.on_progress, "shaping" if attempt == 0 else "shaping again, slower")
             written = self._write(self.grid, stage)
-            emitted = read_back(written.text, written.placed, self.machine)
+            emitted = written.read_back(self.machine)
             originals = [play for play, reason in zip(self.originals, self.reasons, strict=True) if not reason]
             figures = self.judge.measure(
                 emitted, written.placed, originals, self.pool, partial(self.on_progress, "round trip")
@@ -328,6 +326,7 @@ class _Run:
         if rapids is not None:
             warnings += rapids.warnings
         rests, tried = self._rests_on(settled, figures)
+        emitted = settled.emitted.with_verdict(good=figures.within_tolerance)
         return Conversion(
             **vars(figures),
             program=program.source,
@@ -340,7 +339,7 @@ class _Run:
             expanded=core.expanded,
             expanded_radii_mm={f"D{number}": radius for number, radius in core.expanded_radii_mm.items()},
             bytes_read=core.size,
-            bytes_emitted=len(written.text),
+            bytes_emitted=written.size,
             limits=AppliedLimits(
                 machine.tolerance.contour_um,
                 self.judge.target,
@@ -358,13 +357,12 @@ class _Run:
             rests_on=rests,
             unmeasured_tried=tried,
             at_the_control=at_the_control(
-                written.text, written.placed, written.loads, figures, machine, self.grid.block_period_s
+                settled.emitted, written.placed, written.loads, figures, machine, self.grid.block_period_s
             ),
-            text=judged(written.text, good=figures.within_tolerance),
-            emitted=settled.emitted,
+            emitted=emitted,
             placed=tuple(written.placed),
             model=self.model,
-            played=PlayedPrograms(program, machine, settled.emitted, plant=machine.verdict.plant),
+            played=PlayedPrograms(program, machine, emitted, plant=machine.verdict.plant),
         )
 
     def _rests_on(self, settled: _Settled, figures: PlayedFigures) -> tuple[tuple[RestsOn, ...], int]:
@@ -398,7 +396,7 @@ class _Run:
             # Where something was shaped, what the verdict rests on names them.
             warnings += open_axes(program, machine)
         warnings += played_warnings(program, figures, machine)
-        return warnings + text_warnings(program, written.placed, figures, machine, len(written.text), written.blocks)
+        return warnings + text_warnings(program, written.placed, figures, machine, written.size, written.blocks)
 
 
 def _used_shaper(grid: Grid) -> UsedShaper:

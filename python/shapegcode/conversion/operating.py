@@ -5,17 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 from shapegcode.conversion.budget import TransferLoad
 from shapegcode.conversion.figures import PlayedFigures
 from shapegcode.conversion.readback import Placed
 from shapegcode.machine import Machine
+from shapegcode.program import Program
 from shapegcode.program.operating import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK, no_room
 from shapegcode.results.table import Column, Table
 
 __all__ = ["ControlNote", "at_the_control", "control_table"]
 
 _NAMED_LINES = 4
+_CHUNK = 1 << 16  # bytes
 _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
 
@@ -33,7 +36,7 @@ class ControlNote:
 
 
 def at_the_control(
-    text: bytes,
+    emitted: Program,
     placed: Sequence[Placed],
     loads: Mapping[int, TransferLoad],
     figures: PlayedFigures,
@@ -43,7 +46,7 @@ def at_the_control(
     """What to heed with an emitted program.
 
     Args:
-        text: of the program.
+        emitted: the program.
         placed: its shaped regions; none: nothing to heed.
         loads: what regions ask of line and control.
         figures: as played.
@@ -58,12 +61,12 @@ def at_the_control(
     override = OVERRIDES[machine.emission.override]
     elsewhere = [] if machine.emission.override == "lock" else _at_other_overrides(figures)
     return (
-        ControlNote("memory", _memory(len(text), machine)),
+        ControlNote("memory", _memory(emitted.size, machine)),
         ControlNote("drip feed (DNC)", _line(loads, machine)),
         ControlNote("look-ahead", _look_ahead(loads, machine, block_period_s)),
         ControlNote(override.topic, "; ".join([override.sentence, *elsewhere])),
         *(ControlNote(habit.topic, habit.sentence) for habit in (FEED_HOLD, SINGLE_BLOCK)),
-        ControlNote(RESTART.topic, f"{RESTART.sentence}; {_restart_lines(text, placed)}"),
+        ControlNote(RESTART.topic, f"{RESTART.sentence}; {_restart_lines(emitted, placed)}"),
         ControlNote(FIRST_RUN.topic, FIRST_RUN.sentence),
     )
 
@@ -117,14 +120,29 @@ def _at_other_overrides(figures: PlayedFigures) -> Iterator[str]:
         yield "the contour at other settings is measured where verdict.override_percent states them"
 
 
-def _restart_lines(text: bytes, placed: Sequence[Placed]) -> str:
-    lines = text.split(b"\n")
+def _restart_lines(emitted: Program, placed: Sequence[Placed]) -> str:
     named = []
     for place in placed[:_NAMED_LINES]:
         rows = range(place.first_line, place.last_line + 1)
+        lines = zip(rows, _lines_from(emitted, place.first_line), strict=False)
+        first = next(lines)
         # Behind the comment: lines that lock the override or switch a mode belong to the cut.
-        at = next((row for row in rows if not lines[row - 1].lstrip().startswith(b"(")), place.first_line)
-        number = re.match(rb"N\d+", lines[at - 1].strip())
+        at, line = next((each for each in chain([first], lines) if not each[1].lstrip().startswith(b"(")), first)
+        number = re.match(rb"N\d+", line.strip())
         named.append(f"{number[0].decode()} (line {at})" if number else f"line {at}")
     more = f" and {len(placed) - len(named)} more" if len(placed) > len(named) else ""
     return f"here: {', '.join(named)}{more}"
+
+
+def _lines_from(emitted: Program, number: int) -> Iterator[bytes]:
+    """The lines of a text from one on, of which it has a million perhaps."""
+    passed, rest = 1, b""
+    for begin in range(0, emitted.size, _CHUNK):
+        chunk = emitted.text_slice(begin, min(begin + _CHUNK, emitted.size))
+        if passed + chunk.count(b"\n") < number:
+            passed += chunk.count(b"\n")
+            continue
+        *lines, rest = (rest + chunk).split(b"\n")
+        yield from lines[number - passed :]
+        passed = number
+    yield rest

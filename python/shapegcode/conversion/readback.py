@@ -46,11 +46,11 @@ class Placed:
         return emitted.core.cutting_path(self.first_line, self.last_line)
 
 
-def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Program:
+def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) -> Program:
     """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps.
 
     Args:
-        text: the whole emitted program.
+        parts: of the whole emitted text; empty behind it, so that the text stands in memory once.
         placed: its regions.
         machine: whose controller reads it.
 
@@ -63,7 +63,7 @@ def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Progra
     # Half an increment: a program may carry more digits than the controller resolves.
     tolerance_mm = {units: 0.5 * least_increment_mm(machine, units) + 1e-9 for units in (20, 21)}
     probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]
-    emitted = Program.from_text(text, machine, source="emitted program", emitted=True, probe_lines=probes)
+    emitted = Program.from_parts(parts, machine, source="emitted program", probe_lines=probes)
     states = emitted.core.probed
     for index, place in enumerate(placed):
         region = place.region

@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-import numpy as np
-
 from shapegcode import _core
 from shapegcode.conversion.case_player import case_figures
 from shapegcode.conversion.cases import Case, CaseFigures, Judged, RegionLimits, judge_region
@@ -101,8 +99,8 @@ class _Region:
     @property
     def moving(self) -> str:
         """Letters of the axes that move in it."""
-        reach = np.ptp(np.asarray(self.place.region.path.polyline()), axis=0)
-        return "".join(axis for axis, way in zip("xyz", reach, strict=True) if way > 0.0)
+        extent_mm = self.place.region.path.extent_mm
+        return "".join(axis for axis, way in zip("xyz", extent_mm, strict=True) if way > 0.0)
 
     @functools.cached_property
     def tracker(self) -> _core.ContourTracker:

@@ -62,7 +62,6 @@ class Conversion(PlayedFigures, Result):
         rests_on: values that nobody measured on this machine, by how far each moves the deciding figure to its limit.
         unmeasured_tried: how many such values were moved.
         at_the_control: what to heed when it is loaded and run; empty where nothing was shaped.
-        text: the emitted program, as a file holds it.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
         model: the machine that it was played on.
@@ -91,11 +90,15 @@ class Conversion(PlayedFigures, Result):
     rests_on: tuple[RestsOn, ...] = ()
     unmeasured_tried: int = 0
     at_the_control: tuple[ControlNote, ...] = ()
-    text: bytes = field(metadata=hidden())
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
     model: MachineModel = field(metadata=hidden())
     played: PlayedPrograms | None = field(default=None, compare=False, metadata=hidden())
+
+    @property
+    def text(self) -> bytes:
+        """The emitted program, as a file holds it."""
+        return self.emitted.text
 
     @property
     def ok(self) -> bool:

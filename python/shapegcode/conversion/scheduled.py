@@ -21,7 +21,6 @@ from shapegcode.feed.survey import survey
 from shapegcode.feed.travel import OrdinaryMotion, travel_emitted
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.program.stamp import judged
 from shapegcode.shaping.grid import choose_grid
 
 __all__ = ["convert_scheduled"]
@@ -89,8 +88,8 @@ def convert_scheduled(
             break
         margin += excess + _MORE_MARGIN
     warnings = tuple(dict.fromkeys([*emitted.warnings, *conversion.warnings]))
-    text = conversion.text if emitted.ok else judged(conversion.text, good=False)
-    return ScheduledConversion(**vars(conversion) | {"text": text, "warnings": warnings}, feed_schedule=emitted)
+    program = conversion.emitted if emitted.ok else conversion.emitted.with_verdict(good=False)
+    return ScheduledConversion(**vars(conversion) | {"emitted": program, "warnings": warnings}, feed_schedule=emitted)
 
 
 def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, margin: float) -> FeedSchedule:

@@ -42,8 +42,8 @@ class WrittenText(Protocol):
     """A text and the loads of its shaped regions, per index."""
 
     @property
-    def text(self) -> bytes:
-        """The whole text."""
+    def size(self) -> int:
+        """Bytes of the whole text."""
 
     @property
     def loads(self) -> Mapping[int, TransferLoad]:
@@ -143,7 +143,7 @@ class Spending:
             at = f"at a block period of {grid.block_period_s * 1e3:g} ms"
             missed = (index for index in loads if played[index].misses and self._keepable[index])
             chosen = {index: f"{played[index].misses[0]}, {at}" for index in missed} | chosen
-        size = len(written.text) - sum(loads[index].extra_bytes for index in chosen)
+        size = written.size - sum(loads[index].extra_bytes for index in chosen)
         chosen |= self._too_large(size, {k: load for k, load in loads.items() if k not in chosen}, played)
         for index, reason in chosen.items():
             region = played[index]
@@ -248,7 +248,7 @@ class Spending:
 def _needs(grid: Grid, written: WrittenText) -> TextNeeds:
     loads = written.loads.values()
     return TextNeeds(
-        len(written.text),
+        written.size,
         max((load.baud for load in loads), default=0.0),
         max((load.blocks_per_second for load in loads), default=0.0),
         grid.block_period_s,

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from shapegcode import _core
 from shapegcode.conversion.ahead import Ahead, OnShare, cores
 from shapegcode.conversion.budget import TransferLoad, measure_load
-from shapegcode.conversion.readback import Placed
+from shapegcode.conversion.readback import Placed, read_back
 from shapegcode.conversion.spending import keepable
-from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionWriter, Room
+from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionText, RegionWriter, Room
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.shaped_program import stamp_of_machine
@@ -46,7 +46,9 @@ class Written:
     """The emitted text before it is judged.
 
     Attributes:
-        text: the whole program.
+        parts: of the whole text; empty once it was read back.
+        texts: those of its shaped regions, and the byte at which each begins.
+        size: bytes of the whole text.
         placed: its shaped regions.
         blocks: shaped blocks in it.
         kept_warnings: a sentence for every region that keeps its text.
@@ -56,13 +58,34 @@ class Written:
         no_room: per index of a region that was to be shaped and keeps its text why there is no room for it.
     """
 
-    text: bytes
+    parts: list[bytes]
+    texts: list[tuple[RegionText, int]]
+    size: int
     placed: list[Placed]
     blocks: int
     kept_warnings: list[str]
     planned_um: dict[int, float]
     loads: dict[int, TransferLoad]
     no_room: dict[int, str]
+
+    def read_back(self, machine: Machine) -> Program:
+        """Read the text and hold it against the original; from then on it stands in the program that is given.
+
+        Args:
+            machine: whose controller reads it.
+
+        Returns:
+            The emitted program as it was read.
+
+        Raises:
+            RoundTripError: something differs, see `read_back`.
+        """
+        for text, _ in self.texts:
+            text.hand_over()
+        emitted = read_back(self.parts, self.placed, machine)
+        for text, begin in self.texts:
+            text.stands_in(emitted, begin)
+        return emitted
 
 
 class TextWriter:
@@ -84,6 +107,7 @@ class TextWriter:
         self._pool = pool
         # By region: tolerance and feed for which it was shaped, and what it came to.
         self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
+        self._loads: dict[int, TransferLoad] = {}
         self._begun: tuple[dict[int, Aim], Ahead[EmittedRegion]] | None = None
 
     def begin(self, reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> None:
@@ -126,8 +150,9 @@ class TextWriter:
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
         position = core.header_offset
-        written = Written(b"", [], 0, [], {}, {}, {})
+        written = Written([], [], 0, [], 0, [], {}, {}, {})
         blocks, size = 0, core.size
+        begin = sum(map(len, parts))
         aims = _aims(reasons, room_um, feed_share)
         # Moves that stay as they are: all, less those of the regions that are shaped.
         shaped_moves = sum(len(regions[index].path) for index in aims)
@@ -137,38 +162,44 @@ class TextWriter:
             between = core.slice(position, region.text_begin)
             position = region.text_end
             line += between.count(b"\n")
+            begin += len(between)
             shaped = None
             if not reason:
                 size -= region.text_end - region.text_begin
                 try:
                     shaped = self._shaped_region(index, aims[index], ahead)
-                    self._room(size, blocks + kept_moves).require(len(shaped.text), shaped.blocks)
+                    self._room(size, blocks + kept_moves).require(shaped.text.size, shaped.blocks)
                 except NoRoomError as error:
                     shaped = None
                     written.no_room[index] = str(error)
             if shaped is None:
                 if index not in untold:
                     written.kept_warnings.append(self._keep(region, written.no_room.get(index, reason)))
-                text = core.slice(region.text_begin, region.text_end)
+                texts: Sequence[bytes] = [core.slice(region.text_begin, region.text_end)]
                 if index in written.no_room:
-                    size += len(text)
+                    size += region.text_end - region.text_begin
                     kept_moves += len(region.path)
             else:
-                text = shaped.text
-                size += len(text)
+                texts = shaped.text.parts()
+                size += shaped.text.size
                 blocks += shaped.blocks
-                written.placed.append(Placed(region, line, line + text.count(b"\n") - 1))
+                written.placed.append(Placed(region, line, line + _lines(texts) - 1))
+                written.texts.append((shaped.text, begin))
                 if shaped.planned_um > 0.0:
                     written.planned_um[index] = shaped.planned_um
-                bits = self._machine.controller.dnc_bits_per_character
-                written.loads[index] = measure_load(region, shaped, self.grid, bits)
-            line += text.count(b"\n")
-            parts += [between, text]
+                written.loads[index] = self._load(index, region, shaped)
+            line += _lines(texts)
+            begin += sum(map(len, texts))
+            parts += [between, *texts]
         parts.append(core.slice(position, core.size))
-        return Written(
-            b"".join(parts), written.placed, blocks, written.kept_warnings, written.planned_um, written.loads,
-            written.no_room,
-        )  # fmt: skip
+        return replace(written, parts=parts, size=sum(map(len, parts)), blocks=blocks)
+
+    def _load(self, index: int, region: _core.Region, shaped: EmittedRegion) -> TransferLoad:
+        if index not in self._loads:
+            bits = self._machine.controller.dnc_bits_per_character
+            self._loads[index] = measure_load(region, shaped, self.grid, bits)
+            shaped.block_periods.clear()  # nobody else asks for them
+        return self._loads[index]
 
     def _room(self, size: int, moves: int) -> Room:
         """Room for a region beside the rest of the program, all else as it is."""
@@ -199,6 +230,7 @@ class TextWriter:
     def _shaped_region(self, index: int, aim: Aim, ahead: Ahead[EmittedRegion]) -> EmittedRegion:
         if self._is_new(index, aim):
             self._shaped[index] = aim, ahead.result(index)
+            self._loads.pop(index, None)
         else:
             ahead.skip(index)
         return self._shaped[index][1]
@@ -246,6 +278,10 @@ class TextWriter:
             notes=tuple(notes),
         )
         return stamp.lines()
+
+
+def _lines(parts: Sequence[bytes]) -> int:
+    return sum(part.count(b"\n") for part in parts)
 
 
 def _aims(reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> dict[int, Aim]:

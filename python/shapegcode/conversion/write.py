@@ -33,6 +33,47 @@ _TARGETS = {
 }
 
 
+class RegionText:
+    """The lines of a region: in parts as they were written, then in the program that was made of them.
+
+    So a text of a million lines stands in memory once.
+
+    Args:
+        parts: whole lines each.
+    """
+
+    def __init__(self, parts: Sequence[bytes]) -> None:
+        self._parts: Sequence[bytes] | None = parts
+        self._inside: tuple[Program, int] | None = None
+        self.size = sum(map(len, parts))
+        """Bytes."""
+
+    def parts(self) -> Sequence[bytes]:
+        """The text, in as many parts as it has."""
+        if self._inside is not None:
+            program, begin = self._inside
+            return [program.text_slice(begin, begin + self.size)]
+        assert self._parts is not None  # handed over, and not read back
+        return self._parts
+
+    def hand_over(self) -> None:
+        """Somebody else has the parts now."""
+        self._parts = self._inside = None
+
+    def stands_in(self, program: Program, begin: int) -> None:
+        """The text is part of that of a program.
+
+        Args:
+            program: which was read.
+            begin: byte at which it stands there.
+        """
+        self._parts, self._inside = None, (program, begin)
+
+    def joined(self) -> bytes:
+        """The text in one."""
+        return b"".join(self.parts())
+
+
 @dataclass(frozen=True)
 class EmittedRegion:
     """The text that replaces a region.
@@ -40,18 +81,19 @@ class EmittedRegion:
     Attributes:
         text: whole lines.
         blocks: shaped blocks in it, without the lines around them.
-        periods: whole block periods that each of them lasts.
-        blocks_begin: byte of the text at which they begin.
-        blocks_end: byte behind them.
+        block_periods: whole block periods that each of them lasts, of each part that holds blocks.
         planned_um: deviation of what shall follow the path for which the feed was planned, µm; 0 without a target.
     """
 
-    text: bytes
+    text: RegionText
     blocks: int
-    periods: npt.NDArray[np.uint32]
-    blocks_begin: int
-    blocks_end: int
+    block_periods: list[npt.NDArray[np.uint32]]
     planned_um: float
+
+    @property
+    def block_parts(self) -> Sequence[bytes]:
+        """The parts of the text that hold its blocks, before it is handed over."""
+        return self.text.parts()[1:-1]
 
 
 def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
@@ -252,11 +294,8 @@ class RegionWriter:
         emission = self._machine.emission
         unlock = emission.unlock_lines if emission.override == "lock" else ()
         after = _lines([_restore_line(region, state.motion, state.plane), *unlock, *emission.epilogue], state)
-        text, all_periods = b"".join(texts), np.concatenate(periods)
-        return EmittedRegion(
-            before + text + after, len(all_periods), all_periods, len(before), len(before) + len(text),
-            shaper.largest_deviation_mm * 1e3,
-        )  # fmt: skip
+        emitted = RegionText([before, *texts, after])
+        return EmittedRegion(emitted, sum(map(len, periods)), periods, shaper.largest_deviation_mm * 1e3)
 
     def _fit(self, region: _core.Region, options: _core.ShapingOptions) -> _core.FitOptions:
         """How shaped motion becomes blocks in the units of a region."""

@@ -139,7 +139,7 @@ def write_lines(path: str | Path, lines: Iterable[str]) -> None:
             stream.write(_encoded(line))
 
 
-def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = True) -> None:
+def write_bytes(path: str | Path, data: bytes | memoryview, *, overwrite: bool = True) -> None:
     """As :func:`write_text`, for bytes.
 
     Args:
@@ -159,7 +159,7 @@ def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = True) -> Non
             _write_new(Path(os.path.realpath(path)), data)
 
 
-def _write_new(target: Path, data: bytes) -> None:
+def _write_new(target: Path, data: bytes | memoryview) -> None:
     with open(target, "xb") as stream:
         try:
             stream.write(data)

@@ -378,7 +378,7 @@ class MachineModel:
         options = self.verdict_options(filters=filters, offset=offset)
         if tracker is not None:
             options.tracker = tracker
-        return _core.play_path(blocks, _core.plan_speed(blocks, self.limits()), options, path)
+        return _core.play_planned(blocks, self.limits(), options, path)
 
     def cycle_time_s(self, program: _core.ProgramText) -> float:
         """Time of a whole program in closed form, s; `shapegcode.cycle_time` says where it goes."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.reading import program_bytes, program_loader, reader_options
 from shapegcode.program.several import place_of, programs_of
-from shapegcode.program.stamp import STAMP_BEGIN, Stamp, stamp_of
+from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, stamp_of
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -133,10 +133,7 @@ class Program:
             expand_compensation=expand_compensation,
             collect_alarms=collect_alarms,
         )
-        folders = [folder] if folder is not None else []
-        folders += [Path(name).expanduser() for name in machine.input.program_folders]
-        if folders:
-            options.load_program = program_loader(folders, machine.controller.max_program_bytes)
+        _look_in(options, machine, [folder] if folder is not None else [])
         try:
             core = _core.read_program(data, options)
         except ProgramError as error:
@@ -145,23 +142,77 @@ class Program:
 
         return cls(core, source, data if core.expanded else None, folder, program_number)
 
+    @classmethod
+    def from_parts(
+        cls, parts: list[bytes], machine: Machine, *, source: str, probe_lines: Sequence[int] = ()
+    ) -> Program:
+        """Read a text that shapegcode has just written and that is still in parts.
+
+        Args:
+            parts: of the text; the list is empty behind it, so that the text stands in memory once.
+            machine: whose controller reads it.
+            source: names the text in messages.
+            probe_lines: as `from_text` takes them.
+
+        Returns:
+            The program.
+
+        Raises:
+            ProgramError: as `from_text` does.
+        """
+        options = reader_options(machine, emitted=True, probe_lines=probe_lines)
+        _look_in(options, machine, [])
+        try:
+            core = _core.read_parts(parts, options)
+        except ProgramError as error:
+            raise located_error(error.file or source, error.line, error.column, str(error), error.alarm) from None
+        return cls(core, source, core.unexpanded if core.expanded else None)
+
     @property
     def text(self) -> bytes:
         """The text that was read, to the letter."""
         return self.core.text if self.unexpanded is None else self.unexpanded
 
-    @cached_property
+    @property
+    def size(self) -> int:
+        """Bytes of that text."""
+        return self.core.size if self.unexpanded is None else len(self.unexpanded)
+
+    def view(self) -> memoryview:
+        """That text without a copy of it."""
+        return self.core.view() if self.unexpanded is None else memoryview(self.unexpanded)
+
+    def text_slice(self, begin: int, end: int) -> bytes:
+        """Bytes of that text between two offsets."""
+        return self.core.slice(begin, end) if self.unexpanded is None else self.unexpanded[begin:end]
+
+    def with_verdict(self, *, good: bool) -> Program:
+        """The emitted program with verdict and mark in its header; a long text is not copied, but changed in place.
+
+        Args:
+            good: the verdict.
+
+        Returns:
+            The program.
+        """
+        if self.unexpanded is not None:
+            return replace(self, unexpanded=judged(self.unexpanded, good=good))
+        judge(self.core, good=good)
+        return replace(self)  # nothing of it was worked out from the text as it was
+
+    @property
     def own_text(self) -> bytes:
         """The lines of this program alone, of a text that holds several; else the whole text."""
+        text = self.text
         try:
-            places = programs_of(self.text)
-            index = 0 if self.number is None else _index(self.text, self.number, self.source)
+            places = programs_of(text)
+            index = 0 if self.number is None else _index(text, self.number, self.source)
             if index is None:
                 (index,) = (place.index for place in places if place.address == f"O{self.number:04d}")
         except (ProgramError, ValueError):
-            return self.text  # in a file of its own
+            return text  # in a file of its own
         place = places[index]
-        return self.text if len(places) == 1 else self.text[place.text_begin : place.text_end]
+        return text if len(places) == 1 else text[place.text_begin : place.text_end]
 
     @cached_property
     def regions(self) -> list[_core.Region]:
@@ -169,7 +220,7 @@ class Program:
         # Made anew by the core at every call: kept, as a program may have a hundred thousand.
         return self.core.regions
 
-    @property
+    @cached_property
     def stamp(self) -> Stamp | None:
         """What its header says, if the converter wrote it; else None."""
         return stamp_of(self.own_text)
@@ -227,6 +278,13 @@ class Program:
         """
         first, file = self.core.origin(region.first_line)
         return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
+
+
+def _look_in(options: _core.ReaderOptions, machine: Machine, folders: list[Path]) -> None:
+    """Let the core look for called programs in folders, and in those of the machine."""
+    folders = [*folders, *(Path(name).expanduser() for name in machine.input.program_folders)]
+    if folders:
+        options.load_program = program_loader(folders, machine.controller.max_program_bytes)
 
 
 def _index(data: bytes, wanted: int | str, source: str) -> int | None:

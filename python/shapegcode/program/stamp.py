@@ -18,11 +18,13 @@ from __future__ import annotations
 
 import re
 import zlib
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
+from shapegcode import _core
 from shapegcode.program.operating import FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK
 
-__all__ = ["RAPID_MARK", "REGION_MARK", "STAMP_BEGIN", "Stamp", "judged", "stamp_of", "text_mark"]
+__all__ = ["RAPID_MARK", "REGION_MARK", "STAMP_BEGIN", "Stamp", "judge", "judged", "stamp_of", "text_mark"]
 
 REGION_MARK = "(SHAPED)"
 """Stands before each shaped region."""
@@ -181,11 +183,21 @@ def text_mark(text: bytes) -> str:
     Returns:
         The CRC-32 of the rest.
     """
-    mark, end, is_first = 0, 0, True
-    while end < len(text):
-        # Whole lines: what does not count never reaches over a line's end.
-        begin, end = end, 1 + text.find(b"\n", end + _CHUNK) or len(text)
-        kept = _what_counts(text[begin:end])
+
+    def chunks() -> Iterator[bytes]:
+        end = 0
+        while end < len(text):
+            begin, end = end, 1 + text.find(b"\n", end + _CHUNK) or len(text)
+            yield text[begin:end]
+
+    return _mark_of(chunks())
+
+
+def _mark_of(chunks: Iterable[bytes]) -> str:
+    """The mark of a text in chunks of whole lines: what does not count never reaches over a line's end."""
+    mark, is_first = 0, True
+    for chunk in chunks:
+        kept = _what_counts(chunk)
         if kept:
             mark = zlib.crc32(kept if is_first else b"\n" + kept, mark)
             is_first = False
@@ -223,13 +235,35 @@ def judged(text: bytes, *, good: bool) -> bytes:
     Returns:
         The text, as long as it was.
     """
-    for before in (_PENDING, _GOOD):
-        text = _replaced(text, before, _GOOD if good else _BAD)
-        if good:
-            break
-    return _replaced(text, _MARK_PENDING, f"(TEXT {text_mark(text)})".encode())
+    changes = _changes(text.find, text_mark(text), good=good)
+    if not changes:
+        return text
+    changed = bytearray(text)
+    for begin, after in changes:
+        changed[begin : begin + len(after)] = after
+    return bytes(changed)
 
 
-def _replaced(text: bytes, before: bytes, after: bytes) -> bytes:
-    """The first of `before` replaced; a long text without it is not copied."""
-    return text.replace(before, after, 1) if before in text else text
+def judge(program: _core.ProgramText, *, good: bool) -> None:
+    """The same in the text of a program that was read; it holds what it held in the same places.
+
+    Args:
+        program: whose header has an open verdict, or one that was good before.
+        good: the verdict.
+    """
+    for begin, after in _changes(program.find, _mark_of(_lines_of(program)), good=good):
+        program.overwrite(begin, after)
+
+
+def _changes(find: Callable[[bytes], int], mark: str, *, good: bool) -> list[tuple[int, bytes]]:
+    """Where the header says something else, and what: as long as what it takes the place of."""
+    verdicts = [(_PENDING, _GOOD)] if good else [(_PENDING, _BAD), (_GOOD, _BAD)]
+    wanted = [*verdicts, (_MARK_PENDING, f"(TEXT {mark})".encode())]
+    return [(begin, after) for before, after in wanted if (begin := find(before)) >= 0]
+
+
+def _lines_of(program: _core.ProgramText) -> Iterator[bytes]:
+    end = 0
+    while end < program.size:
+        begin, end = end, 1 + program.find(b"\n", end + _CHUNK) or program.size
+        yield program.slice(begin, end)

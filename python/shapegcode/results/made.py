@@ -31,7 +31,7 @@ class MadeFile:
     size_bytes: int
 
     @classmethod
-    def of(cls, role: str, name: str | Path, content: bytes | None = None) -> MadeFile:
+    def of(cls, role: str, name: str | Path, content: bytes | memoryview | None = None) -> MadeFile:
         """Of a file, or of what is about to be written into it.
 
         Args:

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -39,7 +40,8 @@ enum class PathSide : std::uint8_t {
 /// forward. Positive on the left of the direction of travel seen along the tool axis (+Z looking down), negative on
 /// the right; a deviation along Z only, or from a travel along Z only, is positive above. Amortised O(1) per sample, no
 /// allocation after construction; a step looks at the pieces of the path that may be nearest and passes others in
-/// groups, so that its work has no other bound than how many pieces lie equally near. Copies what it needs of the path.
+/// groups, so that its work has no other bound than how many pieces lie equally near. Reads the path: it keeps no copy
+/// of it.
 ///
 /// The foot point is searched within an arc length that the last step and the last deviation allow, so that another
 /// pass of the path nearby is not mistaken for the present one. On a path that turns back on itself the outward and the
@@ -64,13 +66,20 @@ class ContourTracker {
 
  private:
   static constexpr double reach_mm = 0.01;
+  static constexpr std::size_t slots = 16;
+  static constexpr std::size_t no_piece = std::numeric_limits<std::size_t>::max();
 
-  /// What a search needs of one segment: exactly one cache line.
+  /// What a search needs of one segment.
   struct Piece {
     Vector3 start;
     Vector3 direction;  // unit; of the neighbour if the piece has no length
     double length;
     double s;  // of the start, from the path's start
+  };
+  /// The piece last asked for of those that share its place.
+  struct Slot {
+    std::size_t piece = no_piece;
+    Piece of{};
   };
   struct Arc {
     Segment segment;
@@ -116,19 +125,30 @@ class ContourTracker {
   [[nodiscard]] Found search(const Vector3& p, double move, const Window& window, double bound) const noexcept;
   [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
   /// Direction of travel at a foot, of any length.
-  [[nodiscard]] const Vector3& direction_at(std::size_t piece, const Foot& foot) const noexcept;
+  [[nodiscard]] Vector3 direction_at(std::size_t piece, const Foot& foot) const noexcept;
   [[nodiscard]] Vector3 start_tangent(std::size_t piece) const noexcept;
   [[nodiscard]] Vector3 end_tangent(std::size_t piece) const noexcept;
 
   /// The path as a search wants it; constant, so that copies of a tracker share it.
   struct Geometry {
-    std::vector<Piece> pieces;
-    std::vector<std::int32_t> arc_of;  // -1 for a line
+    Path path;
+    SteadyColumn<std::int32_t> arc_of;  // -1 for a line
     std::vector<Arc> arcs;
   };
   [[nodiscard]] static std::shared_ptr<const Geometry> geometry_of(const Path& path);
+  [[nodiscard]] static Arc arc_of(const Segment& segment) noexcept;
+
+  [[nodiscard]] std::size_t pieces() const noexcept { return geometry_->path.size(); }
+  [[nodiscard]] double begin_mm(std::size_t piece) const noexcept { return geometry_->path.distance_mm(piece); }
+  [[nodiscard]] const Piece& at(std::size_t i) const noexcept {
+    Slot& slot = slots_[i % slots];
+    if (slot.piece != i) slot = {i, piece_of(i)};
+    return slot.of;
+  }
+  [[nodiscard]] Piece piece_of(std::size_t i) const noexcept;
 
   std::shared_ptr<const Geometry> geometry_;
+  mutable std::array<Slot, slots> slots_{};  // pieces around the point, worked out once
   Vector3 last_ = Vector3::Zero();
   std::size_t cursor_ = 0;
   double s_ = 0.0;
@@ -166,7 +186,7 @@ class OrbitError {
   };
   void add_move(Arc& arc, std::size_t index, const Vector3& to, std::size_t to_segment) noexcept;
 
-  std::vector<std::int32_t> arc_of_;  // -1 for a line
+  SteadyColumn<std::int32_t> arc_of_;  // -1 for a line
   std::vector<Arc> arcs_;
   bool has_last_ = false;
   Vector3 last_ = Vector3::Zero();

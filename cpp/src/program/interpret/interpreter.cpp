@@ -131,15 +131,15 @@ void Interpreter::close_region() {
     return;
   }
   region_->notes.resize(notes_kept_);
-  if (!segments_.empty()) {
+  if (segments_.size() > 0) {
     region_->shaped = std::exchange(shaped_next_, false);
     region_->was_rapid = std::exchange(rapid_next_, false);
-    region_->path = std::make_shared<const Path>(std::move(segments_));
+    region_->path = std::make_shared<const Path>(segments_.path());
     add_step(StepKind::region, program_.regions.size());
     program_.steps.back().line = region_->first_line;
     program_.regions.push_back(std::move(region_));
   }
-  segments_ = {};
+  segments_ = PathBuilder();
   region_.reset();
 }
 

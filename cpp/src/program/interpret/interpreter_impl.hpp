@@ -135,7 +135,7 @@ class Interpreter {
   std::uint32_t line_number_ = 0;
   LineOrigin origin_;
   std::shared_ptr<Region> region_;
-  std::vector<Segment> segments_;  ///< of the open region
+  PathBuilder segments_;  ///< of the open region
   std::size_t notes_kept_ = 0;
   std::uint32_t foreign_ = 0;  ///< modes passed through untouched that are on
   bool explicit_exact_stop_ = false;

@@ -231,7 +231,7 @@ void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_
   segment.stop_at_end = stops;
   if (segment.length_mm > 0.0) {
     require_room(work_.move(segment));
-    segments_.push_back(segment);
+    segments_.add(segment);
   }
   state_.position_mm = to;
   state_.known = known_after;

@@ -229,9 +229,7 @@ Program Reader::run() {
 bool Reader::is_shut(std::int64_t number) const noexcept { return std::ranges::find(shut_, number) != shut_.end(); }
 
 Program Reader::result() {
-  if (!program_.expanded) {
-    program_.text = std::move(sources_.front().text);
-  }
+  (program_.expanded ? program_.unexpanded : program_.text) = std::move(sources_.front().text);
   return std::move(program_);
 }
 

@@ -46,15 +46,13 @@ class ShapedRapids:
     """A text with shaped rapids.
 
     Attributes:
-        text: the whole program.
-        emitted: the same, read back.
+        emitted: the whole program, read back.
         placed: the cutting regions and their places in it.
         outcome: what became of the rapids.
         warnings: what is different where they became cutting moves.
         extra_s: what the replacements add to the cycle time (settling not counted), s.
     """
 
-    text: bytes
     emitted: Program
     placed: list[Placed]
     outcome: RapidsOutcome
@@ -146,7 +144,7 @@ class _RapidShaper:
     def _result(self, open_gaps: Sequence[OpenGap], kept: Counter[str], found: int) -> ShapedRapids:
         shaped = [choice for gap in open_gaps for choice in gap.choices if choice.text]
         spliced = splice(self.emitted.core.text, self.placed, shaped)
-        read = read_back(spliced.text, spliced.everything, self.machine)
+        read = read_back([spliced.text], spliced.everything, self.machine)
         outcome = RapidsOutcome(
             found=found,
             shaped=len(shaped),
@@ -158,7 +156,7 @@ class _RapidShaper:
             moves=tuple(_move(choice, place, self.placed) for choice, place in zip(shaped, spliced.moves, strict=True)),
         )
         extra_s = math.fsum(c.after.clock_s - c.before.clock_s for c in shaped if c.after is not None)
-        return ShapedRapids(spliced.text, read, spliced.placed, outcome, _warnings(outcome, self.machine), extra_s)
+        return ShapedRapids(read, spliced.placed, outcome, _warnings(outcome, self.machine), extra_s)
 
     def _write(self, choice: Choice) -> None:
         """The lines that replace a rapid."""
@@ -174,7 +172,7 @@ class _RapidShaper:
         # In G95 a dwell may count revolutions.
         lines += ["G94", _STOP] if region.entry.feed_mode != 94 else [_STOP]
         end = self.emitted.core.line_end.encode()
-        choice.text = b"".join(line.encode("latin-1") + end for line in lines) + choice.shaped.text
+        choice.text = b"".join(line.encode("latin-1") + end for line in lines) + choice.shaped.text.joined()
 
     def _too_fast(self, choice: Choice, budget: Budget) -> bool:
         assert choice.shaped is not None
@@ -184,7 +182,7 @@ class _RapidShaper:
     def _judge(self, choices: Sequence[Choice]) -> None:
         """Play every replacement as the text has it."""
         spliced = splice(self.emitted.core.text, self.placed, choices)
-        emitted = read_back(spliced.text, spliced.everything, self.machine)
+        emitted = read_back([spliced.text], spliced.everything, self.machine)
         stops_s = _STOP_S + self.machine.emission.prefill_dwell_s
         running = [
             self.pool.submit(self.plant.blocks, place.blocks(emitted), choice.region, stops_s)
