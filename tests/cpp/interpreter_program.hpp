@@ -66,7 +66,7 @@ inline std::string text_of(const Program& program, const Region& region) {
   return program.text.substr(region.text_begin, region.text_end - region.text_begin);
 }
 
-inline const Segment& only_segment(const Program& program) {
+inline Segment only_segment(const Program& program) {
   REQUIRE(program.regions.size() == 1);
   REQUIRE(program.regions[0]->path->size() == 1);
   return (*program.regions[0]->path)[0];

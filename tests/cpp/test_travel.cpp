@@ -86,7 +86,7 @@ TEST_CASE("a travel without a way is refused, not read past its end") {
   const auto path = two_lines();
   const auto profile = std::make_shared<const SpeedProfile>();
   const auto nothing = std::make_shared<const Path>();
-  const auto of_blocks = [&](std::span<const Segment> blocks, double window_s) {
+  const auto of_blocks = [&](const shapegcode::Segments& blocks, double window_s) {
     static_cast<void>(travel_blocks(blocks, *path, BlockEnd::ceil, stations(), {0.001, {}, window_s}));
   };
   const auto of_path = [&] { static_cast<void>(travel_path(nothing, profile, *path, stations(), {0.001, {}, 0.0})); };
