@@ -47,6 +47,7 @@ NOT_FROM = {
 }
 # Public headers whose folder of sources has another name; one that is named like a folder, or lies in it, is its own.
 HEADER_FOLDERS = {
+    "columns.hpp": "path",
     "control.hpp": "motion",
     "error.hpp": "base",
     "minimal_shapers.hpp": "shaper",

@@ -183,7 +183,15 @@ class Program:
         return self.core.view() if self.unexpanded is None else memoryview(self.unexpanded)
 
     def text_slice(self, begin: int, end: int) -> bytes:
-        """Bytes of that text between two offsets."""
+        """Bytes of that text between two offsets.
+
+        Args:
+            begin: of the first byte.
+            end: behind the last one.
+
+        Returns:
+            The bytes.
+        """
         return self.core.slice(begin, end) if self.unexpanded is None else self.unexpanded[begin:end]
 
     def with_verdict(self, *, good: bool) -> Program:
