@@ -105,6 +105,14 @@ TEST_CASE("interpolator: batch and stepwise agree to the last bit, whatever the 
       CHECK_FALSE(stepwise.step(position));
       CHECK(position == Vector3(10.0, 10.0, 0.0));
       CHECK(stepwise.segment() == 1);
+      Interpolator leaping(path, profile, period);
+      for (Eigen::Index i = 6; i < batch.positions_mm.rows(); i += 7) {
+        REQUIRE(leaping.step(position, 7));
+        if (position.transpose() != batch.positions_mm.row(i)) ++differing;
+      }
+      CHECK(differing == 0);
+      CHECK_FALSE(leaping.step(position, 7));
+      CHECK(position == Vector3(10.0, 10.0, 0.0));
     }
   }
 }

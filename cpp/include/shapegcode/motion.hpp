@@ -159,7 +159,10 @@ class Interpolator {
 
   /// Next set-point, X, Y and Z. False once the last set-point was given; it then stays at the end.
   bool step(std::span<double> out) noexcept { return step_into(out, *this); }
-  bool step(Vector3& position) noexcept;
+  bool step(Vector3& position) noexcept { return step(position, 1); }
+  /// The set-point so many periods on, to the last bit what the last of as many steps gives; the path is looked at
+  /// once.
+  bool step(Vector3& position, std::size_t periods) noexcept;
   /// Distance along the path at the set-point last given.
   [[nodiscard]] double distance_mm() const noexcept { return distance_mm_; }
   /// Segment of the set-point last given.
@@ -175,6 +178,7 @@ class Interpolator {
   std::shared_ptr<const Path> path_;
   std::shared_ptr<const SpeedProfile> profile_;
   FirStream smoothing_;
+  bool smooths_;  // more than one sample
   double period_s_ = 0.0;
   double delay_s_ = 0.0;
   std::size_t sample_count_ = 0;

@@ -47,9 +47,7 @@ void RunReader::read_row() {
 
 void RunReader::read_command() {
   Vector3 position;
-  for (std::size_t skip = 0; skip < (read_ == 0 ? 1 : steps_per_half_); ++skip) {
-    ahead_.step(position);
-  }
+  ahead_.step(position, read_ == 0 ? 1 : steps_per_half_);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     if (read_ == 0) {
       command_[axis].assign(static_cast<std::size_t>(history_), position[static_cast<Eigen::Index>(axis)]);
@@ -87,9 +85,7 @@ void RunReader::read_error() {
   since_corner_ += 1.0;
 
   Vector3 wanted;
-  for (std::size_t skip = 0; skip < (read_ == 1 ? 1 : steps_per_half_); ++skip) {
-    target_->step(wanted);
-  }
+  target_->step(wanted, read_ == 1 ? 1 : steps_per_half_);
   const std::size_t at = target_->segment();
   const Vector3 tangent = tangent_at(target_->on(), target_->distance_mm() - path_->distance_mm(at));
   Vector3 error;

@@ -22,6 +22,7 @@ Interpolator::Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<con
     : path_(std::move(path)),
       profile_(std::move(profile)),
       smoothing_(Fir::moving_average(smoothing_length(*profile_, period_s)), 1),
+      smooths_(smoothing_.fir().duration_samples() > 0),
       period_s_(period_s),
       delay_s_(delay_s) {
   const double rest = 0.0;
@@ -39,14 +40,16 @@ void Interpolator::take_segment() noexcept {
   on_end_mm_ = path_->distance_mm(path_cursor_ + 1);
 }
 
-bool Interpolator::step(Vector3& position) noexcept {
-  const bool moving = index_ < sample_count_;
-  if (moving) {
-    double distance = profile_->distance_mm(static_cast<double>(index_) * period_s_ - delay_s_, phase_cursor_);
-    ++index_;
+bool Interpolator::step(Vector3& position, std::size_t periods) noexcept {
+  const std::size_t end = std::min(index_ + periods, sample_count_);
+  const bool moving = end == index_ + periods;
+  // Only what smooths the distance needs the set-points that nobody asks for.
+  if (!smooths_ && index_ < end) index_ = end - 1;
+  while (index_ < end) {
+    distance_mm_ = profile_->distance_mm(static_cast<double>(index_) * period_s_ - delay_s_, phase_cursor_);
+    if (smooths_) smoothing_.step({&distance_mm_, 1}, {&distance_mm_, 1});
     // The last set-point is the end itself, whatever the running sum rounds to.
-    smoothing_.step({&distance, 1}, {&distance, 1});
-    distance_mm_ = index_ == sample_count_ ? path_->length_mm() : distance;
+    if (++index_ == sample_count_) distance_mm_ = path_->length_mm();
   }
   if (path_->size() == 0) {
     position = Vector3::Zero();
