@@ -1,7 +1,6 @@
 #include "shapegcode/measure/contour.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -25,22 +24,14 @@ constexpr double retreat_tie_relative = 1e-6;
 constexpr double retreat_tie_absolute_mm2 = 1e-16;
 // A component of the deviation or the travel below this share of the whole is rounding.
 constexpr double negligible_share = 1e-6;
-constexpr std::uint32_t growing_until_lost = 8;
+constexpr std::uint32_t growing_until_lost = 8;  // and at every power of two from there
 constexpr double widest_local_window_rad = 1.0;
 // Pieces that lie further away than the best foot are passed in groups.
-constexpr std::size_t group_size = 16;
+constexpr std::size_t group_size = 16;  // a power of two
 constexpr double group_slack = 1e-6;
 constexpr double group_slack_mm = 1e-6;
 
 }  // namespace
-
-void DeviationStats::add(double deviation_mm) noexcept {
-  max_abs_mm = std::max(max_abs_mm, std::abs(deviation_mm));
-  most_positive_mm = std::max(most_positive_mm, deviation_mm);
-  most_negative_mm = std::min(most_negative_mm, deviation_mm);
-  sum_of_squares_mm2 += deviation_mm * deviation_mm;
-  ++count;
-}
 
 void DeviationStats::include_missed(double distance_mm) noexcept { max_abs_mm = std::max(max_abs_mm, distance_mm); }
 
@@ -233,7 +224,7 @@ bool ContourTracker::is_beyond(std::size_t first, std::size_t size, const Vector
 
 std::size_t ContourTracker::group_from(std::size_t first, const Vector3& p, double limit2) const noexcept {
   std::size_t passed = 0;
-  for (std::size_t size = group_size; first % size == 0 && first + size < pieces(); size *= group_size) {
+  for (std::size_t size = group_size; (first & (size - 1)) == 0 && first + size < pieces(); size *= group_size) {
     if (!is_beyond(first, size, p, limit2)) break;
     passed = size;
   }
@@ -242,7 +233,7 @@ std::size_t ContourTracker::group_from(std::size_t first, const Vector3& p, doub
 
 std::size_t ContourTracker::group_before(std::size_t end, const Vector3& p, double limit2) const noexcept {
   std::size_t passed = 0;
-  for (std::size_t size = group_size; end % size == 0 && end >= size && end < pieces(); size *= group_size) {
+  for (std::size_t size = group_size; (end & (size - 1)) == 0 && end >= size && end < pieces(); size *= group_size) {
     if (!is_beyond(end - size, size, p, limit2)) break;
     passed = size;
   }
@@ -252,7 +243,7 @@ std::size_t ContourTracker::group_before(std::size_t end, const Vector3& p, doub
 ContourTracker::Found ContourTracker::search(const Vector3& p, double move, const Window& window,
                                              double bound) const noexcept {
   Found best{foot_on(cursor_, p, window), cursor_, 0.0};
-  const Foot start = best.foot;
+  const Vector3 heading = direction_at(cursor_, best.foot);
   const double advance = begin_mm(cursor_) + best.foot.along - s_;
   bool retreats = advance < 0.0;
   Window forward = window;
@@ -274,7 +265,7 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
     // A return leg runs back: another turn of a circle does not. Far ahead it is one only as far behind the tip as the
     // point was before it, and nearer: a vibration along the path is no reason to jump.
     const bool nearer = foot.distance2 < best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
-    const bool back = direction_at(i, foot).dot(direction_at(cursor_, start)) < 0.0;
+    const bool back = direction_at(i, foot).dot(heading) < 0.0;
     const bool within = begin_mm(i) + foot.along <= window.end;
     if (within ? nearer || back : nearer && back && i == cursor_ + 1 && 2.0 * foot.along > to_tip) {
       best = {foot, i, 0.0};
@@ -336,7 +327,7 @@ double ContourTracker::step(const Vector3& p, double up_to_mm) noexcept {
   bool jumped = false;
 
   growing_ = distance > deviation_ + 0.25 * move && move > 0.0 ? growing_ + 1 : 0;
-  if (growing_ >= growing_until_lost && std::has_single_bit(growing_)) {
+  if (growing_ >= growing_until_lost && (growing_ & (growing_ - 1)) == 0) {
     // Widened at 8, 16, 32 … samples only: the cost stays proportional to the samples.
     const double factor = static_cast<double>(growing_) * static_cast<double>(growing_) / 16.0;
     const Found wide = search(p, move, {s_ - factor * behind, std::min(s_ + factor * ahead, bound)}, bound);

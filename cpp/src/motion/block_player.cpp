@@ -18,6 +18,16 @@ constexpr double tick_tolerance = 1e-6;
 // Blocks that one step takes one by one; where more of them end within a period, whole groups are passed at once.
 constexpr std::size_t group_size = 16;
 
+void require_playable(const Segments& blocks, double period_s, double override_ratio) {
+  require_period(period_s);
+  require_above_zero(override_ratio, "override", "");
+  for (const Segment& block : blocks) {
+    if (block.length_mm > 0.0 && !(block.feed_mm_per_s > 0.0)) {
+      throw Error(ErrorKind::argument, "block without a feed greater than zero", block.line);
+    }
+  }
+}
+
 }  // namespace
 
 double whole_periods(double periods) noexcept { return std::ceil(periods - tick_tolerance); }
@@ -32,13 +42,7 @@ double block_periods(double length_mm, double feed_mm_per_s, double period_s, Bl
 
 BlockPlayer::BlockPlayer(Segments blocks, double period_s, BlockEnd block_end, double override_ratio)
     : blocks_(std::move(blocks)), period_s_(period_s), ratio_(override_ratio), block_end_(block_end) {
-  require_period(period_s);
-  require_above_zero(override_ratio, "override", "");
-  for (const Segment& block : blocks_) {
-    if (block.length_mm > 0.0 && !(block.feed_mm_per_s > 0.0)) {
-      throw Error(ErrorKind::argument, "block without a feed greater than zero", block.line);
-    }
-  }
+  require_playable(blocks_, period_s, override_ratio);
   if (!blocks_.empty()) {
     find_crowds();
     open_block();
@@ -165,10 +169,10 @@ bool BlockPlayer::step(Vector3& position) noexcept {
 }
 
 double play_duration_s(const Segments& blocks, double period_s, BlockEnd block_end, double override_ratio) {
-  const BlockPlayer player(blocks, period_s, block_end, override_ratio);
+  require_playable(blocks, period_s, override_ratio);
   double total = 0.0;
   for (const Segment& block : blocks) {
-    total += player.block_duration_s(block);
+    total += block_periods(block.length_mm, block.feed_mm_per_s * override_ratio, period_s, block_end) * period_s;
   }
   return total;
 }

@@ -18,8 +18,9 @@ constexpr double peak_steps_per_swing = 20.0;
 constexpr double most_substeps = 1024.0;
 constexpr double residual_steps_per_swing = 64.0;
 constexpr double most_residual_steps = 1e6;
-constexpr double node_angle_rad = 1e-3;   // omega*period between neighbouring nodes of a mode that varies
-constexpr double most_matrices = 262144;  // of a mode that varies: 8 MB
+constexpr double node_angle_rad = 1e-3;       // omega*period between neighbouring nodes of a mode that varies
+constexpr double surely_below = 1.0 - 1e-12;  // rounding included
+constexpr double most_matrices = 262144;      // of a mode that varies: 8 MB
 
 double fastest_hz(const std::vector<Mode>& modes) {
   double fastest = 0.0;
@@ -35,9 +36,12 @@ double slowest_hz(const std::vector<Mode>& modes) {
 
 }  // namespace
 
-double ModalPlant::State::reachable() const noexcept {
-  const double quadrature = (velocity + decay_rate * deflection) * damped_period_s;
-  return std::abs(participation) * std::sqrt(deflection * deflection + quadrature * quadrature);
+double ModalPlant::State::reachable() const noexcept { return std::abs(participation) * std::sqrt(amplitude2()); }
+
+double ModalPlant::reachable(std::size_t axis) const noexcept {
+  double sum = 0.0;
+  for (std::size_t m = first_[axis]; m < first_[axis + 1]; ++m) sum += states_[m].reachable();
+  return sum;
 }
 
 double ModalPlant::largest_between(const Motion& from, const Motion& to, double time_s) noexcept {
@@ -244,12 +248,15 @@ Vector3 ModalPlant::step(const Vector3& command) noexcept {
     if (first == last) continue;
 
     // The command's velocity jumps at the set-point; the table does not, so the deflection's velocity jumps back.
-    double reachable = 0.0;
+    double squares = 0.0;
     for (std::size_t m = first; m < last; ++m) {
-      states_[m].velocity -= jump;
-      reachable += states_[m].reachable();
+      State& state = states_[m];
+      state.velocity -= jump;
+      squares += state.participation * state.participation * state.amplitude2();
     }
-    if (reachable > peak_[a]) look_between(axis);
+    // The square of a sum is at most its number of terms times the sum of their squares: mostly it settles the matter.
+    const bool may_grow = static_cast<double>(last - first) * squares > surely_below * peak_[a] * peak_[a];
+    if (may_grow && reachable(axis) > peak_[a]) look_between(axis);
     double deflection = 0.0;
     for (std::size_t m = first; m < last; ++m) {
       states_[m].propagate();
@@ -258,7 +265,7 @@ Vector3 ModalPlant::step(const Vector3& command) noexcept {
     deflection_[a] = deflection;
   }
   if (++row_ % rows_between_looks == rows_between_looks - 1) forget_nothing();
-  return command_ + deflection_;
+  return {command[0] + deflection_[0], command[1] + deflection_[1], command[2] + deflection_[2]};
 }
 
 Vector3 ModalPlant::residual_peak(int n_periods) const {

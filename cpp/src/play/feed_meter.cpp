@@ -1,6 +1,7 @@
 #include "play/feed_meter.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace shapegcode::detail {
@@ -20,11 +21,12 @@ FeedMeter::FeedMeter(const Path& path, const PlaybackOptions& options)
   for (std::size_t i = 0; i < windows_.size(); ++i) {
     windows_[i] = window_periods[i] * static_cast<std::size_t>(samples);
   }
-  rows_.resize(windows_.back() + 1);
+  rows_.resize(std::bit_ceil(windows_.back() + 1));
+  mask_ = rows_.size() - 1;
 }
 
 void FeedMeter::step(const Vector3& command, const ContourTracker& tracker, double deviation_mm) noexcept {
-  Row& now = rows_[count_ % rows_.size()];
+  Row& now = rows_[count_ & mask_];
   double travelled = 0.0;
   if (count_ > 0) {
     const Row& last = row(count_ - 1);
@@ -41,7 +43,7 @@ void FeedMeter::step(const Vector3& command, const ContourTracker& tracker, doub
 
 void FeedMeter::compare(const Row& from, const Row& to, double time_s) noexcept {
   const double speed = (to.travelled_mm - from.travelled_mm - slack_mm_) / time_s;
-  const auto beats = [&](double feed) { return speed > largest_.ratio() * (1.0 + least_gain) * feed; };
+  const auto beats = [&](double feed) { return speed > ratio_to_beat_ * feed; };
   if (!(speed > 0.0) || !beats(path_->feed_mm_per_s(to.segment))) {
     return;
   }
@@ -64,6 +66,7 @@ void FeedMeter::compare(const Row& from, const Row& to, double time_s) noexcept 
   const double programmed = path_->feed_mm_per_s(fastest);
   if (beats(programmed)) {
     largest_ = {speed, programmed, path_->line(fastest)};
+    ratio_to_beat_ = largest_.ratio() * (1.0 + least_gain);
   }
 }
 

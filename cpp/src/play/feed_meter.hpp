@@ -31,16 +31,18 @@ class FeedMeter {
     std::size_t segment = 0;
   };
 
-  [[nodiscard]] const Row& row(std::size_t index) const noexcept { return rows_[index % rows_.size()]; }
+  [[nodiscard]] const Row& row(std::size_t index) const noexcept { return rows_[index & mask_]; }
   void compare(const Row& from, const Row& to, double time_s) noexcept;
 
   const Path* path_;
   double period_s_;
   double slack_mm_;
   std::array<std::size_t, 3> windows_{};
-  std::vector<Row> rows_;  // a ring as long as the longest window
+  std::vector<Row> rows_;  // a ring longer than the longest window, a power of two
+  std::size_t mask_ = 0;
   std::size_t count_ = 0;
   FeedExcess largest_;
+  double ratio_to_beat_ = 0.0;
 };
 
 }  // namespace shapegcode::detail

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -18,7 +20,13 @@ struct DeviationStats {
   double most_negative_mm = 0.0;
   double sum_of_squares_mm2 = 0.0;
   std::size_t count = 0;
-  void add(double deviation_mm) noexcept;
+  void add(double deviation_mm) noexcept {
+    max_abs_mm = std::max(max_abs_mm, std::abs(deviation_mm));
+    most_positive_mm = std::max(most_positive_mm, deviation_mm);
+    most_negative_mm = std::min(most_negative_mm, deviation_mm);
+    sum_of_squares_mm2 += deviation_mm * deviation_mm;
+    ++count;
+  }
   /// A distance by which the track missed a corner of the path (CornerReach): counts in the largest magnitude alone.
   void include_missed(double distance_mm) noexcept;
   /// The extremes of others, of samples that do not count in the root mean square.

@@ -102,6 +102,11 @@ class ModalPlant {
       velocity = over_period.vd * deflection + over_period.vv * velocity;
       deflection = next;
     }
+    /// Square of an amplitude that no later deflection of the free mode exceeds, before participation.
+    [[nodiscard]] double amplitude2() const noexcept {
+      const double quadrature = (velocity + decay_rate * deflection) * damped_period_s;
+      return deflection * deflection + quadrature * quadrature;
+    }
     /// No later deflection of the free mode exceeds this share of the response.
     [[nodiscard]] double reachable() const noexcept;
   };
@@ -139,6 +144,8 @@ class ModalPlant {
   [[nodiscard]] Mode mode_now(std::size_t axis, std::size_t mode) const noexcept;
   /// States too small to be any become zero.
   void forget_nothing() noexcept;
+  /// No later deflection of an axis that is free from now on exceeds it.
+  [[nodiscard]] double reachable(std::size_t axis) const noexcept;
   /// `peak_` over the period that now begins, looked at between its ends; called only where it may grow.
   void look_between(std::size_t axis) noexcept;
   /// Largest |deflection| between two instants `time_s` apart, with the turning point found by the secant of the rate.
