@@ -76,7 +76,7 @@ class Path {
  public:
   Path() = default;
   /// Throws Error(argument) if a segment does not start where its predecessor ends (1e-6 mm) or a number is not finite.
-  explicit Path(Segments segments);
+  explicit Path(const Segments& segments);
 
   [[nodiscard]] Segments segments() const noexcept;
   [[nodiscard]] std::size_t size() const noexcept { return data_ ? data_->feeds.size() : 0; }

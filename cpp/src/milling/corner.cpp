@@ -222,7 +222,7 @@ Path corner_path(const CornerCut& cut, double feed_mm_per_s, double z_mm) {
                                 cut.mirrored ? -cut.turn_rad : cut.turn_rad, 2, feed_mm_per_s));
   }
   if (cut.after_mm > 0.0) segments.push_back(make_line(place(arc_end), place(length), feed_mm_per_s));
-  return Path(std::move(segments));
+  return Path(segments);
 }
 
 Ring corner_stock(const CornerCut& cut, double beyond_mm) {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <utility>
 
 #include "milling/checks.hpp"
 
@@ -250,7 +249,7 @@ Path with_feeds(const Path& path, std::span<const FeedStretch> stretches) {
       at = stretches[k].end_mm;
     }
   }
-  return Path(std::move(pieces));
+  return Path(pieces);
 }
 
 void look_ahead_on_load(FeedStations& stations, std::span<const double> load_mm_per_min,

@@ -31,7 +31,7 @@ bool is_plain(const Segment& segment, const Vector3& next_mm) noexcept {
 
 }  // namespace
 
-Path::Path(Segments segments) {
+Path::Path(const Segments& segments) {
   PathBuilder builder;
   for (std::size_t i = 0; i < segments.size(); ++i) builder.add(segments[i]);
   *this = builder.path();

@@ -84,7 +84,7 @@ class Clock {
       std::vector<Segment> run;
       at = detail::gather_run(program_, at, run);
       const bool stop = run.back().stop_at_end;
-      add(cutting_run(Path(std::move(run)), stop, detail::plays_shaped_outside(model_)));
+      add(cutting_run(Path(run), stop, detail::plays_shaped_outside(model_)));
       return at;
     }
     const Segment& segment = move.segment;
