@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +18,19 @@ __all__ = ["BLOCK_ENDS", "CasePlayer", "case_figures"]
 
 BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 """Both rules of block timing."""
+
+
+@dataclass(frozen=True)
+class Played:
+    """A case that was played.
+
+    Attributes:
+        run: its figures.
+        cut_s: how long all blocks take in it, before any filter, where only their end was played; else 0.
+    """
+
+    run: _core.PlaybackFigures
+    cut_s: float
 
 
 @dataclass(frozen=True)
@@ -65,24 +79,33 @@ class CasePlayer:
         whole = [[case] for case in others if case.needs_contour(self.target)]
         return [*whole, [case for case in others if not case.needs_contour(self.target)]]
 
-    def others(self, cases: Sequence[Case]) -> dict[str, _core.PlaybackFigures]:
+    def others(self, cases: Sequence[Case]) -> dict[str, Played]:
         """A group of them by the name of their case."""
         played = {}
         for case in cases:
             whole = case.needs_contour(self.target)
-            played[case.name] = self.model.play_emitted(
+            run = self.model.play_emitted(
                 self.blocks, self.path, override=case.override, shift=case.shift,
                 only=None if case.mode == ALL_MODES else case.mode, offset=self.offset, contour=whole,
                 command_contour=case.override != 1.0,
                 last_seconds=0.0 if whole else self.model.vibration_memory_s, tracker=self.tracker,
             )  # fmt: skip
+            played[case.name] = Played(run, 0.0 if whole or case.override == 1.0 else self._cut_s(case.override))
         return played
+
+    def _cut_s(self, override: float) -> float:
+        """How long all blocks take at a feed override, before any filter."""
+        return _core.play_duration_s(self.blocks, self.model.period_s, self.model.own_rule, override)
+
+    @cached_property
+    def _own_cut_s(self) -> float:
+        return self._cut_s(1.0)
 
     def figures(
         self,
         nominal: Sequence[_core.PlaybackFigures],
         planned: _core.PlaybackFigures | None,
-        others: Mapping[str, _core.PlaybackFigures],
+        others: Mapping[str, Played],
     ) -> tuple[CaseFigures, ...]:
         """One entry per case, of what the tasks gave."""
         by_rule = {rule.name: run for rule, run in zip(BLOCK_ENDS, nominal, strict=True)}
@@ -98,16 +121,14 @@ class CasePlayer:
                 figures.append(case_figures(run))
         return tuple(figures)
 
-    def _other(self, case: Case, run: _core.PlaybackFigures, own: _core.PlaybackFigures) -> CaseFigures:
-        whole = case.needs_contour(self.target)
+    def _other(self, case: Case, played: Played, own: _core.PlaybackFigures) -> CaseFigures:
+        run, whole = played.run, case.needs_contour(self.target)
         if case.override == 1.0:  # the set-points are those of the nominal case, only the table is another
             response = Deviation.of([run.response]) if whole else None
             return CaseFigures(run.residual_mm, Deviation.of([own.command]), response, own.duration_s)
         if whole:
             return case_figures(run)
-        model = self.model
-        cut_s = [_core.play_duration_s(self.blocks, model.period_s, model.own_rule, at) for at in (case.override, 1.0)]
-        return CaseFigures(run.residual_mm, None, None, own.duration_s + cut_s[0] - cut_s[1])
+        return CaseFigures(run.residual_mm, None, None, own.duration_s + played.cut_s - self._own_cut_s)
 
 
 def case_figures(run: _core.PlaybackFigures, *, contour: bool = True) -> CaseFigures:

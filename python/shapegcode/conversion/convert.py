@@ -24,7 +24,7 @@ from shapegcode.conversion.figures import (
 from shapegcode.conversion.judge import Judge, RegionFigures
 from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids
-from shapegcode.conversion.rests import RestsOn, rests_on
+from shapegcode.conversion.rests import Begun, RestsOn, begin_rests, rests_on
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.spending import Spending, keepable
 from shapegcode.conversion.warnings import open_axes, played_warnings, text_warnings
@@ -135,11 +135,13 @@ def _refuse_own_marks(program: Program) -> None:
 
 @dataclass(frozen=True)
 class _Settled:
-    """A text that is read back and played."""
+    """A text that is read back and played, with trackers of its regions' paths, and what is played ahead of need."""
 
     written: Written
     emitted: Program
     figures: list[RegionFigures]
+    trackers: list[_core.ContourTracker]
+    begun: Begun
 
 
 @dataclass
@@ -185,6 +187,7 @@ class _Run:
             pool.submit(self.model.play_original, region.path, offset=self.model.offset(region))
             for region in program.regions
         ]
+        self.original_s = pool.submit(self.model.cycle_time_s, program.core)
         if budget is None:
             self.writer.begin(self.reasons, self.room_um, self.feed_share)
 
@@ -230,10 +233,13 @@ class _Run:
         indices = [index for index, reason in enumerate(self.reasons) if not reason]
         verdicts = self.judge.verdicts(settled.figures, settled.written.placed, self.grid.block_period_s)
         left: list[RegionFigures] = []
-        for index, figures, verdict in zip(indices, settled.figures, verdicts, strict=True):
+        trackers: list[_core.ContourTracker] = []
+        played = zip(settled.figures, settled.trackers, strict=True)
+        for index, (figures, tracker), verdict in zip(indices, played, verdicts, strict=True):
             gained = gain_um(figures)
             if not keepable(self.program.regions[index], self.machine) or (gained >= least and not verdict.misses):
                 left.append(figures)
+                trackers.append(tracker)
             else:
                 why = verdict.misses[0] if verdict.misses else f"shaping gains {gained:.1f} µm"
                 self._keep(index, why, gained)
@@ -241,7 +247,7 @@ class _Run:
             return settled
         # What stays shaped is as before: it is neither shaped nor played again.
         written = self._write(self.grid)
-        return _Settled(written, written.read_back(self.machine), left)
+        return _Settled(written, written.read_back(self.machine), left, trackers, {})
 
     def _keep(self, index: int, reason: str, gained_um: float) -> None:
         region = self.program.regions[index]
@@ -265,16 +271,27 @@ class _Run:
         tried: dict[int, _Attempt] = {}
         for attempt in range(_ATTEMPTS):
             stage = partial(self.on_progress, "shaping" if attempt == 0 else "shaping again, slower")
-            written = self._write(self.grid, stage)
-            emitted = written.read_back(self.machine)
-            originals = [play for play, reason in zip(self.originals, self.reasons, strict=True) if not reason]
-            figures = self.judge.measure(
-                emitted, written.placed, originals, self.pool, partial(self.on_progress, "round trip")
-            )
-            slower = self._slow_down(written, figures)
-            if attempt + 1 == _ATTEMPTS or not (self._tighten(tried, written, figures) or slower):
+            settled = self._played(self._write(self.grid, stage), ahead=attempt == 0)
+            slower = self._slow_down(settled.written, settled.figures)
+            if attempt + 1 == _ATTEMPTS or not (self._tighten(tried, settled.written, settled.figures) or slower):
                 break
-        return _Settled(written, emitted, figures)
+            settled.trackers.clear()  # nobody asks for them any more: they take room beside the next text
+            for run in settled.begun.values():
+                run.cancel()
+        return settled
+
+    def _played(self, written: Written, *, ahead: bool) -> _Settled:
+        """The text read back and played; `ahead`: what its verdict rests on too, where that is known before it."""
+        following = [self.pool.submit(_core.ContourTracker, place.region.path) for place in written.placed]
+        emitted = written.read_back(self.machine)
+        originals = [play for play, reason in zip(self.originals, self.reasons, strict=True) if not reason]
+        trackers = [each.result() for each in following]
+        playing = self.judge.begin(emitted, written.placed, trackers, self.pool)
+        begun: Begun = {}
+        if ahead and cores() > 1 and len(trackers) == 1:
+            begun = begin_rests(self.judge, self.machine, written.placed[0], emitted, trackers[0], self.pool)
+        figures = self.judge.figures(playing, originals, partial(self.on_progress, "round trip"))
+        return _Settled(written, emitted, figures, trackers, begun)
 
     def _slow_down(self, written: Written, figures: list[RegionFigures]) -> bool:
         """Give regions that run faster along the path than the machine allows a lower feed. False if there are none."""
@@ -368,14 +385,15 @@ class _Run:
     def _rests_on(self, settled: _Settled, figures: PlayedFigures) -> tuple[tuple[RestsOn, ...], int]:
         if figures.worst_case is None:
             return (), 0
+        played = zip(settled.written.placed, settled.figures, settled.trackers, strict=True)
         return rests_on(
-            self.model, self.judge, settled.figures, settled.written.placed, settled.emitted, figures.worst_case.lines,
-            self.pool, partial(self.on_progress, "what it rests on"),
+            self.judge, self.machine, list(played), settled.emitted, figures.worst_case.lines, self.pool,
+            settled.begun, partial(self.on_progress, "what it rests on"),
         )  # fmt: skip
 
     def _cycle_time_s(self, settled: _Settled, cutting: Pair[float], rapids: ShapedRapids | None) -> Pair[float]:
         """What `shapegcode time` says of both texts."""
-        original_s = self.model.cycle_time_s(self.program.core)
+        original_s = self.original_s.result()
         if self.machine.emission.header:
             return Pair(original_s, self.model.cycle_time_s(settled.emitted.core))
         # Nothing in such a text says which regions are shaped.

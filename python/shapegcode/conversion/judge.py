@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.case_player import BLOCK_ENDS, CasePlayer
+from shapegcode.conversion.case_player import BLOCK_ENDS, CasePlayer, Played
 from shapegcode.conversion.cases import (
     ALL_MODES,
     Case,
@@ -75,6 +75,25 @@ class RegionFigures:
         return max(run.duration_s for run in self.emitted)
 
 
+@dataclass(frozen=True)
+class Playing:
+    """The playbacks of one emitted region under way.
+
+    Attributes:
+        player: whose tasks they are.
+        nominal: under both rules of block end.
+        planned: with the look-ahead left on.
+        others: the other cases, in groups.
+        slowed: blocks that the look-ahead limits would slow.
+    """
+
+    player: CasePlayer
+    nominal: Sequence[Future[_core.PlaybackFigures]]
+    planned: Future[_core.PlaybackFigures | None]
+    others: Sequence[Future[dict[str, Played]]]
+    slowed: Future[int]
+
+
 class Judge:
     """Plays emitted regions in every case and holds them against the machine's tolerances.
 
@@ -100,7 +119,7 @@ class Judge:
         pool: Executor,
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
-        """Play every emitted region beside its original.
+        """Play every emitted region beside its original: `begin` and `figures`.
 
         Args:
             emitted: the program read back.
@@ -112,12 +131,29 @@ class Judge:
         Returns:
             The figures of each region, in the order of the text.
         """
+        trackers = [_core.ContourTracker(place.region.path) for place in placed]
+        return self.figures(self.begin(emitted, placed, trackers, pool), originals, on_step)
+
+    def begin(
+        self, emitted: Program, placed: Sequence[Placed], trackers: Iterable[_core.ContourTracker], pool: Executor
+    ) -> list[Playing]:
+        """Begin to play every emitted region.
+
+        Args:
+            emitted: the program read back.
+            placed: the regions and their places in it.
+            trackers: of their programmed paths.
+            pool: runs the playbacks.
+
+        Returns:
+            The playbacks of each region.
+        """
         limits = self._model.limits()
         running = []
-        for place in placed:
+        for place, tracker in zip(placed, trackers, strict=True):
             player = CasePlayer(
                 place.blocks(emitted), place.region.path, self._model, self.cases, self.target,
-                self._model.offset(place.region), _core.ContourTracker(place.region.path),
+                self._model.offset(place.region), tracker,
                 least_increment_mm(self._machine, place.region.exit.units),
             )  # fmt: skip
             planned = pool.submit(player.planned)  # takes longest
@@ -127,22 +163,40 @@ class Judge:
                 _core.count_slowed_blocks, player.blocks, limits.corner_speed_difference_mm_per_s,
                 limits.max_feed_mm_per_s,
             )  # fmt: skip
-            running.append((player, runs, planned, rest, slowed))
+            running.append(Playing(player, runs, planned, rest, slowed))
+        return running
+
+    def figures(
+        self,
+        running: Sequence[Playing],
+        originals: Sequence[Future[_core.PlaybackFigures]],
+        on_step: Step = lambda _done, _total: None,
+    ) -> list[RegionFigures]:
+        """What the playbacks show.
+
+        Args:
+            running: the emitted regions' playbacks under way.
+            originals: the originals'.
+            on_step: called with playbacks done and playbacks in all.
+
+        Returns:
+            The figures of each region.
+        """
         results: list[RegionFigures] = []
         # A program may be one long region: what moves is the number of its playbacks.
         done = count(1)
-        total = sum(len(runs) + len(rest) + 3 for _, runs, _, rest, _ in running)
+        total = sum(len(each.nominal) + len(each.others) + 3 for each in running)
 
         def result(future: Future[_T]) -> _T:
             found = future.result()
             on_step(next(done), total)
             return found
 
-        for original, (player, runs, planned, rest, slowed) in zip(originals, running, strict=True):
-            nominal = tuple(result(run) for run in runs)
-            others = {name: run for part in rest for name, run in result(part).items()}
-            figures = player.figures(nominal, result(planned), others)
-            results.append(RegionFigures(result(original), nominal, figures, result(slowed)))
+        for original, each in zip(originals, running, strict=True):
+            nominal = tuple(result(run) for run in each.nominal)
+            others = {name: run for part in each.others for name, run in result(part).items()}
+            cases = each.player.figures(nominal, result(each.planned), others)
+            results.append(RegionFigures(result(original), nominal, cases, result(each.slowed)))
         return results
 
     def contour_um(self, figures: RegionFigures, *, turned: bool = True) -> float:

@@ -6,10 +6,10 @@ uncertainty, or by what is usual where none is stated. That takes no more playba
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from itertools import islice
 
 from shapegcode import _core
 from shapegcode.conversion.case_player import case_figures
@@ -22,7 +22,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.settings.keys import KeyValue
 
-__all__ = ["LEAST_SHARE", "RestsOn", "UnknownAxis", "rests_on", "unknown_axes"]
+__all__ = ["LEAST_SHARE", "RestsOn", "UnknownAxis", "begin_rests", "rests_on", "unknown_axes"]
 
 LEAST_SHARE = 0.01
 """Of a limit: a value that moves its figure by less does not matter."""
@@ -76,36 +76,18 @@ class _Trial:
     only: str | None = None
 
 
+Begun = Mapping[tuple[str, str], "Future[CaseFigures]"]
+"""Playbacks under way, by the value and what it is moved to."""
+
+
 @dataclass(frozen=True)
 class _Region:
-    """A region: how it is played, and what it is judged by."""
+    """A region, how it is played, and what its figures are judged by."""
 
-    figures: RegionFigures
     place: Placed
     emitted: Program
     judge: Judge
-
-    @property
-    def limits(self) -> RegionLimits:
-        """What it is judged by."""
-        return self.judge.limits(self.figures, self.place)
-
-    @property
-    def before(self) -> dict[str, Judged]:
-        """Its judged figures as it is meant to run, under the controller's own rule of block timing."""
-        own = self.figures.emitted[0 if self.judge.own_rule == _core.BlockEnd.ceil else 1]
-        return {each.figure: each for each in judge_region(case_figures(own), self.limits)}
-
-    @property
-    def moving(self) -> str:
-        """Letters of the axes that move in it."""
-        extent_mm = self.place.region.path.extent_mm
-        return "".join(axis for axis, way in zip("xyz", extent_mm, strict=True) if way > 0.0)
-
-    @functools.cached_property
-    def tracker(self) -> _core.ContourTracker:
-        """Of the programmed path, for all runs that measure the contour."""
-        return _core.ContourTracker(self.place.region.path)
+    tracker: _core.ContourTracker
 
     def play(self, trial: _Trial, *, contour: bool) -> CaseFigures:
         """The figures with a value moved; without the contour they come from the end of the region alone."""
@@ -113,54 +95,98 @@ class _Region:
         run = model.play_emitted(
             self.place.blocks(self.emitted), path, shift=trial.shift, only=trial.only,
             offset=model.offset(self.place.region), contour=contour,
-            last_seconds=0.0 if contour else model.vibration_memory_s, tracker=self.tracker if contour else None,
+            command_contour=self.judge.target == "command",
+            last_seconds=0.0 if contour else model.vibration_memory_s, tracker=self.tracker,
         )  # fmt: skip
         return case_figures(run, contour=contour)
 
+    @property
+    def moving(self) -> str:
+        """Letters of the axes that move in it."""
+        extent_mm = self.place.region.path.extent_mm
+        return "".join(axis for axis, way in zip("xyz", extent_mm, strict=True) if way > 0.0)
+
+    def limits(self, figures: RegionFigures) -> RegionLimits:
+        """What it is judged by."""
+        return self.judge.limits(figures, self.place)
+
+    def before(self, figures: RegionFigures) -> dict[str, Judged]:
+        """Its judged figures as it is meant to run, under the controller's own rule of block timing."""
+        own = figures.emitted[0 if self.judge.own_rule == _core.BlockEnd.ceil else 1]
+        return {each.figure: each for each in judge_region(case_figures(own), self.limits(figures))}
+
+
+def begin_rests(
+    judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
+) -> Begun:
+    """Begin to play what `rests_on` will play with the contour, where only one region can decide.
+
+    Args:
+        judge: that judges the text.
+        machine: the trials move its values.
+        place: the region.
+        emitted: the text, read back.
+        tracker: of the programmed path.
+        pool: runs the playbacks.
+
+    Returns:
+        What `rests_on` is given.
+    """
+    region = _Region(place, emitted, judge, tracker)
+    trials = islice(_trials(machine, region.moving), _FULL_RUNS)
+    return {_name(trial): pool.submit(region.play, trial, contour=True) for trial in trials}
+
+
+def _name(trial: _Trial) -> tuple[str, str]:
+    return trial.value.key, trial.moved
+
 
 def rests_on(
-    model: MachineModel,
     judge: Judge,
-    figures: Sequence[RegionFigures],
-    placed: Sequence[Placed],
+    machine: Machine,
+    played: Sequence[tuple[Placed, RegionFigures, _core.ContourTracker]],
     emitted: Program,
     deciding_lines: tuple[int, int],
     pool: Executor,
+    begun: Begun,
     on_step: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> tuple[tuple[RestsOn, ...], int]:
     """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit.
 
     Args:
-        model: of the machine.
         judge: that judged the text.
-        figures: of every shaped region.
-        placed: these regions.
+        machine: for which it was judged.
+        played: every shaped region, its figures, and a tracker of its programmed path.
         emitted: the text, read back.
         deciding_lines: first and last line of the region that comes nearest to a limit.
         pool: runs the playbacks.
+        begun: what is being played already: see `begin_rests`.
         on_step: called with playbacks done and playbacks in all.
 
     Returns:
         At most eight values, none that moves a figure by less than a hundredth of its limit, but for axes that may
         have a mode or not; and how many were tried.
     """
-    regions = [_Region(found, place, emitted, judge) for found, place in zip(figures, placed, strict=True)]
-    deciding = next(region for region in regions if region.place.original_lines == deciding_lines)
-    trials = [(deciding, trial) for trial in _trials(model.machine, deciding.moving)]
-    for axis, trial in _unknown_axes(model.machine).items():
-        if axis not in deciding.moving:
-            region = next((region for region in regions if axis in region.moving), None)
-            trials += [(region, trial)] if region is not None else []
-    left_s = max(_FREE_S, _FULL_RUNS * sum(each.emitted_s for each in figures))
+    regions = [(_Region(place, emitted, judge, tracker), figures) for place, figures, tracker in played]
+    deciding, decided = next(pair for pair in regions if pair[0].place.original_lines == deciding_lines)
+    moving = deciding.moving
+    trials = [(deciding, decided, trial) for trial in _trials(machine, moving)]
+    for axis, trial in _unknown_axes(machine).items():
+        if axis not in moving:
+            pair = next((pair for pair in regions if axis in pair[0].moving), None)
+            trials += [(*pair, trial)] if pair is not None else []
+    left_s = max(_FREE_S, _FULL_RUNS * sum(figures.emitted_s for _, figures in regions))
     running = []
-    for region, trial in trials:
-        left_s -= region.figures.emitted_s
-        running.append(pool.submit(region.play, trial, contour=left_s >= 0.0))
+    for region, figures, trial in trials:
+        left_s -= figures.emitted_s
+        run = begun.get(_name(trial))
+        running.append(pool.submit(region.play, trial, contour=left_s >= 0.0) if run is None else run)
     rows = []
-    for done, ((region, trial), run) in enumerate(zip(trials, running, strict=True), start=1):
-        rows.append(_rests(trial.value, trial.moved, region.before, judge_region(run.result(), region.limits)))
+    for done, ((region, figures, trial), run) in enumerate(zip(trials, running, strict=True), start=1):
+        judged = judge_region(run.result(), region.limits(figures))
+        rows.append(_rests(trial.value, trial.moved, region.before(figures), judged))
         on_step(done, len(trials))
-    rows += _from_cases(model.machine, deciding)
+    rows += _from_cases(machine, deciding, decided)
     return _ranked(rows), len({row.key for row in rows})
 
 
@@ -302,13 +328,13 @@ def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
             yield _Trial(unmeasured[key], f"{period:g} s", each)
 
 
-def _from_cases(machine: Machine, region: _Region) -> Iterator[RestsOn]:
+def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[RestsOn]:
     """What was played anyway and counts for nothing: the other rule of block timing, look-ahead on, an empty buffer."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
-    for case, played in zip(region.judge.cases, region.figures.cases, strict=True):
+    for case, played in zip(region.judge.cases, figures.cases, strict=True):
         key, said = _key_of(case)
         if not case.counts and key in unmeasured:
-            yield _rests(unmeasured[key], said, region.before, judge_region(played, region.limits))
+            yield _rests(unmeasured[key], said, region.before(figures), judge_region(played, region.limits(figures)))
 
 
 def _key_of(case: Case) -> tuple[str, str]:
