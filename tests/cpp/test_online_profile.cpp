@@ -54,8 +54,8 @@ class Alone {
   explicit Alone(const ControllerSettings& settings)
       : control_(settings),
         ring_(std::bit_ceil(settings.queue)),
-        intake_(control_.planning_limits(), {}, control_.planning_tolerance(), jerk_s(settings)),
-        profile_(ring_, control_.planning_limits(), jerk_s(settings), settings.window, settings.period_s) {
+        intake_(control_.planning_limits(), {}, control_.planning_tolerance()),
+        profile_(ring_, control_.planning_limits(), settings.window, settings.period_s) {
     intake_.restart(values_of(Vector3(Vector3::Zero())));
     profile_.restart(0);
   }

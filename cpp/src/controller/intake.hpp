@@ -12,13 +12,12 @@ namespace shapegcode {
 
 class Intake {
  public:
-  Intake(const MotionLimits& limits, const std::vector<FollowingLimits>& following, const FilterTolerance& tolerance,
-         double jerk_s)
+  Intake(const MotionLimits& limits, const std::vector<FollowingLimits>& following, const FilterTolerance& tolerance)
       : limits_(limits),
         following_(following),
         tolerance_(tolerance),  // A segment of following axes alone knows no limit of X, Y and Z.
         steepest_(following.empty() ? steepest_of(limits) : MotionLimits::none),
-        jump_time_s_(jump_time_s(limits, jerk_s)) {}
+        jump_time_s_(jump_time_s(limits, limits.jerk_time_s)) {}
 
   /// The next segment starts at this position, whatever came before.
   void restart(std::span<const double> position) noexcept;

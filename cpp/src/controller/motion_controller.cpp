@@ -60,9 +60,9 @@ class MotionController::Implementation {
         filters_(settings, axis_count + static_cast<int>(n_following_)),
         limits_(planning_limits_of(settings, filters_)),
         jerk_periods_(jerk_periods(settings)),
-        intake_(limits_, following_limits_of(settings, filters_), filters_.tolerance(), jerk_s(settings)),
+        intake_(limits_, following_limits_of(settings, filters_), filters_.tolerance()),
         ring_(std::bit_ceil(std::max(settings.queue, settings.window + 2))),
-        profile_(ring_, limits_, jerk_s(settings), settings.window, settings.period_s),
+        profile_(ring_, limits_, settings.window, settings.period_s),
         smoothing_(Fir::moving_average(jerk_periods_), 1) {
     override_.store(settings.limits.feed_override, std::memory_order_relaxed);
     restart(std::array<double, most_controller_axes>{});

@@ -31,7 +31,7 @@ bool OnlineProfile::refuses() const noexcept {
   if (state_ != State::running || fits(plan_.draft())) return false;
   if (plan_.newest() > first) return true;  // which of them it is, one by one shows
   const bool fitted = !slow_down_ && !stop_ && fits(plan_.version());
-  return (fitted && jerk_s_ > 0.0) || !slows_down_before(first);
+  return (fitted && plan_.jerk_s() > 0.0) || !slows_down_before(first);
 }
 
 // Whether the slow stretch before a corner of the new segments, which the jerk time wants, has begun already, and the
@@ -40,8 +40,9 @@ bool OnlineProfile::comes_too_late() const noexcept {
   const double highest = recent_.highest();
   for (std::uint64_t i = plan_.first_new(); i <= plan_.newest(); ++i) {
     const QueuedSegment& entry = (*ring_)[i];
-    if (entry.corner <= 0.0 || entry.distance - 0.5 * highest * jerk_s_ >= distance_) return false;
-    if (entry.distance - 0.5 * entry.corner * jerk_s_ < distance_ && highest > entry.corner * (1.0 + rounding)) {
+    if (entry.corner <= 0.0 || entry.distance - slow_reach(highest, plan_.jerk_s()) >= distance_) return false;
+    if (entry.distance - slow_reach(entry.corner, plan_.jerk_s()) < distance_ &&
+        highest > entry.corner * (1.0 + rounding)) {
       return true;
     }
   }
@@ -60,7 +61,7 @@ bool OnlineProfile::slows_down_before(std::uint64_t index) const noexcept {
   const double corner = (*ring_)[index].corner;
   const std::uint64_t end = std::min(index, running_ + OnlinePlan::portion);
   double squared = speed_now_ * speed_now_;
-  double left = (*ring_)[index].distance - 0.5 * corner * jerk_s_ - distance_;
+  double left = (*ring_)[index].distance - slow_reach(corner, plan_.jerk_s()) - distance_;
   double skipped = distance_ - (*ring_)[running_].distance;
   for (std::uint64_t i = running_; i < end && left > 0.0 && squared > corner * corner; ++i) {
     const SegmentPlan& plan = plan_.segment(i, plan_.draft());

@@ -26,7 +26,7 @@ ZoneSet OnlinePlan::zones_between(std::uint64_t from, std::uint64_t into) const 
   const QueuedSegment& junction = (*ring_)[std::max(from, into)];
   return junction_zones({limit_of(source), source.segment.feed_mm_per_s * draft_ratio_, limit_of((*ring_)[into]),
                          junction.corner, junction.jump},
-                        limits_, jerk_s_);
+                        limits_, jerk_s());
 }
 
 void OnlinePlan::split(const QueuedSegment& entry, SegmentPlan& plan) const noexcept {
@@ -75,7 +75,7 @@ void OnlinePlan::visit_zones() noexcept {
       extend(carry_, own);
     }
   }
-  cut_to(carry_, entry.fastest, jump_time_s(limits_, jerk_s_));
+  cut_to(carry_, entry.fastest, jump_time_s(limits_, jerk_s()));
   Versions<SegmentPlan>& plan = places_[i & mask_].plan;
   if (i < first_) {
     const SegmentPlan& before = plan.at(version_);
@@ -100,7 +100,7 @@ ZoneSet OnlinePlan::zones_at_start(std::uint64_t index) const noexcept {
   if (before.segment.stop_at_end) return {};
   ZoneSet zones = beyond(segment(index - 1, draft()).at_start, before.segment.length_mm);
   extend(zones, zones_between(index - 1, index));
-  cut_to(zones, entry.fastest, jump_time_s(limits_, jerk_s_));
+  cut_to(zones, entry.fastest, jump_time_s(limits_, jerk_s()));
   return zones;
 }
 
@@ -110,7 +110,7 @@ ZoneSet OnlinePlan::zones_behind(std::uint64_t index) const noexcept {
   if (before.segment.stop_at_end) return {};
   ZoneSet zones = beyond(before.behind, before.segment.length_mm);
   extend(zones,
-         junction_zones({before.hard_limit, MotionLimits::none, entry.fastest, entry.corner, {}}, limits_, jerk_s_));
+         junction_zones({before.hard_limit, MotionLimits::none, entry.fastest, entry.corner, {}}, limits_, jerk_s()));
   return zones;
 }
 

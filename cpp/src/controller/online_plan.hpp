@@ -63,7 +63,7 @@ class OnlinePlan {
   static constexpr int first_visit = 8;
   static constexpr int beyond_portion = first_visit;
 
-  OnlinePlan(SegmentRing& ring, const MotionLimits& limits, double jerk_s, std::size_t window);
+  OnlinePlan(SegmentRing& ring, const MotionLimits& limits, std::size_t window);
 
   /// At rest before segment `next`. Nothing is known of any.
   void restart(std::uint64_t next) noexcept;
@@ -91,6 +91,8 @@ class OnlinePlan {
   [[nodiscard]] std::uint64_t first_new() const noexcept { return first_; }
   [[nodiscard]] std::uint64_t newest() const noexcept { return newest_; }
   [[nodiscard]] std::uint64_t first_changed() const noexcept { return changed_; }
+  /// How long the smoothing by the jerk time lasts; 0 = none.
+  [[nodiscard]] double jerk_s() const noexcept { return limits_.jerk_time_s; }
   /// Of this portion.
   [[nodiscard]] int done() const noexcept { return portion - left_; }
 
@@ -135,7 +137,6 @@ class OnlinePlan {
 
   SegmentRing* ring_;
   MotionLimits limits_;
-  double jerk_s_;
   std::uint64_t window_;  // an eighth more than was asked for: what a draft is being made of is not yet in sight
   std::uint64_t mask_;
   std::vector<Entry> places_;

@@ -6,10 +6,9 @@
 
 namespace shapegcode {
 
-OnlinePlan::OnlinePlan(SegmentRing& ring, const MotionLimits& limits, double jerk_s, std::size_t window)
+OnlinePlan::OnlinePlan(SegmentRing& ring, const MotionLimits& limits, std::size_t window)
     : ring_(&ring),
       limits_(limits),
-      jerk_s_(jerk_s),
       window_(window + window / 8),
       mask_(std::bit_ceil(window_) - 1),
       places_(mask_ + 1) {}

@@ -199,9 +199,8 @@ void OnlineProfile::advance(bool settled) noexcept {
       return;
     }
   }
-  const double t = time_s - phase_.start_s;
-  distance_ = phase_.distance_mm + t * (phase_.speed_mm_per_s + 0.5 * phase_.acceleration_mm_per_s2 * t);
-  speed_now_ = std::max(0.0, phase_.speed_mm_per_s + phase_.acceleration_mm_per_s2 * t);
+  distance_ = phase_.distance_at(time_s);
+  speed_now_ = std::max(0.0, phase_.speed_mm_per_s + phase_.acceleration_mm_per_s2 * (time_s - phase_.start_s));
 }
 
 }  // namespace shapegcode

@@ -35,12 +35,11 @@ class RecentSpeed {
 
 class OnlineProfile {
  public:
-  OnlineProfile(SegmentRing& ring, const MotionLimits& limits, double jerk_s, std::size_t window, double period_s)
+  OnlineProfile(SegmentRing& ring, const MotionLimits& limits, std::size_t window, double period_s)
       : ring_(&ring),
-        plan_(ring, limits, jerk_s, window),
-        jerk_s_(jerk_s),
+        plan_(ring, limits, window),
         period_s_(period_s),
-        recent_(std::ceil(jerk_s / period_s)) {}
+        recent_(std::ceil(limits.jerk_time_s / period_s)) {}
 
   /// At rest before segment `next`, the first one of a motion to come. Nothing is known of any.
   void restart(std::uint64_t next) noexcept;
@@ -106,7 +105,6 @@ class OnlineProfile {
 
   SegmentRing* ring_;
   OnlinePlan plan_;
-  double jerk_s_;
   double period_s_;
   double asked_ = 1.0;  // ratio of the feeds
 

@@ -28,6 +28,7 @@ struct QueuedSegment {
   // Of the thread that steps.
   double distance = 0.0;  ///< of its start, since the motion began
   ZoneSet behind{};       ///< at its start, of slow corners and segments before it, whatever the override
+  // Of the planning thread again; last, as nothing but a set-point asks for them.
   std::array<double, most_following_axes> following_start{}, following_end{};
   std::array<double, most_following_axes> following_rate{};  ///< per mm of the way
 };

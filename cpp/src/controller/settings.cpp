@@ -90,15 +90,11 @@ void check_settings(const ControllerSettings& settings) {
   require(settings.queue <= most_segments, "queue", static_cast<double>(settings.queue), "segments", "0 ... 16777216");
 }
 
-double jerk_s(const ControllerSettings& settings) {
-  const int periods = jerk_periods(settings);
-  return periods > 1 ? periods * settings.period_s : 0.0;
-}
-
 MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
   const double share = own_share(filters) / filters.gain();
   MotionLimits limits = settings.limits;
-  limits.jerk_time_s = jerk_s(settings);
+  const int periods = jerk_periods(settings);
+  limits.jerk_time_s = periods > 1 ? periods * settings.period_s : 0.0;
   limits.max_feed_mm_per_s = (limits.max_feed_mm_per_s / filters.gain()).cwiseMin(changing_speed(settings, filters));
   limits.max_acceleration_mm_per_s2 *= share;
   limits.max_jerk_mm_per_s3 *= share;

@@ -62,11 +62,14 @@ inline Zone zone_of_jump(Jump jump, double speed, double steepest, double time_s
   return {static_cast<double>(jump), time_s * (speed + 0.5 * steepest * time_s)};
 }
 
+/// How far before and behind a slow place the smoothing by the jerk time wants its speed.
+inline double slow_reach(double speed, double jerk_s) noexcept { return 0.5 * speed * jerk_s; }
+
 inline ZoneSet junction_zones(const JunctionSpeeds& at, const MotionLimits& limits, double jerk_s) noexcept {
   ZoneSet zones;
   const double least = std::min(at.corner, at.from);
   if (jerk_s > 0.0 && least < at.into) {
-    zones[at.corner < at.from ? corner_zone : slow_zone] = {least, 0.5 * least * jerk_s};
+    zones[at.corner < at.from ? corner_zone : slow_zone] = {least, slow_reach(least, jerk_s)};
   }
   if (limits.feed_spread_s > 0.0 && at.from_feed * (1.0 + limits.feed_excess_ratio) < at.into) {
     zones[feed_zone] = {at.from_feed, at.from_feed * (limits.feed_spread_s + 0.5 * jerk_s)};
