@@ -56,6 +56,8 @@ void register_simulation(py::module_& module) {
       .def_readwrite("settling_limit_s", &PlaybackOptions::settling_limit_s,
                      "How long behind the stop it is looked for; with drives the residual too, s.")
       .def_readwrite("measure_contour", &PlaybackOptions::measure_contour, "Deviations and orbit errors.")
+      .def_readwrite("measure_response", &PlaybackOptions::measure_response,
+                     "False: the command alone; no figures of the response.")
       .def_readwrite("measure_command", &PlaybackOptions::measure_command,
                      "False: the deviation of the response alone, no orbit errors.")
       .def_readwrite("feed_window_s", &PlaybackOptions::feed_window_s,

@@ -2,11 +2,16 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
+#include <span>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "arrays.hpp"
 #include "register.hpp"
 #include "shapegcode/command.hpp"
+#include "shapegcode/error.hpp"
 #include "shapegcode/write.hpp"
 
 namespace py = pybind11;
@@ -132,6 +137,24 @@ void register_emission(py::module_& module) {
       },
       py::arg("blocks").none(false), py::arg("start"), py::arg("marks"), py::arg("options"),
       "(text as bytes, motion code, plane) of fitted blocks; `start` in increments.");
+
+  module.def(
+      "busiest_per_s",
+      [](const VectorArray& durations_s, const std::optional<VectorArray>& amounts, double stretch_s) {
+        const std::span<const double> durations(durations_s.data(), static_cast<std::size_t>(durations_s.size()));
+        std::span<const double> given;
+        if (amounts) given = {amounts->data(), static_cast<std::size_t>(amounts->size())};
+        if (amounts && given.size() != durations.size()) {
+          throw Error(ErrorKind::argument,
+                      fmt::format("{} durations and {} amounts: must be as many", durations.size(), given.size()));
+        }
+        const py::gil_scoped_release release;
+        return busiest_per_s(durations, given, stretch_s);
+      },
+      py::arg("durations_s"), py::arg("amounts"), py::arg("stretch_s"),
+      "Largest amount per second in any stretch of a duration; each block's amount is spread evenly over it.\n\n"
+      "`durations_s`: of the blocks, s, (n,); `amounts`: what each of them needs, such as its characters, (n,); None: "
+      "one of each; `stretch_s`: the stretch, s; all blocks together if they last less.");
 }
 
 }  // namespace shapegcode::bindings

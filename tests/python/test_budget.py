@@ -20,7 +20,7 @@ import shapegcode as sg
 from acceptance import Judged, convert, machine_with, read_sample
 from command import run as run_command
 from judge.player import durations
-from shapegcode.checking.runs import busiest_per_s
+from shapegcode import _core
 
 HEAD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\n"
 TAIL = "G0Z50.\nM30\n%\n"
@@ -327,7 +327,7 @@ def test_busiest_stretch_is_that_of_every_stretch_tried(blocks: list[tuple[int, 
     flow = np.repeat([amount / duration for duration, amount in blocks], ticks)
     window = min(stretch, len(flow))
     tried = max(math.fsum(flow[k : k + window]) for k in range(len(flow) - window + 1)) / window
-    assert busiest_per_s(ticks, [amount for _, amount in blocks], stretch) == pytest.approx(tried, abs=1e-12)
+    assert _core.busiest_per_s(ticks, [amount for _, amount in blocks], stretch) == pytest.approx(tried, abs=1e-12)
 
 
 # ---- none, bad ones, and the command -----------------------------------------------------------------------

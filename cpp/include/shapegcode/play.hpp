@@ -29,6 +29,7 @@ struct PlaybackOptions {
   std::shared_ptr<const ContourTracker> tracker;
   bool measure_contour = true;          ///< deviation of command and response and orbit errors
   bool measure_command = true;          ///< false: the response alone; no figures of the command, no orbit errors
+  bool measure_response = true;         ///< false: the command alone; no figures of the response
   bool measure_response_orbit = false;  ///< orbit errors of the response too, where the contour is measured
   /// Largest speed against the programmed feed, over this time and four and sixteen times it; 0: not measured. Needs
   /// the deviation of the command.

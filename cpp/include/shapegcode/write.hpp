@@ -109,6 +109,12 @@ struct WrittenBlocks {
                                          std::array<std::int64_t, axis_count> start, std::span<const BlockMark> marks,
                                          const WriterOptions& options);
 
+/// Largest amount per second in any stretch of a duration; each block's amount is spread evenly over it. `amounts`: of
+/// each block, such as its characters; empty: one of each. Durations >= 0; all blocks together are the stretch if they
+/// last less. 0 where nothing lasts.
+[[nodiscard]] double busiest_per_s(std::span<const double> durations_s, std::span<const double> amounts,
+                                   double stretch_s) noexcept;
+
 /// How new feeds are written into the blocks of a region.
 struct FeedWriterOptions {
   double increment_mm = 0.001;    ///< least increment of positions

@@ -85,10 +85,11 @@ ContourTracker::Piece ContourTracker::piece_of(std::size_t i) const noexcept {
     const Vector3& start = path.start_mm(i);
     const Vector3 along = path.start_mm(i + 1) - start;
     const double length = along.norm();
-    if (length > 0.0) return {start, along / length, length, path.distance_mm(i)};
+    if (length > 0.0) return {start, along / length, length, path.distance_mm(i), path.distance_mm(i + 1), -1};
   }
   const Segment segment = path[i];
-  Piece piece{segment.start_mm, tangent_at(segment, 0.0), segment.length_mm, path.distance_mm(i)};
+  Piece piece{segment.start_mm,    tangent_at(segment, 0.0), segment.length_mm,
+              path.distance_mm(i), path.distance_mm(i + 1),  geometry_->arc_of[i]};
   // Pieces without length take the direction of the end before them; at the start the one that follows.
   for (std::size_t k = i; !(piece.length > 0.0) && piece.direction.isZero(0.0) && k-- > 0;) {
     const Segment before = path[k];
@@ -105,18 +106,13 @@ ContourTracker::ContourTracker(const Path& path) : geometry_(geometry_of(path)) 
 Vector3 ContourTracker::start_tangent(std::size_t piece) const noexcept { return at(piece).direction; }
 
 Vector3 ContourTracker::end_tangent(std::size_t piece) const noexcept {
-  const std::int32_t arc = geometry_->arc_of[piece];
-  return arc < 0 ? at(piece).direction : geometry_->arcs[static_cast<std::size_t>(arc)].end_tangent;
+  const Piece& of = at(piece);
+  return of.arc < 0 ? of.direction : geometry_->arcs[static_cast<std::size_t>(of.arc)].end_tangent;
 }
 
-Vector3 ContourTracker::direction_at(std::size_t piece, const Foot& foot) const noexcept {
-  return geometry_->arc_of[piece] < 0 ? at(piece).direction : foot.tangent;
-}
-
-inline ContourTracker::Foot ContourTracker::foot_on(std::size_t piece, const Vector3& p,
+inline ContourTracker::Foot ContourTracker::foot_on(const Piece& line, const Vector3& p,
                                                     const Window& window) const noexcept {
-  if (geometry_->arc_of[piece] >= 0) return foot_on_arc(piece, p, window);
-  const Piece& line = at(piece);
+  if (line.arc >= 0) return foot_on_arc(line, p, window);
   Foot foot;
   const Vector3 from_start = p - line.start;
   const double along = std::clamp(from_start.dot(line.direction), 0.0, line.length);
@@ -163,10 +159,9 @@ double ContourTracker::refined_foot(const Arc& arc, const Vector3& p, const Pola
 }
 
 // Angles `u` count from the arc's start in the sense of its turning, without wrapping.
-ContourTracker::Foot ContourTracker::foot_on_arc(std::size_t piece, const Vector3& p,
+ContourTracker::Foot ContourTracker::foot_on_arc(const Piece& base, const Vector3& p,
                                                  const Window& window) const noexcept {
-  const Piece& base = at(piece);
-  const Arc& arc = geometry_->arcs[static_cast<std::size_t>(geometry_->arc_of[piece])];
+  const Arc& arc = geometry_->arcs[static_cast<std::size_t>(base.arc)];
   const double rad_per_mm = arc.turn / base.length;
   const double first = std::clamp((window.begin - base.s) * rad_per_mm, 0.0, arc.turn);
   const double last = std::clamp((window.end - base.s) * rad_per_mm, first, arc.turn);
@@ -242,46 +237,55 @@ std::size_t ContourTracker::group_before(std::size_t end, const Vector3& p, doub
 
 ContourTracker::Found ContourTracker::search(const Vector3& p, double move, const Window& window,
                                              double bound) const noexcept {
-  Found best{foot_on(cursor_, p, window), cursor_, 0.0};
-  const Vector3 heading = direction_at(cursor_, best.foot);
-  const double advance = begin_mm(cursor_) + best.foot.along - s_;
+  // What follows looks other pieces up, which may take this one's slot: what is needed of it is read before.
+  const Piece& here = at(cursor_);
+  Found best{foot_on(here, p, window), cursor_, 0.0};
+  best.s = here.s + best.foot.along;
+  const double advance = best.s - s_;
   bool retreats = advance < 0.0;
   Window forward = window;
   // A filtered command turns back before it reaches the tip: the return leg lies as far behind the tip.
-  const double to_tip = at(cursor_).length - best.foot.along;
+  const double to_tip = here.length - best.foot.along;
   if (advance < 0.5 * move && to_tip < longest_turn_mm) {
-    const double tip = begin_mm(cursor_) + at(cursor_).length;
-    forward.end = std::max(forward.end, std::min(tip + to_tip + window_margin_mm, bound));
+    forward.end = std::max(forward.end, std::min(here.s + here.length + to_tip + window_margin_mm, bound));
   }
-  for (std::size_t i = cursor_ + 1; i < pieces() && begin_mm(i) <= forward.end; ++i) {
-    const double limit = retreats ? best.foot.distance2 * (1.0 + retreat_tie_relative) + retreat_tie_absolute_mm2
-                                  : best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
-    if (const std::size_t passed = group_from(i, p, limit); passed > 0) {
-      i += passed - 1;
-      continue;
-    }
-    const Foot foot = foot_on(i, p, forward);
-    if (foot.distance2 >= limit) continue;
-    // A return leg runs back: another turn of a circle does not. Far ahead it is one only as far behind the tip as the
-    // point was before it, and nearer: a vibration along the path is no reason to jump.
-    const bool nearer = foot.distance2 < best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
-    const bool back = direction_at(i, foot).dot(heading) < 0.0;
-    const bool within = begin_mm(i) + foot.along <= window.end;
-    if (within ? nearer || back : nearer && back && i == cursor_ + 1 && 2.0 * foot.along > to_tip) {
-      best = {foot, i, 0.0};
-      retreats = false;
+  double next_s = here.next_s;
+  if (next_s <= forward.end) {
+    const Vector3 heading = here.arc < 0 ? here.direction : best.foot.tangent;
+    for (std::size_t i = cursor_ + 1; i < pieces() && next_s <= forward.end; ++i) {
+      const double limit = retreats ? best.foot.distance2 * (1.0 + retreat_tie_relative) + retreat_tie_absolute_mm2
+                                    : best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
+      if (const std::size_t passed = i % group_size == 0 ? group_from(i, p, limit) : 0; passed > 0) {
+        i += passed - 1;
+        next_s = begin_mm(i + 1);
+        continue;
+      }
+      const Piece& piece = at(i);
+      next_s = piece.next_s;
+      const Foot foot = foot_on(piece, p, forward);
+      if (foot.distance2 >= limit) continue;
+      // A return leg runs back: another turn of a circle does not. Far ahead it is one only as far behind the tip as
+      // the point was before it, and nearer: a vibration along the path is no reason to jump.
+      const bool nearer = foot.distance2 < best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
+      const bool back = (piece.arc < 0 ? piece.direction : foot.tangent).dot(heading) < 0.0;
+      const bool within = piece.s + foot.along <= window.end;
+      if (within ? nearer || back : nearer && back && i == cursor_ + 1 && 2.0 * foot.along > to_tip) {
+        best = {foot, i, piece.s + foot.along};
+        retreats = false;
+      }
     }
   }
-  for (std::size_t i = cursor_; i-- > 0 && begin_mm(i) + at(i).length >= window.begin;) {
+  for (std::size_t i = cursor_; i-- > 0;) {
+    const Piece& piece = at(i);
+    if (piece.s + piece.length < window.begin) break;
     const double limit = best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
-    if (const std::size_t passed = group_before(i + 1, p, limit); passed > 0) {
+    if (const std::size_t passed = (i + 1) % group_size == 0 ? group_before(i + 1, p, limit) : 0; passed > 0) {
       i -= passed - 1;
       continue;
     }
-    const Foot foot = foot_on(i, p, window);
-    if (foot.distance2 < limit) best = {foot, i, 0.0};
+    const Foot foot = foot_on(piece, p, window);
+    if (foot.distance2 < limit) best = {foot, i, piece.s + foot.along};
   }
-  best.s = begin_mm(best.piece) + best.foot.along;
   return best;
 }
 
@@ -289,7 +293,7 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
 double ContourTracker::lateral_side(const Found& found, double distance) const noexcept {
   const Piece& piece = at(found.piece);  // its neighbours have other slots
   const double from_start = found.foot.along;
-  Vector3 travel = geometry_->arc_of[found.piece] < 0 ? piece.direction : found.foot.tangent;
+  Vector3 travel = piece.arc < 0 ? piece.direction : found.foot.tangent;
   // At a corner one leg alone may see the point on the wrong side: the mean direction decides.
   if (from_start <= 0.0 && found.piece > 0) {
     travel = start_tangent(found.piece) + end_tangent(found.piece - 1);

@@ -46,7 +46,8 @@ class Recorder {
         plant_(options),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
         tracks_command_(tracks_contour_ && options.measure_command && !command_on_path),
-        tracks_response_orbit_(tracks_contour_ && options.measure_response_orbit),
+        tracks_response_(tracks_contour_ && options.measure_response),
+        tracks_response_orbit_(tracks_response_ && options.measure_response_orbit),
         command_tracker_(tracks_contour_ ? tracker_of(path, options) : ContourTracker(a_point())),
         response_tracker_(command_tracker_),
         orbit_(tracks_contour_ ? path : a_point()),
@@ -93,10 +94,10 @@ class Recorder {
       }
       orbit_.step(command, command_tracker_.segment());
       command_reach_.step(command, command_tracker_.s_mm());
-    } else if (tracks_contour_) {
+    } else if (tracks_response_) {
       command_tracker_.step(command);  // says how far the response can be
     }
-    if (tracks_contour_) {
+    if (tracks_response_) {
       figures_.response.add(follow(response));
     }
     record(command, response);
@@ -122,8 +123,10 @@ class Recorder {
       if (options_.measure_command) {
         figures_.orbit_error_percent = orbit_.percent();
       }
-      figures_.command.count = figures_.response.count;
+      count_command();
       figures_.command.include_missed(command_reach_.largest_mm());
+    }
+    if (tracks_response_) {
       follow_lag();
       figures_.response.include_missed(response_reach_.largest_mm());
       if (tracks_response_orbit_) {
@@ -143,8 +146,10 @@ class Recorder {
   // The wait is over and what it excited has decayed: the rest of the run is that without a wait.
   StarvedFigures finish_wait() {
     if (tracks_contour_) {
-      figures_.command.count = figures_.response.count;
+      count_command();
       figures_.command.include_missed(command_reach_.largest_passed_mm());
+    }
+    if (tracks_response_) {
       figures_.response.include_missed(response_reach_.largest_passed_mm());
     }
     return {0, wait_residual_, figures_.command, figures_.response};
@@ -157,6 +162,13 @@ class Recorder {
   }
 
  private:
+  // A command that is not followed lies on the path.
+  void count_command() {
+    if (!tracks_command_) {
+      figures_.command.count = figures_.response.count;
+    }
+  }
+
   // Deviation of the response from the path, with all that hangs on where its foot is.
   double follow(const Vector3& response) {
     const double deviation = response_tracker_.step(response, command_tracker_.reach_of(response));
@@ -215,6 +227,7 @@ class Recorder {
   detail::AxisPlant at_rest_plant_ = plant_;
   bool tracks_contour_;
   bool tracks_command_;
+  bool tracks_response_;
   bool tracks_response_orbit_;
   ContourTracker command_tracker_;
   ContourTracker response_tracker_;

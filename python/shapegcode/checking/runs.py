@@ -20,7 +20,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
 from shapegcode.program import Program
 
-__all__ = ["BlockTable", "Breaker", "ClampedFeed", "CuttingRun", "block_table", "busiest_per_s", "look_ahead_breakers"]
+__all__ = ["BlockTable", "Breaker", "ClampedFeed", "CuttingRun", "block_table", "look_ahead_breakers"]
 
 _CUTTING, _RAPID, _DWELL = (
     kind.value for kind in (_core.BlockKind.cutting, _core.BlockKind.rapid, _core.BlockKind.dwell)
@@ -34,7 +34,6 @@ _NO_LIMIT = 1e12
 _ROUNDING = 1e-6
 _TICK_SLACK = 1e-5
 _FIRST_PLACES = 20
-_PIECE = 1 << 15  # blocks that are looked at in one go: what bounds the memory
 
 # What a stop between two cutting moves does, worst first.
 _STOPS = "the control stops reading ahead, and the tool stands in the cut"
@@ -188,45 +187,6 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     return BlockTable(tuple(runs), lines, lines_of[_RAPID], lines_of[_DWELL], firsts, clamped)
 
 
-def busiest_per_s(durations_s: npt.ArrayLike, amounts: npt.ArrayLike, stretch_s: float) -> float:
-    """Largest amount per second in any stretch of a duration; each block's amount is spread evenly over it.
-
-    Args:
-        durations_s: of the blocks, s, (n,).
-        amounts: what each of them needs: its characters, or 1, (n,).
-        stretch_s: the stretch, s; all blocks together if they last less.
-
-    Returns:
-        Amount per second.
-    """
-    times, sums = _running(durations_s), _running(amounts)
-    if times[-1] <= 0.0:
-        return 0.0
-    stretch = min(stretch_s, float(times[-1]))
-    largest = 0.0
-    # Piece by piece: a program may have a million blocks.
-    for first in range(0, len(times), _PIECE):
-        edges = times[first : first + _PIECE]
-        # The sum over a stretch is piecewise linear in its place: it is largest where a block begins or ends at its
-        # edge.
-        begins = np.clip(np.concatenate([edges, edges - stretch]), 0.0, times[-1] - stretch)
-        # Only the blocks around them count.
-        low = max(0, int(np.searchsorted(times, begins.min(), side="right")) - 1)
-        high = int(np.searchsorted(times, begins.max() + stretch, side="right")) + 1
-        near, passed = times[low:high], sums[low:high]
-        amount = np.interp(begins + stretch, near, passed) - np.interp(begins, near, passed)
-        largest = max(largest, float(amount.max()))
-    return largest / stretch
-
-
-def _running(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """The sums up to each value, from 0 on."""
-    given = np.asarray(values, dtype=np.float64)
-    sums = np.zeros(len(given) + 1)
-    np.cumsum(given, out=sums[1:])
-    return sums
-
-
 def _needed_per_s(
     duration_s: npt.NDArray[np.float64],
     offsets: npt.NDArray[np.int64],
@@ -236,7 +196,7 @@ def _needed_per_s(
 ) -> float:
     """Characters per second; those between two blocks count with the block that follows."""
     amounts = np.diff(offsets[lines], prepend=offsets[first - 1])
-    return busiest_per_s(duration_s, amounts, stretch_s)
+    return _core.busiest_per_s(duration_s, amounts, stretch_s)
 
 
 def _shaper_s(program: Program, machine: Machine) -> float:

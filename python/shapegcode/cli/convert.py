@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli.arguments import add_alias
@@ -127,7 +131,8 @@ def run(args: argparse.Namespace) -> int:
     runner.check_files(args, also_written=[failed])
     _give_memory_back()
     with runner.progress(f"converting {args.input}", args) as bar:
-        program = read_for_conversion(args.input, machine, program_number=args.program)
+        with _loading("shapegcode.conversion.convert"):
+            program = read_for_conversion(args.input, machine, program_number=args.program)
         result = (_scheduled if args.feed_schedule else _converted)(args, program, machine, bar)
     target = output if result.ok else failed
     notes = ["original: the program with these feeds, not yet shaped"] if args.feed_schedule else []
@@ -152,6 +157,17 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         "block_period_s": args.block_period,
         "budget": None if limits == (None, None, None) else Budget(*limits),
     }
+
+
+@contextmanager
+def _loading(module: str) -> Iterator[None]:
+    """Load a module beside what is done within: the core reads a long program without Python."""
+    thread = Thread(target=import_module, args=(module,))
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join()
 
 
 def _give_memory_back() -> None:

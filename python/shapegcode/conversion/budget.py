@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.checking.runs import busiest_per_s
 from shapegcode.conversion.write import EmittedRegion
 from shapegcode.results.result import Xyz
 from shapegcode.shaping.grid import Grid
@@ -167,11 +166,11 @@ def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_p
     np.concatenate(shaped.block_periods, out=durations, casting="same_kind")
     durations *= grid.block_period_s
     stretch = max(grid.duration_s, grid.block_period_s)
-    characters = busiest_per_s(durations, _block_bytes(shaped), stretch)
+    characters = _core.busiest_per_s(durations, _block_bytes(shaped), stretch)
     return TransferLoad(
         shaped.text.size - (region.text_end - region.text_begin),
         characters * bits_per_character,
-        busiest_per_s(durations, np.broadcast_to(1.0, shaped.blocks), stretch),
+        _core.busiest_per_s(durations, None, stretch),
     )
 
 

@@ -131,19 +131,21 @@ class CasePlayer:
         return CaseFigures(run.residual_mm, None, None, own.duration_s + played.cut_s - self._own_cut_s)
 
 
-def case_figures(run: _core.PlaybackFigures, *, contour: bool = True) -> CaseFigures:
+def case_figures(run: _core.PlaybackFigures, *, contour: bool = True, response: bool = True) -> CaseFigures:
     """What a playback showed.
 
     Args:
         run: the playback.
         contour: the deviations were measured.
+        response: that of the response among them.
 
     Returns:
         Its figures.
     """
     if not contour:
         return CaseFigures(run.residual_mm, None, None, run.duration_s)
-    return CaseFigures(run.residual_mm, Deviation.of([run.command]), Deviation.of([run.response]), run.duration_s)
+    followed = Deviation.of([run.response]) if response else None
+    return CaseFigures(run.residual_mm, Deviation.of([run.command]), followed, run.duration_s)
 
 
 def _starved(run: _core.PlaybackFigures, waited_s: float) -> CaseFigures:

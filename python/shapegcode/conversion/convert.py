@@ -337,18 +337,22 @@ class _Run:
     def _result(self, settled: _Settled, rapids: ShapedRapids | None) -> Conversion:
         program, machine, written = self.program, self.machine, settled.written
         core = program.core
+        # For a core that waits while the last playbacks run.
+        mark = self.pool.submit(lambda: settled.emitted.mark)
+        emitted_s = self.pool.submit(self.model.cycle_time_s, settled.emitted.core)
         figures = self.judge.summarise(settled.figures, written.placed, self.grid.block_period_s)
         cutting = figures.region_time_s()
         warnings = self._warnings(written, figures)
         if rapids is not None:
             warnings += rapids.warnings
         rests, tried = self._rests_on(settled, figures)
+        mark.result()
         emitted = settled.emitted.with_verdict(good=figures.within_tolerance)
         return Conversion(
             **vars(figures),
             program=program.source,
             machine=machine.name,
-            cycle_time_s=self._cycle_time_s(settled, cutting, rapids),
+            cycle_time_s=self._cycle_time_s(settled, emitted_s.result(), cutting, rapids),
             cutting_time_s=cutting,
             block_period_s=self.grid.block_period_s,
             shaper=_used_shaper(self.grid),
@@ -391,11 +395,13 @@ class _Run:
             settled.begun, partial(self.on_progress, "what it rests on"),
         )  # fmt: skip
 
-    def _cycle_time_s(self, settled: _Settled, cutting: Pair[float], rapids: ShapedRapids | None) -> Pair[float]:
+    def _cycle_time_s(
+        self, settled: _Settled, emitted_s: float, cutting: Pair[float], rapids: ShapedRapids | None
+    ) -> Pair[float]:
         """What `shapegcode time` says of both texts."""
         original_s = self.original_s.result()
         if self.machine.emission.header:
-            return Pair(original_s, self.model.cycle_time_s(settled.emitted.core))
+            return Pair(original_s, emitted_s)
         # Nothing in such a text says which regions are shaped.
         added_s = self.machine.emission.prefill_dwell_s * len(settled.written.placed)
         added_s += rapids.extra_s if rapids else 0.0

@@ -67,13 +67,17 @@ class RestsOn:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A value, what it is moved to in words, and how the region is then played."""
+    """A value, what it is moved to in words, and how the region is then played.
+
+    `moves_command`: the set-points are others too, not the table alone.
+    """
 
     value: KeyValue
     moved: str
     machine: Machine
     shift: float = 0.0
     only: str | None = None
+    moves_command: bool = False
 
 
 Begun = Mapping[tuple[str, str], "Future[CaseFigures]"]
@@ -92,13 +96,18 @@ class _Region:
     def play(self, trial: _Trial, *, contour: bool) -> CaseFigures:
         """The figures with a value moved; without the contour they come from the end of the region alone."""
         model, path = MachineModel(trial.machine), self.place.region.path
+        contour = contour and self.needs_contour(trial)
         run = model.play_emitted(
             self.place.blocks(self.emitted), path, shift=trial.shift, only=trial.only,
             offset=model.offset(self.place.region), contour=contour,
-            command_contour=self.judge.target == "command",
+            command_contour=self.judge.target == "command", response_contour=self.judge.target == "response",
             last_seconds=0.0 if contour else model.vibration_memory_s, tracker=self.tracker,
         )  # fmt: skip
-        return case_figures(run, contour=contour)
+        return case_figures(run, contour=contour, response=self.judge.target == "response")
+
+    def needs_contour(self, trial: _Trial) -> bool:
+        """Whether the judged deviation is another one with the value moved."""
+        return trial.moves_command or self.judge.target == "response"
 
     @property
     def moving(self) -> str:
@@ -133,7 +142,7 @@ def begin_rests(
         What `rests_on` is given.
     """
     region = _Region(place, emitted, judge, tracker)
-    trials = islice(_trials(machine, region.moving), _FULL_RUNS)
+    trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
     return {_name(trial): pool.submit(region.play, trial, contour=True) for trial in trials}
 
 
@@ -234,7 +243,7 @@ def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
         now = machine.controller.shaped_time_constant_s
         other = 1.2 * now if now else _FILTER_S
         for each in _changed(machine, key, other):
-            yield _Trial(unmeasured[key], f"{other:g} s", each)
+            yield _Trial(unmeasured[key], f"{other:g} s", each, moves_command=True)
 
 
 @dataclass(frozen=True)
@@ -325,7 +334,7 @@ def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
         free = machine.with_values("emission.block_period_s", None)
         period = 2.0 * machine.controller.interpolation_period_s
         for each in _changed(free, key, period):
-            yield _Trial(unmeasured[key], f"{period:g} s", each)
+            yield _Trial(unmeasured[key], f"{period:g} s", each, moves_command=True)
 
 
 def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[RestsOn]:

@@ -305,6 +305,7 @@ class MachineModel:
         override: float = 1.0,
         contour: bool = True,
         command_contour: bool = True,
+        response_contour: bool = True,
         last_seconds: float = 0.0,
         shift: float = 0.0,
         only: str | None = None,
@@ -324,6 +325,7 @@ class MachineModel:
             override: feed override, 1 = 100 %.
             contour: measure the deviations too.
             command_contour: that of the command among them.
+            response_contour: that of the response.
             last_seconds: play no more than the end; 0: all.
             shift: see `options`.
             only: likewise.
@@ -343,6 +345,7 @@ class MachineModel:
         if tracker is not None:
             options.tracker = tracker
         options.measure_command = command_contour
+        options.measure_response = response_contour
         if increment_mm is not None:
             options.feed_window_s = max(self.machine.controller.block_time_s, self.period_s)
             options.feed_slack_mm = 2.0 * increment_mm

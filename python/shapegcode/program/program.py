@@ -12,7 +12,7 @@ from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.reading import program_bytes, program_loader, reader_options
 from shapegcode.program.several import place_of, programs_of
-from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, stamp_of
+from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -205,8 +205,13 @@ class Program:
         """
         if self.unexpanded is not None:
             return replace(self, unexpanded=judged(self.unexpanded, good=good))
-        judge(self.core, good=good)
+        judge(self.core, self.mark, good=good)
         return replace(self)  # nothing of it was worked out from the text as it was
+
+    @cached_property
+    def mark(self) -> str:
+        """The mark of the plain program's text, which its header holds if the converter wrote it."""
+        return mark_of(self.core)
 
     @property
     def own_text(self) -> bytes:
@@ -231,7 +236,7 @@ class Program:
     @cached_property
     def stamp(self) -> Stamp | None:
         """What its header says, if the converter wrote it; else None."""
-        return stamp_of(self.own_text)
+        return stamp_of(self.own_text) if STAMP_BEGIN in self.text else None
 
     @property
     def shaped_regions(self) -> int:

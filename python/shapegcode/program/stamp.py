@@ -244,14 +244,27 @@ def judged(text: bytes, *, good: bool) -> bytes:
     return bytes(changed)
 
 
-def judge(program: _core.ProgramText, *, good: bool) -> None:
+def mark_of(program: _core.ProgramText) -> str:
+    """The mark of a program that was read; see `text_mark`.
+
+    Args:
+        program: any.
+
+    Returns:
+        Eight hexadecimal digits.
+    """
+    return _mark_of(_lines_of(program))
+
+
+def judge(program: _core.ProgramText, mark: str, *, good: bool) -> None:
     """The same in the text of a program that was read; it holds what it held in the same places.
 
     Args:
         program: whose header has an open verdict, or one that was good before.
+        mark: of its text.
         good: the verdict.
     """
-    for begin, after in _changes(program.find, _mark_of(_lines_of(program)), good=good):
+    for begin, after in _changes(program.find, mark, good=good):
         program.overwrite(begin, after)
 
 

@@ -82,7 +82,9 @@ class ContourTracker {
     Vector3 start;
     Vector3 direction;  // unit; of the neighbour if the piece has no length
     double length;
-    double s;  // of the start, from the path's start
+    double s;          // of the start, from the path's start
+    double next_s;     // of the next piece's start
+    std::int32_t arc;  // -1 for a line
   };
   /// The piece last asked for of those that share its place.
   struct Slot {
@@ -118,8 +120,8 @@ class ContourTracker {
     double s;  // of the foot, from the path's start
   };
 
-  [[nodiscard]] Foot foot_on(std::size_t piece, const Vector3& p, const Window& window) const noexcept;
-  [[nodiscard]] Foot foot_on_arc(std::size_t piece, const Vector3& p, const Window& window) const noexcept;
+  [[nodiscard]] Foot foot_on(const Piece& piece, const Vector3& p, const Window& window) const noexcept;
+  [[nodiscard]] Foot foot_on_arc(const Piece& piece, const Vector3& p, const Window& window) const noexcept;
   /// Newton on the derivative of half the squared distance from `u` on, kept within `turns`.
   [[nodiscard]] static double refined_foot(const Arc& arc, const Vector3& p, const Polar& polar, const Turns& turns,
                                            double u) noexcept;
@@ -132,8 +134,6 @@ class ContourTracker {
   /// `bound`: no foot lies further from the path's start.
   [[nodiscard]] Found search(const Vector3& p, double move, const Window& window, double bound) const noexcept;
   [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
-  /// Direction of travel at a foot, of any length.
-  [[nodiscard]] Vector3 direction_at(std::size_t piece, const Foot& foot) const noexcept;
   [[nodiscard]] Vector3 start_tangent(std::size_t piece) const noexcept;
   [[nodiscard]] Vector3 end_tangent(std::size_t piece) const noexcept;
 
