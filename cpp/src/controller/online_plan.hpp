@@ -59,7 +59,7 @@ class OnlinePlan {
 
   /// What one period may do: a visit of a segment by a pass counts 1 to 5, in proportion to its time; the first one
   /// more, as another processor has just written the segment. The last visit may go beyond by `beyond_portion`.
-  static constexpr int portion = 64;
+  static constexpr int portion = 40;
   static constexpr int first_visit = 8;
   static constexpr int beyond_portion = first_visit;
 

@@ -8,7 +8,6 @@
 namespace realtime {
 namespace {
 
-constexpr std::uint32_t step_target_ns = 2000;
 constexpr std::uint32_t push_target_ns = 20'000;
 constexpr double drift_target_mm = 1e-9;
 
@@ -91,6 +90,13 @@ void Report::free_run(const FreeRun& run, std::size_t window, double others_core
               1e-3 * run.step.worst() - jitter_us, 1e-3 * step_target_ns,
               100.0 * static_cast<double>(run.step.below(step_target_ns)) / static_cast<double>(run.step.count()));
   print_verdict("99.99 % of step()", 1e-3 * run.step.at(0.9999), 1e-3 * step_target_ns);
+  const auto steps = static_cast<double>(run.step.count());
+  const std::size_t above = run.step.count() - run.step.below(step_target_ns);
+  const double own = above > run.interruptions ? static_cast<double>(above - run.interruptions) : 0.0;
+  std::printf(
+      "  above it: %zu steps; the clock alone, in as much measured time: %zu; without these below it: %.5f %%, "
+      "asked 99.99 %%: %s\n",
+      above, run.interruptions, 100.0 * (1.0 - own / steps), own <= 1e-4 * steps ? "met" : "MISSED");
   std::string activities;
   for (std::size_t i = 0; i < run.activities.size(); ++i) {
     const char* name = text_of(static_cast<shapegcode::Activity>(i));
@@ -106,8 +112,8 @@ void Report::free_run(const FreeRun& run, std::size_t window, double others_core
       "{\"thread\": " + quoted(run.thread) + ", \"step\": " + json_of(run.step) + ", \"usual\": " + json_of(run.usual) +
           ", \"with_change\": " + json_of(run.with_change) + ", \"clock\": " + json_of(run.clock) +
           ", \"push\": " + json_of(run.push) +
-          format(", \"below_2_us\": %.7f, \"segments\": %llu, \"others_cores\": %.3f}",
-                 static_cast<double>(run.step.below(step_target_ns)) / static_cast<double>(run.step.count()),
+          format(", \"below_2_us\": %.7f, \"interruptions\": %zu, \"segments\": %llu, \"others_cores\": %.3f}",
+                 static_cast<double>(run.step.below(step_target_ns)) / steps, run.interruptions,
                  static_cast<unsigned long long>(run.segments), others_cores));
   std::fflush(stdout);
 }

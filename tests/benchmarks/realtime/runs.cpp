@@ -107,20 +107,25 @@ void free_steps(FreeRun& run, MotionController& control, const Feeder& feeder, s
   const interposer::Calls before = interposer::calls();
   for (std::size_t done = 0; done < steps; done += burst) {
     while (feeder.pushed() - control.state().segments_done < enough_waiting) sleep_for(nap_ns);
+    std::int64_t left = 0;  // of the time that the clock is read for
     for (std::size_t i = 0; i < burst; ++i) {
       const bool changes = panel.act(control, activity);
       const std::int64_t begin = now_ns();
       activity = control.step(set_point);
       consume(set_point);
       const std::int64_t spent = now_ns() - begin;
+      left += spent;
       run.step.add(spent);
       (changes ? run.with_change : run.usual).add(spent);
       ++run.activities[static_cast<std::size_t>(activity)];
     }
-    for (std::size_t i = 0; i < burst; ++i) {
+    for (std::size_t i = 0; i < burst || left > 0; ++i) {
       const std::int64_t begin = now_ns();
       consume(set_point);
-      run.clock.add(now_ns() - begin);
+      const std::int64_t spent = now_ns() - begin;
+      left -= spent;
+      run.interruptions += spent >= step_target_ns ? 1U : 0U;
+      if (i < burst) run.clock.add(spent);
     }
   }
   run.stepping = interposer::calls() - before;

@@ -12,6 +12,8 @@
 
 namespace realtime {
 
+constexpr std::uint32_t step_target_ns = 2000;
+
 /// One thread steps without a pause between the steps, in bursts; another one, of ordinary priority, pushes.
 struct FreeRun {
   FreeRun(std::size_t steps, std::size_t pushes)
@@ -22,7 +24,10 @@ struct FreeRun {
   Durations usual;        ///< those without a new override, hold or resume
   Durations with_change;  ///< those with one
   Durations clock;        ///< the same loop, the clock alone, in bursts between those of the steps
-  Durations push;         ///< segments that were taken
+  /// How often the clock alone took `step_target_ns` or more, in as much measured time as the steps took: what
+  /// interrupted it then interrupts a step as often.
+  std::size_t interruptions = 0;
+  Durations push;  ///< segments that were taken
   std::array<std::size_t, 6> activities{};
   interposer::Calls stepping, pushing;
   std::uint64_t segments = 0, starvations = 0;
