@@ -439,7 +439,7 @@ Seen follow(const Path& path, double feed_mm_per_s, double amplitude_mm) {
     Vector3 p = command;
     p[0] += amplitude_mm * std::sin(251.3 * time_s);
     p[1] += amplitude_mm * (std::cos(284.0 * time_s) - 1.0);
-    const double tracked = std::abs(tracker.step(p, driven.reach_of(p)));
+    const double tracked = std::abs(tracker.step(p, driven));
     double nearest = std::numeric_limits<double>::infinity();
     std::size_t near = cursor;
     const double first = std::max(0.0, s - reach);

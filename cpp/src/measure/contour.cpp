@@ -30,6 +30,11 @@ constexpr double widest_local_window_rad = 1.0;
 constexpr std::size_t group_size = 16;  // a power of two
 constexpr double group_slack = 1e-6;
 constexpr double group_slack_mm = 1e-6;
+// Directions of a straight stretch lie within 5.7 degrees of one, hence 11.5 of each other: then no other piece of it
+// is nearer than a foot that lies further from both ends of its piece than .104 of the deviation.
+constexpr double straight_cosine2 = 0.99;
+constexpr double nearest_share = 0.125;
+constexpr double nearest_margin_mm = 1e-5;
 
 }  // namespace
 
@@ -80,16 +85,25 @@ ContourTracker::Arc ContourTracker::arc_of(const Segment& segment) noexcept {
 }
 
 ContourTracker::Piece ContourTracker::piece_of(std::size_t i) const noexcept {
+  Piece piece = bare_piece_of(i);
+  const Vector3& direction = piece.direction;
+  piece.across2 = direction[0] * direction[0] + direction[1] * direction[1];
+  piece.has_side = piece.across2 > negligible_share * negligible_share * direction.squaredNorm();
+  return piece;
+}
+
+ContourTracker::Piece ContourTracker::bare_piece_of(std::size_t i) const noexcept {
   const Path& path = geometry_->path;
   if (path.is_plain(i)) {
     const Vector3& start = path.start_mm(i);
     const Vector3 along = path.start_mm(i + 1) - start;
     const double length = along.norm();
-    if (length > 0.0) return {start, along / length, length, path.distance_mm(i), path.distance_mm(i + 1), -1};
+    if (length > 0.0) return {start, along / length, length, path.distance_mm(i), path.distance_mm(i + 1), -1, false, 0.0};
   }
   const Segment segment = path[i];
   Piece piece{segment.start_mm,    tangent_at(segment, 0.0), segment.length_mm,
-              path.distance_mm(i), path.distance_mm(i + 1),  geometry_->arc_of[i]};
+              path.distance_mm(i), path.distance_mm(i + 1),  geometry_->arc_of[i],
+             false,               0.0};
   // Pieces without length take the direction of the end before them; at the start the one that follows.
   for (std::size_t k = i; !(piece.length > 0.0) && piece.direction.isZero(0.0) && k-- > 0;) {
     const Segment before = path[k];
@@ -289,6 +303,53 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
   return best;
 }
 
+bool ContourTracker::runs_along(std::size_t piece) const noexcept {
+  const Path& path = geometry_->path;
+  if (!path.is_plain(piece)) return false;
+  const Vector3 along = path.start_mm(piece + 1) - path.start_mm(piece);
+  const double forward = along.dot(straight_.direction);
+  return forward > 0.0 && forward * forward >= straight_cosine2 * along.squaredNorm();
+}
+
+void ContourTracker::straighten() noexcept {
+  const Piece& here = at(cursor_);
+  const bool is_line = here.arc < 0 && here.length > 0.0;
+  straight_ = {cursor_, here.direction, cursor_, cursor_, here.s, here.next_s, !is_line, !is_line};
+}
+
+// A stretch grows with the window as far as it runs straight; where it ends, one is begun about each new piece.
+bool ContourTracker::runs_straight(const Window& window) noexcept {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  for (;;) {
+    Straight& now = straight_;
+    while (!now.turns_behind && (now.end <= window.end || now.last <= cursor_)) {
+      if (now.last + 1 >= pieces()) {
+        now.end = infinite;
+        break;
+      }
+      if (!runs_along(now.last + 1)) {
+        now.turns_behind = true;
+      } else {
+        now.end = begin_mm(++now.last + 1);
+      }
+    }
+    while (!now.turns_before && now.begin + group_slack_mm >= window.begin) {
+      if (now.first == 0) {
+        now.begin = -infinite;
+      } else if (!runs_along(now.first - 1)) {
+        now.turns_before = true;
+      } else {
+        now.begin = begin_mm(--now.first);
+      }
+    }
+    const bool reaches = now.end > window.end && now.begin + group_slack_mm < window.begin && cursor_ >= now.first &&
+                         (cursor_ < now.last || now.end == infinite);
+    if (reaches) near_ = {now.begin + group_slack_mm, now.end};
+    if (reaches || now.about == cursor_) return reaches;
+    straighten();
+  }
+}
+
 // 1 left, -1 right; 0 where the deviation or the travel is along Z only.
 double ContourTracker::lateral_side(const Found& found, double distance) const noexcept {
   const Piece& piece = at(found.piece);  // its neighbours have other slots
@@ -317,16 +378,74 @@ PathSide ContourTracker::side() const noexcept {
   return lateral_ > 0.0 ? PathSide::left : PathSide::right;
 }
 
-double ContourTracker::step(const Vector3& p, double up_to_mm) noexcept {
+double ContourTracker::step(const Vector3& p) noexcept {
+  return follow(p, [] { return std::numeric_limits<double>::infinity(); });
+}
+
+double ContourTracker::step(const Vector3& p, const ContourTracker& driver) noexcept {
+  return follow(p, [&] { return driver.s_ + 2.0 * (p - driver.last_).norm() + reach_mm; });
+}
+
+// Most points lie beside the middle of a piece, or of the next one, of a path that runs straight about them, and then no
+// other piece needs a look: all points within so straight a stretch that lie `t` of path away from the foot, of which
+// `rest` on the foot's own piece, are further off, since t^2 cos^2 - 2 |offset| (t - rest) sin > 0.
+template <typename Bound>
+inline double ContourTracker::follow(const Vector3& p, const Bound& bound) noexcept {
   // The sum of the components' sizes bounds the step's length without a square root.
   const double move = (p - last_).lpNorm<1>();
   if (!std::isfinite(move)) return std::numeric_limits<double>::quiet_NaN();
   const double retreat = furthest_ - s_;
   const double behind = move + deviation_ + window_margin_mm;
   const double ahead = 2.0 * move + 4.0 * (deviation_ + retreat) + window_margin_mm + retreat;
+  const Window window{s_ - behind, s_ + ahead};
   // What was passed before stays in reach, whatever the caller knows.
-  const double bound = std::max(up_to_mm, s_);
-  Found found = search(p, move, {s_ - behind, std::min(s_ + ahead, bound)}, bound);
+  const auto furthest = [&] { return std::max(bound(), s_); };
+  const bool is_near = window.begin > near_.begin && window.end < near_.end;
+  if (!is_near && !runs_straight(window)) return follow_any(p, move, window, furthest());
+
+  std::size_t i = cursor_;
+  const Piece* piece = &at(i);
+  Vector3 from_start = p - piece->start;
+  double along = from_start.dot(piece->direction);
+  if (along > piece->length && i + 1 < pieces()) {
+    piece = &at(++i);
+    from_start = p - piece->start;
+    along = from_start.dot(piece->direction);
+    if (!(piece->s + along <= std::min(window.end, furthest()))) return follow_any(p, move, window, furthest());
+  }
+  const Vector3 offset = from_start - along * piece->direction;
+  const double distance = std::sqrt(offset.squaredNorm());
+  const double margin = nearest_share * distance + nearest_margin_mm;
+  const double rest = piece->length - along;
+  const bool nearest = along >= 0.0 && rest >= 0.0 && (along >= margin || i == 0) &&
+                       (rest >= margin || i + 1 == pieces());
+  const bool grows = distance > deviation_ + 0.25 * move && move > 0.0;
+  if (!nearest || (grows && growing_ + 1 >= growing_until_lost)) return follow_any(p, move, window, furthest());
+
+  growing_ = grows ? growing_ + 1 : 0;
+  if (i != cursor_) {
+    cursor_ = i;
+    if (i >= straight_.last) near_.end = -straight_.end;  // to be looked at anew but at the path's end
+  }
+  s_ = piece->s + along;
+  furthest_ = std::clamp(furthest_, s_, s_ + longest_retreat_mm);
+  deviation_ = distance;
+  last_ = p;
+  height_ = offset[2];
+  const double lateral = piece->direction[0] * offset[1] - piece->direction[1] * offset[0];
+  const double negligible = negligible_share * distance;
+  const bool has_side = piece->has_side && lateral * lateral > negligible * negligible * piece->across2;
+  if (!has_side) {
+    lateral_ = 0.0;
+    return height_ < 0.0 ? -distance : distance;
+  }
+  lateral_ = lateral < 0.0 ? -1.0 : 1.0;
+  return lateral_ * distance;
+}
+
+double ContourTracker::follow_any(const Vector3& p, double move, const Window& within, double bound) noexcept {
+  const Window window{within.begin, std::min(within.end, bound)};
+  Found found = search(p, move, window, bound);
   double distance = std::sqrt(found.foot.distance2);
   bool jumped = false;
 
@@ -334,6 +453,8 @@ double ContourTracker::step(const Vector3& p, double up_to_mm) noexcept {
   if (growing_ >= growing_until_lost && (growing_ & (growing_ - 1)) == 0) {
     // Widened at 8, 16, 32 … samples only: the cost stays proportional to the samples.
     const double factor = static_cast<double>(growing_) * static_cast<double>(growing_) / 16.0;
+    const double behind = s_ - within.begin;
+    const double ahead = within.end - s_;
     const Found wide = search(p, move, {s_ - factor * behind, std::min(s_ + factor * ahead, bound)}, bound);
     // An overshoot beside another pass is not a lost track: only a much nearer foot is worth the jump.
     if (wide.foot.distance2 < 0.25 * found.foot.distance2) {
@@ -344,6 +465,7 @@ double ContourTracker::step(const Vector3& p, double up_to_mm) noexcept {
     }
   }
 
+  if (cursor_ != found.piece) near_.begin = std::numeric_limits<double>::infinity();
   cursor_ = found.piece;
   s_ = found.s;
   furthest_ = jumped ? s_ : std::clamp(furthest_, s_, s_ + longest_retreat_mm);

@@ -59,7 +59,7 @@ Eigen::MatrixXd PathFollower::step(const Eigen::Ref<const Eigen::MatrixXd>& comm
     const Vector3 command = command_mm.row(row);
     const Vector3 response = response_mm.row(row);
     command_.step(command);
-    response_.step(response, command_.reach_of(response));
+    response_.step(response, command_);
     left.row(row) = response - path_.point(response_.s_mm(), cursor_);
   }
   return left;

@@ -109,8 +109,8 @@ void SideFigures::add(PathSide side, double distance_mm) noexcept {
   }
 }
 
-double SectionMetrology::Follower::step(const Vector3& p, bool moves, double up_to_mm) noexcept {
-  const double deviation = tracker.step(p, up_to_mm);
+double SectionMetrology::Follower::step(const Vector3& p, bool moves, const ContourTracker* driver) noexcept {
+  const double deviation = driver == nullptr ? tracker.step(p) : tracker.step(p, *driver);
   reach.step(p, tracker.s_mm());
   orbit.step(p, tracker.segment());
   add_deviation(whole, deviation, moves);
@@ -172,7 +172,7 @@ void SectionMetrology::step(const Vector3& command, const Vector3& response) noe
   has_moved_ = has_moved_ || moves;
   const Vector3 peak = vibration_.step(command, response);
 
-  const double command_deviation = command_.step(command, moves, std::numeric_limits<double>::infinity());
+  const double command_deviation = command_.step(command, moves, nullptr);
   if (Running* running = running_at(command_.tracker.segment()); running != nullptr) {
     add_deviation(running->command, command_deviation, moves);
     running->command_sides.add(command_.tracker.side(), std::abs(command_deviation));
@@ -181,7 +181,7 @@ void SectionMetrology::step(const Vector3& command, const Vector3& response) noe
       running->peak = running->peak.cwiseMax(peak);
     }
   }
-  const double response_deviation = response_.step(response, moves, command_.tracker.reach_of(response));
+  const double response_deviation = response_.step(response, moves, &command_.tracker);
   if (Running* running = running_at(response_.tracker.segment()); running != nullptr) {
     add_deviation(running->response, response_deviation, moves);
     running->response_sides.add(response_.tracker.side(), std::abs(response_deviation));

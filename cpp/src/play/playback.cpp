@@ -171,7 +171,7 @@ class Recorder {
 
   // Deviation of the response from the path, with all that hangs on where its foot is.
   double follow(const Vector3& response) {
-    const double deviation = response_tracker_.step(response, command_tracker_.reach_of(response));
+    const double deviation = response_tracker_.step(response, command_tracker_);
     response_reach_.step(response, response_tracker_.s_mm());
     if (tracks_response_orbit_) {
       response_orbit_.step(response, response_tracker_.segment());

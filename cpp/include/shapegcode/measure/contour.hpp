@@ -59,12 +59,12 @@ class ContourTracker {
  public:
   /// The point is expected at the path's start. Throws Error(argument) on a path without segments.
   explicit ContourTracker(const Path& path);
-  /// Signed deviation in mm of the next sample; NaN, and no change of state, if `p` is not finite. `up_to_mm`: how far
-  /// from the path's start its foot may lie at most, for one who knows where the point is driven from: a point that
-  /// vibrates moves backward and forward faster than it travels, and would slip to a later pass; see `reach_of`.
-  double step(const Vector3& p, double up_to_mm = std::numeric_limits<double>::infinity()) noexcept;
-  /// The furthest foot of a point that is driven by another one, whose foot is the last of this tracker.
-  [[nodiscard]] double reach_of(const Vector3& p) const noexcept { return s_ + 2.0 * (p - last_).norm() + reach_mm; }
+  /// Signed deviation in mm of the next sample; NaN, and no change of state, if `p` is not finite.
+  double step(const Vector3& p) noexcept;
+  /// The same of a point that is driven by the last one of another tracker of the path, and whose foot cannot lie much
+  /// further than that one's: a point that vibrates moves backward and forward faster than it travels, and would slip
+  /// to a later pass.
+  double step(const Vector3& p, const ContourTracker& driver) noexcept;
   /// Segment index of the last foot point.
   [[nodiscard]] std::size_t segment() const noexcept { return cursor_; }
   /// Side on which the last sample lies.
@@ -85,6 +85,8 @@ class ContourTracker {
     double s;          // of the start, from the path's start
     double next_s;     // of the next piece's start
     std::int32_t arc;  // -1 for a line
+    bool has_side;     // the direction is not along Z
+    double across2;    // of the direction: the square of what is not along Z
   };
   /// The piece last asked for of those that share its place.
   struct Slot {
@@ -119,6 +121,14 @@ class ContourTracker {
     std::size_t piece;
     double s;  // of the foot, from the path's start
   };
+  /// Lines in a row that all run nearly as the piece in their midst does.
+  struct Straight {
+    std::size_t about = no_piece;
+    Vector3 direction = Vector3::Zero();  // of that piece
+    std::size_t first = 0, last = 0;      // pieces
+    double begin = 0.0, end = 0.0;        // mm from the path's start; infinite where the path ends
+    bool turns_before = false, turns_behind = false;  // what lies beside them does not run so
+  };
 
   [[nodiscard]] Foot foot_on(const Piece& piece, const Vector3& p, const Window& window) const noexcept;
   [[nodiscard]] Foot foot_on_arc(const Piece& piece, const Vector3& p, const Window& window) const noexcept;
@@ -131,6 +141,14 @@ class ContourTracker {
   /// How many pieces from `first` on, or before `end`, need not be looked at one by one; 0: none.
   [[nodiscard]] std::size_t group_from(std::size_t first, const Vector3& p, double limit2) const noexcept;
   [[nodiscard]] std::size_t group_before(std::size_t end, const Vector3& p, double limit2) const noexcept;
+  /// `bound`: says how far the foot may lie from the path's start; asked where it matters.
+  template <typename Bound>
+  double follow(const Vector3& p, const Bound& bound) noexcept;
+  double follow_any(const Vector3& p, double move, const Window& window, double bound) noexcept;
+  /// Whether all of the path within the window, and the next piece, runs nearly as the present one.
+  [[nodiscard]] bool runs_straight(const Window& window) noexcept;
+  void straighten() noexcept;
+  [[nodiscard]] bool runs_along(std::size_t piece) const noexcept;
   /// `bound`: no foot lies further from the path's start.
   [[nodiscard]] Found search(const Vector3& p, double move, const Window& window, double bound) const noexcept;
   [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
@@ -154,6 +172,7 @@ class ContourTracker {
     return slot.of;
   }
   [[nodiscard]] Piece piece_of(std::size_t i) const noexcept;
+  [[nodiscard]] Piece bare_piece_of(std::size_t i) const noexcept;
 
   std::shared_ptr<const Geometry> geometry_;
   mutable std::array<Slot, slots> slots_{};  // pieces around the point, worked out once
@@ -165,6 +184,8 @@ class ContourTracker {
   double lateral_ = 0.0;       // of the last sample: 1 left, -1 right, 0 neither
   double height_ = 0.0;        // of the last sample above its foot
   std::uint32_t growing_ = 0;  // samples since the deviation began to grow
+  Straight straight_;
+  Window near_{std::numeric_limits<double>::infinity(), 0.0};  // for which it runs straight about the present piece
 };
 
 /// Orbit error of every arc of a path: area between the moving point's track and the programmed arc, divided by the

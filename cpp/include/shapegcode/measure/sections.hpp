@@ -309,7 +309,8 @@ class SectionMetrology {
     Vector3 last = Vector3::Zero();
     double last_foot = 0.0;
     /// Deviation of the next point from the path; `moves`: the command does; `up_to_mm`: see ContourTracker.
-    double step(const Vector3& p, bool moves, double up_to_mm) noexcept;
+    /// `driver`: of the point that drives this one; null: none does.
+    double step(const Vector3& p, bool moves, const ContourTracker* driver) noexcept;
   };
 
   void pass_stations(const Follower& follower, const Vector3& p,
