@@ -44,7 +44,14 @@ class BlockPlayer {
   void pause_after(std::size_t block, double seconds);
   /// Next set-point, X, Y and Z, the start first; false once the end was given.
   bool step(std::span<double> out) noexcept { return step_into(out, *this); }
-  bool step(Vector3& position) noexcept;
+  bool step(Vector3& position) noexcept {
+    const double elapsed_s = elapsed_s_ + period_s_;
+    if (!(elapsed_s < on_line_until_s_)) return step_on(position);
+    elapsed_s_ = elapsed_s;
+    const double along_mm = speed_mm_per_s_ * elapsed_s;
+    position = along_mm >= open_.length_mm ? open_.end_mm : open_.start_mm + along_mm / open_.length_mm * way_mm_;
+    return true;
+  }
   /// Block on which the set-point last given lies.
   [[nodiscard]] std::size_t block() const noexcept { return block_; }
   /// Whether the set-point last given is one of a pause.
@@ -54,6 +61,7 @@ class BlockPlayer {
 
  private:
   void open_block() noexcept;
+  bool step_on(Vector3& position) noexcept;
   /// Sums of durations where many blocks may end within a period.
   void find_crowds();
   /// Passes over a group of blocks that ends within the time elapsed; false if none begins here that does.
@@ -65,6 +73,10 @@ class BlockPlayer {
   double ratio_;
   BlockEnd block_end_;
   std::size_t block_ = 0;
+  // A line on which a set-point lies is passed without a look at the block's kind.
+  Vector3 way_mm_ = Vector3::Zero();
+  double speed_mm_per_s_ = 0.0;
+  double on_line_until_s_ = 0.0;
   double elapsed_s_ = 0.0;   // since the open block began
   double duration_s_ = 0.0;  // of the open block and a pause behind it
   std::size_t paused_block_ = 0;

@@ -82,8 +82,8 @@ void OrbitError::add_move(Arc& arc, std::size_t index, const Vector3& to, std::s
   if (to_segment == index) arc.u = u1;
 }
 
-void OrbitError::step(const Vector3& p, std::size_t segment) noexcept {
-  if (arcs_.empty() || segment >= arc_of_.size() || !p.allFinite()) return;
+void OrbitError::step_arcs(const Vector3& p, std::size_t segment) noexcept {
+  if (segment >= arc_of_.size() || !p.allFinite()) return;
   if (!has_last_) {
     // The move from rest at the first sample has no length: it only finds the sample's angle.
     has_last_ = true;

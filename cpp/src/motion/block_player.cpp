@@ -118,6 +118,9 @@ void BlockPlayer::open_block() noexcept {
   if (block_ == paused_block_) {
     duration_s_ += pause_s_;
   }
+  way_mm_ = open_.end_mm - open_.start_mm;
+  speed_mm_per_s_ = open_.feed_mm_per_s * ratio_;
+  on_line_until_s_ = 0.0;
 }
 
 void BlockPlayer::pause_after(std::size_t block, double seconds) {
@@ -139,7 +142,7 @@ bool BlockPlayer::pausing() const noexcept {
          elapsed_s_ >= duration_s_ - pause_s_ - slack;
 }
 
-bool BlockPlayer::step(Vector3& position) noexcept {
+bool BlockPlayer::step_on(Vector3& position) noexcept {
   if (blocks_.empty() || finished_) {
     position = blocks_.empty() ? Vector3(Vector3::Zero()) : blocks_.back().end_mm;
     return false;
@@ -156,6 +159,7 @@ bool BlockPlayer::step(Vector3& position) noexcept {
     }
     if (block_ + 1 == blocks_.size()) {
       finished_ = true;
+      on_line_until_s_ = 0.0;
       position = blocks_.back().end_mm;
       return true;
     }
@@ -164,7 +168,8 @@ bool BlockPlayer::step(Vector3& position) noexcept {
     }
     open_block();
   }
-  position = point_at(open_, std::min(open_.length_mm, open_.feed_mm_per_s * ratio_ * elapsed_s_));
+  if (open_.kind != SegmentKind::arc && open_.length_mm > 0.0) on_line_until_s_ = duration_s_ - slack;
+  position = point_at(open_, std::min(open_.length_mm, speed_mm_per_s_ * elapsed_s_));
   return true;
 }
 

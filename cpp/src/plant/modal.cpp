@@ -235,6 +235,18 @@ void ModalPlant::forget_nothing() noexcept {
   }
 }
 
+// The same as of several modes, to the last bit.
+inline void ModalPlant::step_only_mode(std::size_t axis, double jump) noexcept {
+  const auto a = static_cast<Eigen::Index>(axis);
+  State& state = states_[first_[axis]];
+  state.velocity -= jump;
+  const double share2 = state.participation * state.participation;
+  const bool may_grow = share2 * state.amplitude2() > surely_below * peak_[a] * peak_[a];
+  if (may_grow && state.reachable() > peak_[a]) look_between(axis);
+  state.propagate();
+  deflection_[a] = 0.0 + state.participation * state.deflection;
+}
+
 Vector3 ModalPlant::step(const Vector3& command) noexcept {
   if (!place_.empty()) move_to(0.5 * (command_ + command));
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
@@ -246,6 +258,10 @@ Vector3 ModalPlant::step(const Vector3& command) noexcept {
     const std::size_t first = first_[axis];
     const std::size_t last = first_[axis + 1];
     if (first == last) continue;
+    if (last - first == 1) {
+      step_only_mode(axis, jump);
+      continue;
+    }
 
     // The command's velocity jumps at the set-point; the table does not, so the deflection's velocity jumps back.
     double squares = 0.0;

@@ -8,6 +8,7 @@ namespace shapegcode::detail {
 namespace {
 
 constexpr std::array<std::size_t, 3> window_periods{1, 4, 16};
+constexpr double surely_below = 1.0 - 1e-9;
 constexpr double least_gain = 1e-6;  // what is faster by less than this share is as fast
 
 }  // namespace
@@ -33,12 +34,26 @@ void FeedMeter::step(const Vector3& command, const ContourTracker& tracker, doub
     travelled = last.travelled_mm + (command - last.position).norm();
   }
   now = {command, travelled, std::abs(deviation_mm), tracker.segment()};
-  for (const std::size_t window : windows_) {
-    if (count_ >= window) {
-      compare(row(count_ - window), now, static_cast<double>(window) * period_s_);
+  if (now.segment != limits_of_) {
+    set_limits(now.segment);
+  }
+  for (std::size_t i = 0; i < windows_.size(); ++i) {
+    if (count_ < windows_[i]) continue;
+    const Row& from = row(count_ - windows_[i]);
+    if (travelled - from.travelled_mm > limits_mm_[i]) {
+      compare(from, now, static_cast<double>(windows_[i]) * period_s_);
+      set_limits(now.segment);
     }
   }
   ++count_;
+}
+
+void FeedMeter::set_limits(std::size_t segment) noexcept {
+  const double speed = surely_below * ratio_to_beat_ * path_->feed_mm_per_s(segment);
+  for (std::size_t i = 0; i < windows_.size(); ++i) {
+    limits_mm_[i] = speed * static_cast<double>(windows_[i]) * period_s_ + surely_below * slack_mm_;
+  }
+  limits_of_ = segment;
 }
 
 void FeedMeter::compare(const Row& from, const Row& to, double time_s) noexcept {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "shapegcode/measure/contour.hpp"
@@ -33,6 +34,8 @@ class FeedMeter {
 
   [[nodiscard]] const Row& row(std::size_t index) const noexcept { return rows_[index & mask_]; }
   void compare(const Row& from, const Row& to, double time_s) noexcept;
+  /// What the ways must be longer than on a segment to be a larger excess.
+  void set_limits(std::size_t segment) noexcept;
 
   const Path* path_;
   double period_s_;
@@ -43,6 +46,8 @@ class FeedMeter {
   std::size_t count_ = 0;
   FeedExcess largest_;
   double ratio_to_beat_ = 0.0;
+  std::array<double, 3> limits_mm_{};  // per window; a little too short, so that rounding hides nothing
+  std::size_t limits_of_ = std::numeric_limits<std::size_t>::max();  // segment
 };
 
 }  // namespace shapegcode::detail

@@ -198,7 +198,9 @@ class OrbitError {
   explicit OrbitError(const Path& path);
   /// Next sample, and the segment index on which its foot point lies (ContourTracker::segment()). Samples that are not
   /// finite or lie on no segment are ignored. No allocation.
-  void step(const Vector3& p, std::size_t segment) noexcept;
+  void step(const Vector3& p, std::size_t segment) noexcept {
+    if (!arcs_.empty()) step_arcs(p, segment);
+  }
   /// Percent, one entry per arc of the path in order.
   [[nodiscard]] std::vector<double> percent() const;
 
@@ -213,6 +215,7 @@ class OrbitError {
     double area = 0.0;   // mm^2, so far
     double u = 0.0;      // unwrapped angle of the last sample on this arc, from the arc's start
   };
+  void step_arcs(const Vector3& p, std::size_t segment) noexcept;
   void add_move(Arc& arc, std::size_t index, const Vector3& to, std::size_t to_segment) noexcept;
 
   SteadyColumn<std::int32_t> arc_of_;  // -1 for a line
@@ -229,7 +232,13 @@ class CornerReach {
   /// Corners are junctions at which the direction changes by `least_angle_rad` or more, and the path's end.
   explicit CornerReach(const Path& path, double least_angle_rad = 0.1745);
   /// Next sample, and the distance of its foot point along the path (ContourTracker::s_mm()). No allocation.
-  void step(const Vector3& p, double foot_mm) noexcept;
+  void step(const Vector3& p, double foot_mm) noexcept {
+    if (foot_mm < idle_until_mm_) {
+      last_ = p;
+    } else {
+      step_corners(p, foot_mm);
+    }
+  }
   /// Largest distance of a corner from the track so far, mm.
   [[nodiscard]] double largest_mm() const noexcept;
   /// The same of the corners that lie well behind the point: for a track that ends before the path does.
@@ -241,7 +250,10 @@ class CornerReach {
     double s = 0.0;      // from the path's start
     double best2 = 0.0;  // squared distance to the track
   };
+  void step_corners(const Vector3& p, double foot_mm) noexcept;
+
   std::vector<Corner> corners_;
+  double idle_until_mm_ = 0.0;  // no corner is near before a foot so far from the path's start
   std::size_t first_ = 0;  // corners [first_, next_) are near enough to be looked at
   std::size_t next_ = 0;
   double largest2_ = 0.0;

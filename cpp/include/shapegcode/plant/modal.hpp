@@ -146,6 +146,8 @@ class ModalPlant {
   void forget_nothing() noexcept;
   /// No later deflection of an axis that is free from now on exceeds it.
   [[nodiscard]] double reachable(std::size_t axis) const noexcept;
+  /// An axis with one mode, after its command's velocity jumped.
+  void step_only_mode(std::size_t axis, double jump) noexcept;
   /// `peak_` over the period that now begins, looked at between its ends; called only where it may grow.
   void look_between(std::size_t axis) noexcept;
   /// Largest |deflection| between two instants `time_s` apart, with the turning point found by the secant of the rate.
