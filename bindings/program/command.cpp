@@ -109,6 +109,17 @@ Raises:
             return piece;
           },
           py::arg("periods"), "Next piece of at most so many periods, or None behind the last.")
+      .def("begin_early", &RegionShaper::begin_early,
+           R"(To be called before the first piece: do not wait for the search for the feed.
+
+Where the region is one run, its pieces are given out while they are measured, as if the first plan kept the tolerance.
+Where that turns out to be wrong, next() gives None and is_withdrawn holds: all that was given out is void.)")
+      .def("begin_anew", &RegionShaper::begin_anew,
+           R"(Give the region out from its begin again, with the feed that the search finds.
+
+Returns:
+    False, and nothing is done, if no piece was given out early.)")
+      .def_property_readonly("is_withdrawn", &RegionShaper::is_withdrawn, "Whether what was given out is void.")
       .def_property_readonly("largest_deviation_mm", &RegionShaper::largest_deviation_mm,
                              "Largest deviation of what shall follow the path, as far as given out, mm.")
       .def_property_readonly("share", &RegionShaper::share, "How much of the region was given out, 0 to 1.")

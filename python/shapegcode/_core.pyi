@@ -3133,9 +3133,28 @@ class RegionShaper:
         """
         See the class.
         """
+    def begin_anew(self) -> bool:
+        """
+        Give the region out from its begin again, with the feed that the search finds.
+        
+        Returns:
+            False, and nothing is done, if no piece was given out early.
+        """
+    def begin_early(self) -> None:
+        """
+        To be called before the first piece: do not wait for the search for the feed.
+        
+        Where the region is one run, its pieces are given out while they are measured, as if the first plan kept the tolerance.
+        Where that turns out to be wrong, next() gives None and is_withdrawn holds: all that was given out is void.
+        """
     def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
         """
         Next piece of at most so many periods, or None behind the last.
+        """
+    @property
+    def is_withdrawn(self) -> bool:
+        """
+        Whether what was given out is void.
         """
     @property
     def largest_deviation_mm(self) -> float:

@@ -33,161 +33,160 @@ double next_speed(double speed, double deviation, double tolerance, bool curve) 
   return speed * (curve ? std::sqrt(share) : share);
 }
 
-class FeedSearch {
- public:
-  FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
-             std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s)
-      : path_(std::move(path)),
-        limits_(limits),
-        filter_(filter),
-        steps_per_half_(steps_per_half),
-        tolerance_(tolerance_mm),
-        least_feed_(least_feed_mm_per_s),
-        caps_{std::vector<float>(path_->size(), none), std::vector<float>(path_->size(), none)} {}
+}  // namespace
 
-  PlannedRun run() {
-    PlannedRun best;
-    PlannedRun last;
-    for (int round = 0; round < rounds; ++round) {
-      last.rows = {};
-      last = measured();
-      const bool within = last.largest_deviation_mm <= tolerance_;
-      if (within && (!best.profile || last.profile->duration_s() < best.profile->duration_s())) {
-        RunRows rows = std::move(last.rows);
-        best = last;
-        best.rows = std::move(rows);
-      }
-      bool changed = adjust(round < raising_rounds);
-      if (!stops_.empty()) {
-        last.stops = std::move(stops_);
-        return last;
-      }
-      if (!within && (!changed || round >= raising_rounds) && limits_.law == AccelerationLaw::constant_time) {
-        changed = slow_lines() || changed;
-      }
-      if (!changed || (within && round >= raising_rounds)) {
-        break;
-      }
-    }
-    if (best.profile) {
-      return best;
-    }
-    // Corners that do not answer to a lower speed: what bends them is the change of speed around them.
-    for (std::size_t i = 1; i < path_->size(); ++i) {
-      if (caps_.at_junction[i] < none && deviation_.at_junction[i] > tolerance_ &&
-          junction_change((*path_)[i - 1], (*path_)[i]) >= corner_change) {
-        last.stops.push_back(i);
-      }
-    }
-    return last;
+FeedSearch::FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
+                       std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s)
+    : path_(std::move(path)),
+      limits_(limits),
+      filter_(filter),
+      steps_per_half_(steps_per_half),
+      tolerance_(tolerance_mm),
+      least_feed_(least_feed_mm_per_s),
+      caps_{std::vector<float>(path_->size(), none), std::vector<float>(path_->size(), none)} {}
+
+void FeedSearch::begin_round() {
+  plan_ = {path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, {}, &caps_)), 0.0, {}, {}};
+  deviation_.at_junction.assign(path_->size(), 0.0F);
+  deviation_.on_segment.assign(path_->size(), -1.0F);
+  deviation_.near_corner.assign(path_->size(), 0.0F);
+  deviation_.largest = 0.0F;
+  shaper_ = std::make_unique<RunShaper>(path_, plan_.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
+  row_ = 0;
+}
+
+bool FeedSearch::next(Vector3& position) {
+  shaper_->next(position);
+  ++row_;
+  return static_cast<double>(deviation_.largest) <= tolerance_;
+}
+
+PlannedRun FeedSearch::measured() {
+  if (!shaper_) begin_round();
+  const std::size_t rows = 2 * static_cast<std::size_t>(shaper_->periods()) + 1;
+  const bool keeps = row_ == 0 && rows <= most_rows_kept;
+  Vector3 position;
+  while (row_ < rows) {
+    const std::size_t row = row_;
+    next(position);
+    if (!keeps) continue;
+    plan_.rows.positions.push_back(position);
+    if (row % 2 == 0 && row + 1 < rows) plan_.rows.arc_normals.push_back(shaper_->arc_normal());
   }
+  shaper_.reset();
+  plan_.largest_deviation_mm = deviation_.largest;
+  return std::move(plan_);
+}
 
- private:
-  PlannedRun measured() {
-    PlannedRun plan{path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, {}, &caps_)), 0.0, {}, {}};
-    deviation_.at_junction.assign(path_->size(), 0.0F);
-    deviation_.on_segment.assign(path_->size(), -1.0F);
-    deviation_.near_corner.assign(path_->size(), 0.0F);
-    RunShaper shaper(path_, plan.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
-    const std::size_t rows = 2 * static_cast<std::size_t>(shaper.periods()) + 1;
-    const bool keeps = rows <= most_rows_kept;
-    Vector3 position;
-    for (std::size_t row = 0; row < rows; ++row) {
-      shaper.next(position);
-      if (!keeps) continue;
-      plan.rows.positions.push_back(position);
-      if (row % 2 == 0 && row + 1 < rows) plan.rows.arc_normals.push_back(shaper.arc_normal());
+PlannedRun FeedSearch::run() {
+  PlannedRun best;
+  PlannedRun last;
+  for (int round = 0; round < rounds; ++round) {
+    last.rows = {};
+    last = measured();
+    const bool within = last.largest_deviation_mm <= tolerance_;
+    if (within && (!best.profile || last.profile->duration_s() < best.profile->duration_s())) {
+      RunRows rows = std::move(last.rows);
+      best = last;
+      best.rows = std::move(rows);
     }
-    plan.largest_deviation_mm = std::max(
-        {0.0F, *std::ranges::max_element(deviation_.on_segment), *std::ranges::max_element(deviation_.near_corner)});
-    return plan;
+    bool changed = adjust(round < raising_rounds);
+    if (!stops_.empty()) {
+      last.stops = std::move(stops_);
+      return last;
+    }
+    if (!within && (!changed || round >= raising_rounds) && limits_.law == AccelerationLaw::constant_time) {
+      changed = slow_lines() || changed;
+    }
+    if (!changed || (within && round >= raising_rounds)) {
+      break;
+    }
   }
+  if (best.profile) {
+    return best;
+  }
+  // Corners that do not answer to a lower speed: what bends them is the change of speed around them.
+  for (std::size_t i = 1; i < path_->size(); ++i) {
+    if (caps_.at_junction[i] < none && deviation_.at_junction[i] > tolerance_ &&
+        junction_change((*path_)[i - 1], (*path_)[i]) >= corner_change) {
+      last.stops.push_back(i);
+    }
+  }
+  return last;
+}
 
-  // New caps; false if none changed.
-  bool adjust(bool raise) {
-    bool changed = false;
-    const auto adjust_one = [&](float& cap, double speed, double deviation, bool curve, double least) {
-      const bool capped = cap < none;
-      if (deviation <= tolerance_ && !(capped && raise && deviation < enough * tolerance_)) {
+// New caps; false if none changed.
+bool FeedSearch::adjust(bool raise) {
+  bool changed = false;
+  const auto adjust_one = [&](float& cap, double speed, double deviation, bool curve, double least) {
+    const bool capped = cap < none;
+    if (deviation <= tolerance_ && !(capped && raise && deviation < enough * tolerance_)) {
+      return;
+    }
+    double next = next_speed(speed, deviation, tolerance_, curve);
+    if (deviation <= tolerance_) {
+      next = std::min(next, largest_raise * speed);
+    } else if (next < least) {
+      next = least;
+      if (speed <= least) {
         return;
       }
-      double next = next_speed(speed, deviation, tolerance_, curve);
-      if (deviation <= tolerance_) {
-        next = std::min(next, largest_raise * speed);
-      } else if (next < least) {
-        next = least;
-        if (speed <= least) {
-          return;
-        }
-      }
-      cap = static_cast<float>(next);
+    }
+    cap = static_cast<float>(next);
+    changed = true;
+  };
+  for (std::size_t i = 0; i < path_->size(); ++i) {
+    const Segment segment = (*path_)[i];
+    const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
+    if (segment.kind == SegmentKind::arc) {
+      const float clear = deviation_.on_segment[i];
+      adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true,
+                 slowest(segment_speed_limit(segment, limits_)));
+    }
+    if (i == 0) {
+      continue;
+    }
+    const Segment before = (*path_)[i - 1];
+    const double change = junction_change(before, segment);
+    if (change < 1e-6) {
+      continue;  // an arc that begins or ends tangentially is slowed as a whole
+    }
+    const double first = std::min({corner_speed_limit(before, segment, limits_),
+                                   segment_speed_limit(segment, limits_), segment_speed_limit(before, limits_)});
+    const double passed = std::min(first, static_cast<double>(caps_.at_junction[i]));
+    const bool is_curve = change < corner_change;
+    adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], is_curve, is_curve ? slowest(first) : 0.0);
+    if (caps_.at_junction[i] < std::max(creep_mm_per_s, creep_share * first)) {
+      stops_.push_back(i);
+    }
+  }
+  return changed;
+}
+
+double FeedSearch::slowest(double speed) const noexcept {
+  return std::min(speed, std::max(least_feed_, slowest_share * speed));
+}
+
+// Where neither arcs nor corners are to blame it is a ramp on a line across the axes, which bends the response of
+// axes with different modes; a ramp of constant time is as steep as the feed is high.
+bool FeedSearch::slow_lines() {
+  bool changed = false;
+  for (std::size_t i = 0; i < path_->size(); ++i) {
+    const Segment segment = (*path_)[i];
+    const auto deviation = static_cast<double>(deviation_.on_segment[i]);
+    if (segment.kind == SegmentKind::arc || deviation <= tolerance_) {
+      continue;
+    }
+    const double first = segment_speed_limit(segment, limits_);
+    const double speed = std::min(static_cast<double>(caps_.on_segment[i]), first);
+    const double least = slowest(first);
+    if (speed > least) {
+      caps_.on_segment[i] = static_cast<float>(std::max(least, next_speed(speed, deviation, tolerance_, false)));
       changed = true;
-    };
-    for (std::size_t i = 0; i < path_->size(); ++i) {
-      const Segment segment = (*path_)[i];
-      const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
-      if (segment.kind == SegmentKind::arc) {
-        const float clear = deviation_.on_segment[i];
-        adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true,
-                   slowest(segment_speed_limit(segment, limits_)));
-      }
-      if (i == 0) {
-        continue;
-      }
-      const Segment before = (*path_)[i - 1];
-      const double change = junction_change(before, segment);
-      if (change < 1e-6) {
-        continue;  // an arc that begins or ends tangentially is slowed as a whole
-      }
-      const double first = std::min({corner_speed_limit(before, segment, limits_),
-                                     segment_speed_limit(segment, limits_), segment_speed_limit(before, limits_)});
-      const double passed = std::min(first, static_cast<double>(caps_.at_junction[i]));
-      const bool is_curve = change < corner_change;
-      adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], is_curve, is_curve ? slowest(first) : 0.0);
-      if (caps_.at_junction[i] < std::max(creep_mm_per_s, creep_share * first)) {
-        stops_.push_back(i);
-      }
     }
-    return changed;
   }
-
-  [[nodiscard]] double slowest(double speed) const noexcept {
-    return std::min(speed, std::max(least_feed_, slowest_share * speed));
-  }
-
-  // Where neither arcs nor corners are to blame it is a ramp on a line across the axes, which bends the response of
-  // axes with different modes; a ramp of constant time is as steep as the feed is high.
-  bool slow_lines() {
-    bool changed = false;
-    for (std::size_t i = 0; i < path_->size(); ++i) {
-      const Segment segment = (*path_)[i];
-      const auto deviation = static_cast<double>(deviation_.on_segment[i]);
-      if (segment.kind == SegmentKind::arc || deviation <= tolerance_) {
-        continue;
-      }
-      const double first = segment_speed_limit(segment, limits_);
-      const double speed = std::min(static_cast<double>(caps_.on_segment[i]), first);
-      const double least = slowest(first);
-      if (speed > least) {
-        caps_.on_segment[i] = static_cast<float>(std::max(least, next_speed(speed, deviation, tolerance_, false)));
-        changed = true;
-      }
-    }
-    return changed;
-  }
-
-  std::shared_ptr<const Path> path_;
-  MotionLimits limits_;
-  const RunFilter& filter_;
-  std::size_t steps_per_half_;
-  double tolerance_;
-  double least_feed_;
-  SpeedCaps caps_;
-  RunDeviation deviation_;
-  std::vector<std::size_t> stops_;
-};
-
-}  // namespace
+  return changed;
+}
 
 RunLimits run_limits(const MotionLimits& limits) {
   return {limits.max_feed_mm_per_s, limits.max_acceleration_mm_per_s2};

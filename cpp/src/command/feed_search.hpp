@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "command/run_corrector.hpp"
+#include "command/run_deviation.hpp"
 #include "command/run_filter.hpp"
+#include "command/run_shaper.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/path.hpp"
 
@@ -31,6 +33,46 @@ struct PlannedRun {
   std::vector<std::size_t> stops;
   /// The run itself, shaped while it was measured; empty where it is longer than what is kept.
   RunRows rows;
+};
+
+/// Looks for it: see `plan_within_tolerance`. The rows of the first round may be asked for one by one, by one who cannot
+/// wait until all are measured.
+class FeedSearch {
+ public:
+  /// `filter` stays the caller's.
+  FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
+             std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s);
+
+  /// Plans the next round.
+  void begin_round();
+  /// Of the round that was begun.
+  [[nodiscard]] const PlannedRun& plan() const noexcept { return plan_; }
+  [[nodiscard]] RunShaper& shaper() noexcept { return *shaper_; }
+  [[nodiscard]] double largest_deviation_mm() const noexcept { return deviation_.largest; }
+  /// Its next row, of 2*periods()+1; false if the run has left the tolerance: it is then not the one looked for. One
+  /// that never leaves it is.
+  bool next(Vector3& position);
+  /// The run looked for; goes on with the round that was begun.
+  [[nodiscard]] PlannedRun run();
+
+ private:
+  PlannedRun measured();
+  bool adjust(bool raise);
+  [[nodiscard]] double slowest(double speed) const noexcept;
+  bool slow_lines();
+
+  std::shared_ptr<const Path> path_;
+  MotionLimits limits_;
+  const RunFilter& filter_;
+  std::size_t steps_per_half_;
+  double tolerance_;
+  double least_feed_;
+  SpeedCaps caps_;
+  RunDeviation deviation_;
+  std::vector<std::size_t> stops_;
+  PlannedRun plan_;  // of the round under way, with its shaper
+  std::unique_ptr<RunShaper> shaper_;
+  std::size_t row_ = 0;  // rows of it that were measured
 };
 
 /// The highest feed at which a run keeps the contour tolerance: planned at full speed, shaped, measured, and slowed

@@ -75,6 +75,7 @@ void DeviationMeter::measure(std::size_t row) {
     size = std::max(size, missed_by(rows_.path().start_mm(behind), row));
   }
   const auto found = static_cast<float>(size);
+  measured_.largest = std::max(measured_.largest, found);
   // A corner's deviation is no reason to slow the whole arc beside it.
   const auto half = static_cast<std::ptrdiff_t>(half_);
   const std::uint32_t first = rows_.segment(at - half);

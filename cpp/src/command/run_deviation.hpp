@@ -15,6 +15,7 @@ struct RunDeviation {
   std::vector<float> at_junction;  ///< [i]: while segment i is entered, within half the shaper
   std::vector<float> on_segment;   ///< further than that from every corner; negative: nowhere
   std::vector<float> near_corner;  ///< [i]: on segment i, within half the shaper of a corner
+  float largest = 0.0F;            ///< of them all
 };
 
 /// Finds them row by row, behind the corrections.

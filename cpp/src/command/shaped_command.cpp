@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <utility>
 
 #include "command/feed_search.hpp"
@@ -38,38 +37,55 @@ void put(const std::vector<Vector3>& grid, const std::vector<Vector3>& middle, c
   }
 }
 
-// A planned run given out row by row: as it was kept when it was planned, or shaped anew.
+// A planned run given out row by row: as it was kept when it was planned, or shaped anew, or while it is measured.
 class Run {
  public:
+  // The first round of a search, which stays the caller's.
+  explicit Run(FeedSearch& search) : search_(&search) {
+    search.begin_round();
+    plan_ = search.plan();
+  }
   // `filter` stays the caller's.
   Run(PlannedRun plan, const RunFilter& filter, const RunLimits& limits, std::size_t steps_per_half)
       : plan_(std::move(plan)) {
-    if (plan_.rows.positions.size() == 0) shaper_.emplace(plan_.path, plan_.profile, filter, limits, steps_per_half);
+    if (plan_.rows.positions.size() == 0) {
+      own_ = std::make_unique<RunShaper>(plan_.path, plan_.profile, filter, limits, steps_per_half);
+    }
   }
 
   [[nodiscard]] const PlannedRun& plan() const noexcept { return plan_; }
 
   [[nodiscard]] std::uint32_t periods() const noexcept {
-    return shaper_ ? shaper_->periods() : static_cast<std::uint32_t>(plan_.rows.arc_normals.size());
+    if (RunShaper* shaper = shaper_now()) return shaper->periods();
+    return static_cast<std::uint32_t>(plan_.rows.arc_normals.size());
   }
 
-  void next(Vector3& position) {
-    if (shaper_) {
-      shaper_->next(position);
+  // False if the search says of its round that it is not the run looked for.
+  bool next(Vector3& position) {
+    if (search_ != nullptr) return search_->next(position);
+    if (own_) {
+      own_->next(position);
     } else {
       position = plan_.rows.positions[row_];
       plan_.rows.positions.forget_before(row_++);  // each is asked for once
     }
+    return true;
   }
 
   // Of the period that begins at the row last given.
   [[nodiscard]] std::int8_t arc_normal() {
-    return shaper_ ? shaper_->arc_normal() : plan_.rows.arc_normals[(row_ - 1) / 2];
+    if (RunShaper* shaper = shaper_now()) return shaper->arc_normal();
+    return plan_.rows.arc_normals[(row_ - 1) / 2];
   }
 
  private:
+  [[nodiscard]] RunShaper* shaper_now() const noexcept {
+    return search_ != nullptr ? &search_->shaper() : own_.get();
+  }
+
   PlannedRun plan_;
-  std::optional<RunShaper> shaper_;
+  std::unique_ptr<RunShaper> own_;
+  FeedSearch* search_ = nullptr;
   std::size_t row_ = 0;  // rows given out of those kept
 };
 
@@ -81,6 +97,7 @@ struct RegionShaper::State {
 
   [[nodiscard]] bool next(ShapedCommand& piece, std::uint32_t periods);
   [[nodiscard]] bool begin_run();
+  void begin_anew();
   void note_marks(const PlannedRun& run);
   [[nodiscard]] double share() const noexcept;
 
@@ -97,7 +114,10 @@ struct RegionShaper::State {
   std::uint32_t rest_periods_ = 0;
 
   Piece now_{0, 0};
-  std::unique_ptr<Run> run_;      // refers to the filter above
+  std::unique_ptr<FeedSearch> search_;  // of a run that is given out early, or was; refers to the filter above
+  std::unique_ptr<Run> run_;            // likewise
+  bool early_ = false;
+  bool withdrawn_ = false;
   std::uint32_t given_ = 0;       // periods of the run given out
   std::uint32_t resting_ = 0;     // periods of rest still to come
   std::uint32_t period_ = 0;      // of the region
@@ -152,10 +172,22 @@ bool RegionShaper::State::begin_run() {
     return false;
   }
   PlannedRun plan;
+  const auto search_of = [&](const std::shared_ptr<const Path>& part) {
+    return std::make_unique<FeedSearch>(part, options_.limits, filter_, steps_per_half_,
+                                        options_.tolerance.contour_tolerance_mm, options_.least_feed_mm_per_s);
+  };
   for (;;) {
     now_ = pieces_.back();
     pieces_.pop_back();
     const auto part = sub_path(path_, now_.first, now_.last);
+    if (early_) {
+      search_ = search_of(part);
+      run_ = std::make_unique<Run>(*search_);
+      given_ = 0;
+      withdrawn_ = !run_->next(at_);
+      note_marks(run_->plan());
+      return true;
+    }
     if (options_.target == ContourTarget::none) {
       plan = {part,
               std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits, options_.tolerance)),
@@ -164,8 +196,8 @@ bool RegionShaper::State::begin_run() {
               {}};
       break;
     }
-    plan = plan_within_tolerance(part, options_.limits, filter_, steps_per_half_,
-                                 options_.tolerance.contour_tolerance_mm, options_.least_feed_mm_per_s);
+    const std::unique_ptr<FeedSearch> search = search_ ? std::move(search_) : search_of(part);
+    plan = search->run();
     if (plan.stops.empty()) {
       break;
     }
@@ -183,6 +215,15 @@ bool RegionShaper::State::begin_run() {
   run_->next(at_);
   note_marks(run_->plan());
   return true;
+}
+
+void RegionShaper::State::begin_anew() {
+  run_.reset();
+  pieces_ = {{0, path_->size()}};
+  early_ = withdrawn_ = false;
+  given_ = resting_ = period_ = stops_ = 0;
+  largest_deviation_mm_ = 0.0;
+  segment_periods_.clear();
 }
 
 void RegionShaper::State::note_marks(const PlannedRun& run) {
@@ -231,16 +272,19 @@ bool RegionShaper::State::next(ShapedCommand& piece, std::uint32_t periods) {
     if (!run_ && !begin_run()) {
       break;
     }
+    if (withdrawn_) {
+      return false;
+    }
     if (given_ < run_->periods()) {
       const std::int8_t normal = run_->arc_normal();
       Vector3 half;
       Vector3 end;
-      run_->next(half);
-      run_->next(end);
+      withdrawn_ = !run_->next(half) || !run_->next(end);
       add(half, end, normal);
       ++given_;
     }
-    if (given_ == run_->periods()) {
+    if (given_ == run_->periods() && !withdrawn_) {
+      if (early_) largest_deviation_mm_ = search_->largest_deviation_mm();
       run_.reset();
       resting_ = pieces_.empty() ? 0 : rest_periods_;
       if (resting_ == 0) {
@@ -272,6 +316,18 @@ RegionShaper& RegionShaper::operator=(RegionShaper&&) noexcept = default;
 RegionShaper::~RegionShaper() = default;
 
 bool RegionShaper::next(ShapedCommand& piece, std::uint32_t periods) { return state_->next(piece, periods); }
+
+void RegionShaper::begin_early() noexcept {
+  state_->early_ = state_->pieces_.size() == 1 && state_->options_.target != ContourTarget::none;
+}
+
+bool RegionShaper::is_withdrawn() const noexcept { return state_->withdrawn_; }
+
+bool RegionShaper::begin_anew() {
+  if (!state_->early_) return false;
+  state_->begin_anew();
+  return true;
+}
 
 double RegionShaper::largest_deviation_mm() const noexcept { return state_->largest_deviation_mm_; }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,6 +114,10 @@ def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = m
     tolerance.contour_tolerance_mm = contour_tolerance_um * 1e-3
     tolerance.corner_share = _CORNER_SHARE
     return tolerance
+
+
+class _WithdrawnError(Exception):
+    """What was written of a region rests on a feed that does not keep its tolerance."""
 
 
 class NoRoomError(Exception):
@@ -263,31 +268,50 @@ class RegionWriter:
             ArgumentError: it cannot be shaped or written.
             NoRoomError: its text is more than there is room for.
         """
-        notes = region.notes
         options = self.options(limits, tolerance, self._model.offset(region))
-        shaper = _core.RegionShaper(region.path, self._grid.fir, [note.segment for note in notes], options)
+        marked = [note.segment for note in region.notes]
+        shaper = _core.RegionShaper(region.path, self._grid.fir, marked, options)
+        shaper.begin_early()
+        try:
+            return self._write(program, region, shaper, options, room, on_progress)
+        except (_WithdrawnError, NoRoomError):
+            # At the feed that the search ends with it may be another text.
+            if not shaper.begin_anew():
+                raise
+        return self._write(program, region, shaper, options, room, on_progress)
+
+    def _write(
+        self,
+        program: Program,
+        region: _core.Region,
+        shaper: _core.RegionShaper,
+        options: _core.ShapingOptions,
+        room: Room | None,
+        on_progress: Callable[[float], None],
+    ) -> EmittedRegion:
         fit = self._fit(region, options)
         state = self._writer(program, region, fit)
-        marks = _Marks(program, notes)
+        marks = _Marks(program, region.notes)
         texts: list[bytes] = []
         periods: list[npt.NDArray[np.uint32]] = []
         starts: list[list[int]] = []  # of the pieces, in increments
-        for piece, share, is_last in _pieces(shaper):
-            if is_last:
-                state.exact_stop_at_end = region.exact_stop_at_end
-                last = region.path[-1]
-                if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
-                    fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
-            here, breaks = marks.within(piece, last=is_last)
-            fitted = _core.fit_blocks(piece, sorted({*piece.run_ends, *breaks}), fit)
-            fit.lent_periods = fitted.left_periods
-            starts.append([round(float(x) / fit.increment_mm) for x in piece.grid_mm[0]])
-            text, state.motion, state.plane = _core.write_blocks(fitted, starts[-1], here, state)
-            texts.append(text)
-            periods.append(fitted.periods)
-            if room is not None:
-                room.require(sum(map(len, texts)), sum(map(len, periods)))
-            on_progress(share)
+        with closing(_pieces(shaper)) as pieces:
+            for piece, share, is_last in pieces:
+                if is_last:
+                    state.exact_stop_at_end = region.exact_stop_at_end
+                    last = region.path[-1]
+                    if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
+                        fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
+                here, breaks = marks.within(piece, last=is_last)
+                fitted = _core.fit_blocks(piece, sorted({*piece.run_ends, *breaks}), fit)
+                fit.lent_periods = fitted.left_periods
+                starts.append([round(float(x) / fit.increment_mm) for x in piece.grid_mm[0]])
+                text, state.motion, state.plane = _core.write_blocks(fitted, starts[-1], here, state)
+                texts.append(text)
+                periods.append(fitted.periods)
+                if room is not None:
+                    room.require(sum(map(len, texts)), sum(map(len, periods)))
+                on_progress(share)
         # A search for the region's N word must not skip the prologue.
         number = marks.first_word
         before = self._head(region, number, starts[0], state)
@@ -352,10 +376,15 @@ def _pieces(shaper: _core.RegionShaper) -> Iterator[tuple[_core.ShapedCommand, f
     """The pieces of a region, how much of it they come to, and whether one is the last.
 
     The next one is shaped while one is written: of a region of several pieces in a thread of its own.
+
+    Raises:
+        _WithdrawnError: the pieces given are void, see `RegionShaper.begin_early`.
     """
 
     def shaped() -> tuple[_core.ShapedCommand | None, float]:
         piece = shaper.next(_PIECE_PERIODS)
+        if shaper.is_withdrawn:
+            raise _WithdrawnError
         return piece, shaper.share
 
     piece, share = shaped()
