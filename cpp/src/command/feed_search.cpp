@@ -85,6 +85,7 @@ PlannedRun FeedSearch::run() {
     last.rows = {};
     last = measured();
     const bool within = last.largest_deviation_mm <= tolerance_;
+    if (within && round == 0) return last;  // nothing was slowed, so nothing can be raised
     if (within && (!best.profile || last.profile->duration_s() < best.profile->duration_s())) {
       RunRows rows = std::move(last.rows);
       best = last;

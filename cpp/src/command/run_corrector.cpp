@@ -183,16 +183,13 @@ bool RunCorrector::runs_too_fast(std::size_t begin, std::size_t end) {
     return false;
   }
   const double period = 2.0 * rows_.filter().half_period_s;
-  const auto at = [&](std::ptrdiff_t row, bool corrected) {
-    return Vector3(rows_.shaped(0, row, corrected), rows_.shaped(1, row, corrected), rows_.shaped(2, row, corrected));
-  };
   const auto from = static_cast<std::ptrdiff_t>(begin + begin % 2);
   const auto to = static_cast<std::ptrdiff_t>(end) + rows_.filter().shaper_rows() + 4;
-  Vector3 plain = at(from - 2, false);
-  Vector3 last = at(from - 2, true);
+  Vector3 plain = rows_.shaped(from - 2, false);
+  Vector3 last = rows_.shaped(from - 2, true);
   for (std::ptrdiff_t row = from; row <= to; row += 2) {
-    const Vector3 next_plain = at(row, false);
-    const Vector3 next = at(row, true);
+    const Vector3 next_plain = rows_.shaped(row, false);
+    const Vector3 next = rows_.shaped(row, true);
     const double allowed = (1.0 + used_share * ratio) * period * rows_.programmed_feed(row);
     if ((next - last).norm() > std::max(allowed, (next_plain - plain).norm() * (1.0 + 1e-6))) {
       blame(static_cast<std::size_t>(row), begin, end);

@@ -26,13 +26,7 @@ Vector3 DeviationMeter::as_block(std::size_t row) const noexcept {
   for (std::size_t k = rows_.segment(at - half); k <= rows_.segment(at + half); ++k) {
     bends = bends || rows_.path().is_arc(k);
   }
-  Vector3 position;
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    position[static_cast<Eigen::Index>(axis)] =
-        bends ? rows_.shaped(axis, at, true)
-              : 0.5 * (rows_.shaped(axis, at - 1, true) + rows_.shaped(axis, at + 1, true));
-  }
-  return position;
+  return bends ? shaped_ : Vector3(0.5 * (shaped_before_ + shaped_next_));
 }
 
 // What the emitted blocks leave of the error.
@@ -63,6 +57,10 @@ double DeviationMeter::missed_by(const Vector3& corner, std::size_t row) const n
 
 void DeviationMeter::measure(std::size_t row) {
   rows_.read_to(row + half_ + 1);
+  const auto here = static_cast<std::ptrdiff_t>(row);
+  shaped_before_ = row == 0 ? rows_.shaped(here - 1, true) : shaped_;
+  shaped_ = row == 0 ? rows_.shaped(here, true) : shaped_next_;
+  shaped_next_ = rows_.shaped(here + 1, true);
   left(row) = deviation(row);
   const Vector3& left_here = left(row);
   const Vector3& tangent = rows_.tangent(row);

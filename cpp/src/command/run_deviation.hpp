@@ -26,6 +26,8 @@ class DeviationMeter {
 
   /// To be called for each row in turn, once its correction and that of the next row are final.
   void measure(std::size_t row);
+  /// The shaped command, corrected, at the row that was measured last.
+  [[nodiscard]] const Vector3& shaped() const noexcept { return shaped_; }
 
  private:
   [[nodiscard]] Vector3 deviation(std::size_t row);
@@ -40,6 +42,9 @@ class DeviationMeter {
   std::size_t half_;                   // of the shaper, rows
   std::unique_ptr<ModalPlant> plant_;  // of the response; null where modes move
   std::array<Vector3, 16> left_{};     // deviations of the last rows
+  Vector3 shaped_before_ = Vector3::Zero();
+  Vector3 shaped_ = Vector3::Zero();
+  Vector3 shaped_next_ = Vector3::Zero();
 };
 
 }  // namespace shapegcode

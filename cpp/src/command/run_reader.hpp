@@ -59,6 +59,9 @@ class RunReader {
   [[nodiscard]] Vector3 left_of_error(std::size_t row) const noexcept;
   /// The command behind the shaper, with the corrections or without them.
   [[nodiscard]] double shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) const noexcept;
+  [[nodiscard]] Vector3 shaped(std::ptrdiff_t row, bool corrected) const noexcept {
+    return {shaped(0, row, corrected), shaped(1, row, corrected), shaped(2, row, corrected)};
+  }
 
   // Where the path is as a row is given out; only with keeps_places. The rows before the first one are like it.
   [[nodiscard]] const Vector3& tangent(std::size_t row) const noexcept { return tangent_[index(row)]; }

@@ -23,12 +23,11 @@ void RunShaper::next(Vector3& position) {
   } else {
     rows_.read_to(needed);
   }
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    position[static_cast<Eigen::Index>(axis)] =
-        rows_.shaped(axis, static_cast<std::ptrdiff_t>(out_), corrector_.has_value());
-  }
   if (meter_) {
     meter_->measure(out_);
+    position = meter_->shaped();
+  } else {
+    position = rows_.shaped(static_cast<std::ptrdiff_t>(out_), corrector_.has_value());
   }
   ++out_;
   rows_.forget(out_);

@@ -29,7 +29,7 @@ bool RampJoin::end(SpeedPhase& done) {
   return std::exchange(is_open_, false);
 }
 
-void RampStretch::add(const SpeedPhase& phase) { phases_.push_back(phase); }
+void RampStretch::add(const SpeedPhase& phase) { phases_[added_++ % phases_.size()] = phase; }
 
 void RampStretch::end(double length_mm) {
   length_ = length_mm;
@@ -80,7 +80,6 @@ double RampStretch::given_by(std::size_t k) const noexcept {
 }
 
 bool RampStretch::next(Ramp& ramp) {
-  constexpr std::size_t around = 3;
   const std::size_t i = at_;
   if (!exists(i) || (!ended_ && !exists(i + around))) {
     return false;
@@ -89,7 +88,7 @@ bool RampStretch::next(Ramp& ramp) {
   ramp =
       steady(i) ? Ramp{speed, speed, distance(i) - given_by(i)} : Ramp{speed, end_speed(i), distance(i) + taken_by(i)};
   ++at_;
-  for (; first_ + around < at_; ++first_) phases_.pop_front();
+  if (at_ > around) first_ = at_ - around;
   return true;
 }
 

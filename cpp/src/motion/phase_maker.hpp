@@ -1,8 +1,8 @@
 // The phases of a profile out of the ramps of its pieces, one after another: what is passed is forgotten.
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <deque>
 #include <vector>
 
 #include "motion/pieces.hpp"
@@ -30,7 +30,8 @@ class RampJoin {
 class RampStretch {
  public:
   explicit RampStretch(double time_constant_s) : time_constant_s_(time_constant_s) {}
-  /// The phases must come in a row, `add` of the next one giving the length of the one before.
+  /// The phases must come in a row, `add` of the next one giving the length of the one before; between two of them
+  /// `next` must be asked until it is false.
   void add(const SpeedPhase& phase);
   void end(double length_mm);
   /// Next ramp; false if another phase is needed first, or behind the end none is left.
@@ -38,8 +39,8 @@ class RampStretch {
 
  private:
   // Indices count phases from the start of the path; what is not there is steady and asks for nothing.
-  [[nodiscard]] bool exists(std::size_t i) const noexcept { return i >= first_ && i < first_ + phases_.size(); }
-  [[nodiscard]] const SpeedPhase& phase(std::size_t i) const noexcept { return phases_[i - first_]; }
+  [[nodiscard]] bool exists(std::size_t i) const noexcept { return i >= first_ && i < added_; }
+  [[nodiscard]] const SpeedPhase& phase(std::size_t i) const noexcept { return phases_[i % phases_.size()]; }
   [[nodiscard]] bool steady(std::size_t i) const noexcept { return phase(i).acceleration_mm_per_s2 == 0.0; }
   [[nodiscard]] double end_speed(std::size_t i) const noexcept;
   [[nodiscard]] double distance(std::size_t i) const noexcept;
@@ -51,9 +52,12 @@ class RampStretch {
   [[nodiscard]] double taken_by(std::size_t i) const noexcept;
   [[nodiscard]] double given_by(std::size_t k) const noexcept;
 
+  static constexpr std::size_t around = 3;  // phases to both sides that are asked
+
   double time_constant_s_;
-  std::deque<SpeedPhase> phases_;
-  std::size_t first_ = 0;  // index of the first of them
+  std::array<SpeedPhase, 8> phases_;  // a ring: those around the one that comes next
+  std::size_t first_ = 0;             // index of the first of them
+  std::size_t added_ = 0;             // one behind the last
   std::size_t at_ = 0;     // phase that comes next
   double length_ = 0.0;
   bool ended_ = false;

@@ -48,6 +48,18 @@ Piece PlainPlan::piece_of(const Segment& segment) const noexcept {
   return {segment.length_mm, limit, segment_acceleration(segment, limit, limits_), 0.0};
 }
 
+// A ramp over the whole of a segment takes no less time than what is planned there; under the constant-time law both its
+// ramps may be stretched.
+double PlainPlan::longest_s() const noexcept {
+  double sum_s = 0.0;
+  for (std::size_t i = 0; i < start_speeds_.size(); ++i) {
+    const double end_speed = i + 1 < start_speeds_.size() ? start_speeds_[i + 1] : 0.0;
+    const double length = path_.distance_mm(i + 1) - path_.distance_mm(i);
+    if (length > 0.0) sum_s += PhaseJoin::duration_s(start_speeds_[i], end_speed, length);
+  }
+  return sum_s + 2.0 * limits_.time_constant_s * static_cast<double>(start_speeds_.size());
+}
+
 PlainPlan::Phases::Phases(std::shared_ptr<const PlainPlan> plan) : plan_(std::move(plan)), maker_(plan_->limits_) {}
 
 bool PlainPlan::Phases::next(SpeedPhase& phase) {
@@ -79,45 +91,57 @@ bool PlainPlan::Phases::next(SpeedPhase& phase) {
 PlannedMotion::PlannedMotion(Path path, const MotionLimits& limits, double period_s)
     : path_(std::move(path)),
       period_s_(period_s),
-      smoothing_(Fir::moving_average(1), 1),
       plan_((check_limits(limits, {}), std::make_shared<const PlainPlan>(path_, limits, FilterTolerance{}))),
       phases_(plan_) {
   require_period(period_s);
-  const double rest = 0.0;
-  smoothing_.reset({&rest, 1});
-  PlainPlan::Phases all(plan_);
-  for (SpeedPhase phase; all.next(phase);) duration_s_ = phase.start_s + phase.duration_s;
-  const double ramps = std::ceil(duration_s_ / period_s - 1e-9);
-  sample_count_ = static_cast<std::size_t>(require_count(ramps, most_set_points, "a path", "set-points")) + 1;
+  check_count();
   phases_.next(now_);
   has_next_ = phases_.next(next_);
+  take_segment();
 }
 
-// As SpeedProfile, for times that rise.
-double PlannedMotion::distance_mm(double time_s) {
-  if (time_s >= duration_s_) {
-    return path_.length_mm();
-  }
-  if (time_s <= 0.0) {
-    return 0.0;
-  }
+void PlannedMotion::check_count() const {
+  if (plan_->longest_s() / period_s_ < most_set_points) return;
+  double duration_s = 0.0;
+  PlainPlan::Phases all(plan_);
+  for (SpeedPhase phase; all.next(phase);) duration_s = phase.start_s + phase.duration_s;
+  static_cast<void>(require_count(std::ceil(duration_s / period_s_ - 1e-9), most_set_points, "a path", "set-points"));
+}
+
+void PlannedMotion::take_segment() noexcept {
+  on_ = path_[cursor_];
+  on_begin_mm_ = path_.distance_mm(cursor_);
+  on_end_mm_ = path_.distance_mm(cursor_ + 1);
+}
+
+void PlannedMotion::pass_to(double time_s) {
   while (has_next_ && time_s >= next_.start_s) {
     now_ = next_;
     has_next_ = phases_.next(next_);
   }
-  return now_.distance_at(time_s);
 }
 
 bool PlannedMotion::step(Vector3& position) {
-  const bool moving = index_ < sample_count_;
+  const double time_s = static_cast<double>(index_) * period_s_;
+  pass_to(time_s);
   double distance = path_.length_mm();
-  if (moving) {
-    double at = distance_mm(static_cast<double>(index_) * period_s_);
-    ++index_;
-    smoothing_.step({&at, 1}, {&at, 1});
-    if (index_ < sample_count_) distance = at;
+  bool moving = true;
+  if (has_next_) {
+    distance = now_.distance_at(time_s);
+  } else {
+    const double duration_s = now_.start_s + now_.duration_s;
+    const auto last = static_cast<std::size_t>(std::ceil(duration_s / period_s_ - 1e-9));
+    moving = index_ <= last;
+    // The last set-point is the path's end itself.
+    if (index_ < last && time_s < duration_s) distance = now_.distance_at(time_s);
   }
-  position = path_.point(distance, cursor_);
+  if (moving) ++index_;
+  // As Path::point, with the segment at hand.
+  if (distance < on_begin_mm_ || distance >= on_end_mm_) {
+    path_.seek(distance, cursor_);
+    take_segment();
+  }
+  position = point_at(on_, distance - on_begin_mm_);
   return moving;
 }
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "motion/phase_maker.hpp"
-#include "shapegcode/filter.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/path.hpp"
 
@@ -20,6 +19,9 @@ class PlainPlan {
   [[nodiscard]] static bool serves(const MotionLimits& limits) noexcept;
   /// Throws Error(argument) on a segment without feed. The limits are not checked.
   PlainPlan(Path path, const MotionLimits& limits, const FilterTolerance& filter);
+
+  /// A time that the phases do not exceed, in s; infinite where the path stops underway.
+  [[nodiscard]] double longest_s() const noexcept;
 
   /// Phases in a row from the start of the path on.
   class Phases {
@@ -56,20 +58,25 @@ class PlannedMotion {
   bool step(Vector3& position);
 
  private:
-  [[nodiscard]] double distance_mm(double time_s);
+  /// Goes on to the phase at a time.
+  void pass_to(double time_s);
+  void take_segment() noexcept;
+  /// No more than what is played in all, or Error(argument).
+  void check_count() const;
 
   Path path_;
   double period_s_;
-  FirStream smoothing_;  // of the Interpolator, here over one sample
   std::shared_ptr<const PlainPlan> plan_;
   PlainPlan::Phases phases_;
   SpeedPhase now_;
   SpeedPhase next_;
   bool has_next_ = false;
-  double duration_s_ = 0.0;
-  std::size_t sample_count_ = 0;
   std::size_t index_ = 0;
-  std::size_t cursor_ = 0;  // on the path
+  // The segment under way, as in Interpolator.
+  std::size_t cursor_ = 0;
+  Segment on_;
+  double on_begin_mm_ = 0.0;
+  double on_end_mm_ = 0.0;
 };
 
 }  // namespace shapegcode
