@@ -1,6 +1,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -15,6 +16,7 @@ using shapegcode::ContourTracker;
 using shapegcode::DeviationStats;
 using shapegcode::make_arc;
 using shapegcode::make_line;
+using shapegcode::nearest_on;
 using shapegcode::Path;
 using shapegcode::PathSide;
 using shapegcode::Segment;
@@ -502,5 +504,62 @@ TEST_CASE("contour: a path that runs over itself is followed on its own pass, ho
         CHECK(seen.tracker == doctest::Approx(seen.search).epsilon(0.05));
       }
     }
+  }
+}
+
+namespace {
+
+// A curve of lines, gently bent or with corners, long and short; `kept`: each ends in a stop, so that none is a plain
+// line and the tracker searches for every foot.
+std::vector<Segment> wandering(std::mt19937& random, double bend_rad, double longest_mm, bool kept) {
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  std::vector<Segment> path;
+  Vector3 at(10.0, -20.0, 5.0);
+  double heading = 0.0;
+  for (int i = 0; i < 400; ++i) {
+    heading += bend_rad * any(random) * (i % 37 == 0 ? 20.0 : 1.0);
+    const double length = longest_mm * (0.55 + 0.45 * any(random));
+    const Vector3 next = at + length * Vector3(std::cos(heading), std::sin(heading), 0.3 * any(random) * bend_rad);
+    path.push_back(make_line(at, next, 20.0));
+    path.back().stop_at_end = kept;
+    at = next;
+  }
+  return path;
+}
+
+}  // namespace
+
+TEST_CASE("contour tracker: where the path runs straight the short way finds the foot of the search, to the last bit") {
+  for (unsigned seed = 0; seed < 24; ++seed) {
+    const double bend = std::array{0.002, 0.02, 0.1, 0.6}[seed % 4];
+    const double longest = std::array{0.02, 0.3, 2.0}[seed % 3];
+    const double shake = std::array{0.0, 0.004, 0.08}[(seed / 4) % 3];
+    CAPTURE(seed);
+    std::mt19937 first(seed);
+    std::mt19937 second(seed);
+    const Path plain(wandering(first, bend, longest, false));
+    const Path kept(wandering(second, bend, longest, true));
+    ContourTracker driver(plain);
+    ContourTracker quick(plain);
+    ContourTracker thorough(kept);
+    std::size_t cursor = 0;
+    bool same = true;
+    const double step = 0.04;
+    for (int k = 0; k * step < plain.length_mm() + 1.0; ++k) {
+      const Vector3 command = plain.point(std::min(k * step, plain.length_mm()), cursor);
+      driver.step(command);
+      const Vector3 p =
+          command + shake * Vector3(std::sin(0.29 * k), std::sin(0.41 * k) * std::cos(0.05 * k), 0.2 * std::sin(k));
+      const double found = quick.step(p, driver);
+      same = same && found == thorough.step(p, driver) && quick.s_mm() == thorough.s_mm() &&
+             quick.segment() == thorough.segment() && quick.side() == thorough.side();
+      double nearest = std::numeric_limits<double>::infinity();
+      for (std::size_t i = quick.segment() < 3 ? 0 : quick.segment() - 3;
+           i < std::min(quick.segment() + 4, plain.size()); ++i) {
+        nearest = std::min(nearest, nearest_on(plain[i], p).distance_mm);
+      }
+      if (bend < 0.1 && k % 7 == 0) CHECK(std::abs(found) == doctest::Approx(nearest).epsilon(1e-6));
+    }
+    CHECK(same);
   }
 }

@@ -208,3 +208,44 @@ TEST_CASE("feed search: a corner that no speed passes within the tolerance is a 
     CHECK((command.grid_mm.row(command.run_ends[i]).transpose() - (*path)[i].end_mm).norm() < 1e-12);
   CHECK(largest_distance(*path, command) < 1.01e-5);
 }
+
+TEST_CASE("feed search: what is given out before it ends is the run that it ends with, or is void") {
+  const PathPointer path = mixed(100.0);
+  const auto all = std::numeric_limits<std::uint32_t>::max();
+  ShapedCommand waited;
+  RegionShaper patient(path, grid_shaper(), {}, options_for(ContourTarget::command, 5.0));
+  REQUIRE(patient.next(waited, all));
+  // A tolerance that the first plan keeps: the same rows, in pieces.
+  RegionShaper early(path, grid_shaper(), {}, options_for(ContourTarget::command, 5.0));
+  early.begin_early();
+  Eigen::Index row = 0;
+  for (ShapedCommand piece; early.next(piece, 100);) {
+    CHECK(piece.grid_mm == waited.grid_mm.middleRows(row, piece.grid_mm.rows()));
+    CHECK(piece.middle_mm == waited.middle_mm.middleRows(row, piece.middle_mm.rows()));
+    row += piece.middle_mm.rows();
+  }
+  CHECK(row == waited.middle_mm.rows());
+  CHECK_FALSE(early.is_withdrawn());
+  CHECK(early.largest_deviation_mm() == patient.largest_deviation_mm());
+  // And given out once more, whole.
+  ShapedCommand again;
+  REQUIRE(early.begin_anew());
+  REQUIRE(early.next(again, all));
+  CHECK(again.grid_mm == waited.grid_mm);
+  CHECK_FALSE(early.begin_anew());
+
+  // One that it does not: withdrawn, then the run that the search finds.
+  RegionShaper careful(path, grid_shaper(), {}, options_for(ContourTarget::command, 0.01));
+  REQUIRE(careful.next(waited, all));
+  RegionShaper hasty(path, grid_shaper(), {}, options_for(ContourTarget::command, 0.01));
+  hasty.begin_early();
+  for (ShapedCommand piece; hasty.next(piece, 10);) {
+  }
+  CHECK(hasty.is_withdrawn());
+  REQUIRE(hasty.begin_anew());
+  CHECK_FALSE(hasty.is_withdrawn());
+  REQUIRE(hasty.next(again, all));
+  CHECK(again.grid_mm == waited.grid_mm);
+  CHECK(hasty.largest_deviation_mm() == careful.largest_deviation_mm());
+  CHECK(hasty.stops() == careful.stops());
+}

@@ -131,12 +131,12 @@ class RegionShaper {
   /// `piece.segment_periods` then holds all marks of the runs that were begun.
   [[nodiscard]] bool next(ShapedCommand& piece, std::uint32_t periods);
   /// To be called before the first piece: pieces are then given out while the search for the feed still measures them,
-  /// where the region is one run, as if its first plan kept the tolerance. Where that turns out to be wrong, next() gives
-  /// false and is_withdrawn() holds: all that was given out is void.
+  /// where the region is one run, as if its first plan kept the tolerance. Where that turns out to be wrong, next()
+  /// gives false and is_withdrawn() holds: all that was given out is void.
   void begin_early() noexcept;
   [[nodiscard]] bool is_withdrawn() const noexcept;
-  /// Gives the region out from its begin again, with the feed that the search then finds; false, and nothing done, if no
-  /// piece was given out early.
+  /// Gives the region out from its begin again, with the feed that the search then finds; false, and nothing done, if
+  /// no piece was given out early.
   bool begin_anew();
   /// Largest deviation in mm of what the target says shall follow the path, as far as the runs given out tell.
   [[nodiscard]] double largest_deviation_mm() const noexcept;

@@ -51,7 +51,8 @@ void FeedSearch::begin_round() {
   deviation_.on_segment.assign(path_->size(), -1.0F);
   deviation_.near_corner.assign(path_->size(), 0.0F);
   deviation_.largest = 0.0F;
-  shaper_ = std::make_unique<RunShaper>(path_, plan_.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
+  shaper_ =
+      std::make_unique<RunShaper>(path_, plan_.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
   row_ = 0;
 }
 
@@ -152,8 +153,8 @@ bool FeedSearch::adjust(bool raise) {
     if (change < 1e-6) {
       continue;  // an arc that begins or ends tangentially is slowed as a whole
     }
-    const double first = std::min({corner_speed_limit(before, segment, limits_),
-                                   segment_speed_limit(segment, limits_), segment_speed_limit(before, limits_)});
+    const double first = std::min({corner_speed_limit(before, segment, limits_), segment_speed_limit(segment, limits_),
+                                   segment_speed_limit(before, limits_)});
     const double passed = std::min(first, static_cast<double>(caps_.at_junction[i]));
     const bool is_curve = change < corner_change;
     adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], is_curve, is_curve ? slowest(first) : 0.0);

@@ -35,8 +35,8 @@ struct PlannedRun {
   RunRows rows;
 };
 
-/// Looks for it: see `plan_within_tolerance`. The rows of the first round may be asked for one by one, by one who cannot
-/// wait until all are measured.
+/// Looks for it: see `plan_within_tolerance`. The rows of the first round may be asked for one by one, by one who
+/// cannot wait until all are measured.
 class FeedSearch {
  public:
   /// `filter` stays the caller's.

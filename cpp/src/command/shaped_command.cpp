@@ -79,9 +79,7 @@ class Run {
   }
 
  private:
-  [[nodiscard]] RunShaper* shaper_now() const noexcept {
-    return search_ != nullptr ? &search_->shaper() : own_.get();
-  }
+  [[nodiscard]] RunShaper* shaper_now() const noexcept { return search_ != nullptr ? &search_->shaper() : own_.get(); }
 
   PlannedRun plan_;
   std::unique_ptr<RunShaper> own_;

@@ -98,12 +98,18 @@ ContourTracker::Piece ContourTracker::bare_piece_of(std::size_t i) const noexcep
     const Vector3& start = path.start_mm(i);
     const Vector3 along = path.start_mm(i + 1) - start;
     const double length = along.norm();
-    if (length > 0.0) return {start, along / length, length, path.distance_mm(i), path.distance_mm(i + 1), -1, false, 0.0};
+    if (length > 0.0)
+      return {start, along / length, length, path.distance_mm(i), path.distance_mm(i + 1), -1, false, 0.0};
   }
   const Segment segment = path[i];
-  Piece piece{segment.start_mm,    tangent_at(segment, 0.0), segment.length_mm,
-              path.distance_mm(i), path.distance_mm(i + 1),  geometry_->arc_of[i],
-             false,               0.0};
+  Piece piece{segment.start_mm,
+              tangent_at(segment, 0.0),
+              segment.length_mm,
+              path.distance_mm(i),
+              path.distance_mm(i + 1),
+              geometry_->arc_of[i],
+              false,
+              0.0};
   // Pieces without length take the direction of the end before them; at the start the one that follows.
   for (std::size_t k = i; !(piece.length > 0.0) && piece.direction.isZero(0.0) && k-- > 0;) {
     const Segment before = path[k];
@@ -320,6 +326,7 @@ void ContourTracker::straighten() noexcept {
 // A stretch grows with the window as far as it runs straight; where it ends, one is begun about each new piece.
 bool ContourTracker::runs_straight(const Window& window) noexcept {
   constexpr double infinite = std::numeric_limits<double>::infinity();
+  if (straight_.about == no_piece) straighten();
   for (;;) {
     Straight& now = straight_;
     while (!now.turns_behind && (now.end <= window.end || now.last <= cursor_)) {
@@ -386,9 +393,9 @@ double ContourTracker::step(const Vector3& p, const ContourTracker& driver) noex
   return follow(p, [&] { return driver.s_ + 2.0 * (p - driver.last_).norm() + reach_mm; });
 }
 
-// Most points lie beside the middle of a piece, or of the next one, of a path that runs straight about them, and then no
-// other piece needs a look: all points within so straight a stretch that lie `t` of path away from the foot, of which
-// `rest` on the foot's own piece, are further off, since t^2 cos^2 - 2 |offset| (t - rest) sin > 0.
+// Most points lie beside the middle of a piece, or of the next one, of a path that runs straight about them, and then
+// no other piece needs a look: all points within so straight a stretch that lie `t` of path away from the foot, of
+// which `rest` on the foot's own piece, are further off, since t^2 cos^2 - 2 |offset| (t - rest) sin > 0.
 template <typename Bound>
 inline double ContourTracker::follow(const Vector3& p, const Bound& bound) noexcept {
   // The sum of the components' sizes bounds the step's length without a square root.
@@ -417,8 +424,8 @@ inline double ContourTracker::follow(const Vector3& p, const Bound& bound) noexc
   const double distance = std::sqrt(offset.squaredNorm());
   const double margin = nearest_share * distance + nearest_margin_mm;
   const double rest = piece->length - along;
-  const bool nearest = along >= 0.0 && rest >= 0.0 && (along >= margin || i == 0) &&
-                       (rest >= margin || i + 1 == pieces());
+  const bool nearest =
+      along >= 0.0 && rest >= 0.0 && (along >= margin || i == 0) && (rest >= margin || i + 1 == pieces());
   const bool grows = distance > deviation_ + 0.25 * move && move > 0.0;
   if (!nearest || (grows && growing_ + 1 >= growing_until_lost)) return follow_any(p, move, window, furthest());
 

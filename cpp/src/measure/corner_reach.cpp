@@ -57,7 +57,7 @@ void CornerReach::step_corners(const Vector3& p, double foot_mm) noexcept {
     largest2_ = std::max(largest2_, corners_[first_].best2);
     ++first_;
   }
-  idle_until_mm_ = first_ < next_ ? 0.0
+  idle_until_mm_ = first_ < next_            ? 0.0
                    : next_ < corners_.size() ? corners_[next_].s - window_mm
                                              : std::numeric_limits<double>::infinity();
   last_ = p;

@@ -58,7 +58,7 @@ class RampStretch {
   std::array<SpeedPhase, 8> phases_;  // a ring: those around the one that comes next
   std::size_t first_ = 0;             // index of the first of them
   std::size_t added_ = 0;             // one behind the last
-  std::size_t at_ = 0;     // phase that comes next
+  std::size_t at_ = 0;                // phase that comes next
   double length_ = 0.0;
   bool ended_ = false;
 };

@@ -48,8 +48,8 @@ Piece PlainPlan::piece_of(const Segment& segment) const noexcept {
   return {segment.length_mm, limit, segment_acceleration(segment, limit, limits_), 0.0};
 }
 
-// A ramp over the whole of a segment takes no less time than what is planned there; under the constant-time law both its
-// ramps may be stretched.
+// A ramp over the whole of a segment takes no less time than what is planned there; under the constant-time law both
+// its ramps may be stretched.
 double PlainPlan::longest_s() const noexcept {
   double sum_s = 0.0;
   for (std::size_t i = 0; i < start_speeds_.size(); ++i) {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
@@ -372,7 +372,7 @@ class RegionWriter:
         return _lines(lines, writer)
 
 
-def _pieces(shaper: _core.RegionShaper) -> Iterator[tuple[_core.ShapedCommand, float, bool]]:
+def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, float, bool]]:
     """The pieces of a region, how much of it they come to, and whether one is the last.
 
     The next one is shaped while one is written: of a region of several pieces in a thread of its own.

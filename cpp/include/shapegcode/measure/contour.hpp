@@ -124,9 +124,9 @@ class ContourTracker {
   /// Lines in a row that all run nearly as the piece in their midst does.
   struct Straight {
     std::size_t about = no_piece;
-    Vector3 direction = Vector3::Zero();  // of that piece
-    std::size_t first = 0, last = 0;      // pieces
-    double begin = 0.0, end = 0.0;        // mm from the path's start; infinite where the path ends
+    Vector3 direction = Vector3::Zero();              // of that piece
+    std::size_t first = 0, last = 0;                  // pieces
+    double begin = 0.0, end = 0.0;                    // mm from the path's start; infinite where the path ends
     bool turns_before = false, turns_behind = false;  // what lies beside them does not run so
   };
 
@@ -254,7 +254,7 @@ class CornerReach {
 
   std::vector<Corner> corners_;
   double idle_until_mm_ = 0.0;  // no corner is near before a foot so far from the path's start
-  std::size_t first_ = 0;  // corners [first_, next_) are near enough to be looked at
+  std::size_t first_ = 0;       // corners [first_, next_) are near enough to be looked at
   std::size_t next_ = 0;
   double largest2_ = 0.0;
   Vector3 last_ = Vector3::Zero();
