@@ -308,8 +308,8 @@ class SectionMetrology {
     SideFigures sides;
     Vector3 last = Vector3::Zero();
     double last_foot = 0.0;
-    /// Deviation of the next point from the path; `moves`: the command does; `up_to_mm`: see ContourTracker.
-    /// `driver`: of the point that drives this one; null: none does.
+    /// Deviation of the next point from the path; `moves`: the command does; `driver`: of the point that drives this
+    /// one, null: none does.
     double step(const Vector3& p, bool moves, const ContourTracker* driver) noexcept;
   };
 
