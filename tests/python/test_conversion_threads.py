@@ -13,7 +13,7 @@ import pytest
 
 import shapegcode as sg
 from shapegcode import _core
-from shapegcode.conversion import convert as module
+from shapegcode.conversion import convert as module, write
 from shapegcode.conversion.ahead import Ahead
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.program import stamp
@@ -55,14 +55,37 @@ def test_what_has_no_room_does_not_depend_on_it_either(monkeypatch: pytest.Monke
     assert (five.text, five.warnings) == (one.text, one.warnings)
 
 
+def test_what_was_written_for_a_feed_that_does_not_hold_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some seconds of slow lines, then a corner that must be slowed: the pieces written before it are void."""
+    monkeypatch.setattr(write, "_PIECE_PERIODS", 64)
+    lines = ["G21 G17 G90 G54", "G00 X0. Y0. Z0.", "G01 X0.1 F600."]
+    lines += [f"X{2.0 * k:.3f} Y{0.001 * (k % 2):.3f}" for k in range(1, 32)]
+    lines += ["X80. F3000.", "Y40.", "X50. Y60.", "M30", ""]
+    withdrawn: list[bool] = []
+    begin_anew = _core.RegionShaper.begin_anew
+
+    def noted(self: _core.RegionShaper) -> bool:
+        withdrawn.append(begin_anew(self))
+        return withdrawn[-1]
+
+    monkeypatch.setattr(_core.RegionShaper, "begin_anew", noted)
+    text = "\n".join(lines)
+    early = converted(text, 2, monkeypatch, **{"tolerance.contour_um": 4.0})
+    assert withdrawn == [True]
+    assert len(early.placed) == 1
+    monkeypatch.setattr(_core.RegionShaper, "begin_early", lambda _self: None)
+    assert converted(text, 2, monkeypatch, **{"tolerance.contour_um": 4.0}).text == early.text
+    assert withdrawn == [True]
+
+
 def test_regions_are_shaped_at_the_same_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two threads meet within the shaping of two regions: neither goes on before the other has begun."""
     meeting = threading.Barrier(2, None, 60.0)
-    write = RegionWriter.write
+    write_region = RegionWriter.write
 
     def both(self: RegionWriter, program: sg.Program, region: _core.Region, *rest: Any) -> Any:
         meeting.wait()
-        return write(self, program, region, *rest)
+        return write_region(self, program, region, *rest)
 
     monkeypatch.setattr(RegionWriter, "write", both)
     assert len(converted(pockets(2), 2, monkeypatch).placed) == 2

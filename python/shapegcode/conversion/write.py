@@ -274,10 +274,8 @@ class RegionWriter:
         shaper.begin_early()
         try:
             return self._write(program, region, shaper, options, room, on_progress)
-        except (_WithdrawnError, NoRoomError):
-            # At the feed that the search ends with it may be another text.
-            if not shaper.begin_anew():
-                raise
+        except _WithdrawnError:
+            shaper.begin_anew()
         return self._write(program, region, shaper, options, room, on_progress)
 
     def _write(
