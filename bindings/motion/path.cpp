@@ -28,8 +28,13 @@ void for_each_point(const Path& path, double step_rad, Take take) {
   }
   constexpr double most_pieces = 1e7;
   if (path.size() > 0) take(path.start_mm(0));
-  for (const Segment& segment : path.segments()) {
-    const double steps = segment.kind == SegmentKind::arc ? std::ceil(std::abs(segment.sweep_rad) / step_rad) : 1.0;
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    if (!path.is_arc(k)) {
+      take(path.end_mm(k));
+      continue;
+    }
+    const Segment segment = path[k];
+    const double steps = std::ceil(std::abs(segment.sweep_rad) / step_rad);
     if (!(steps <= most_pieces)) {
       throw Error(ErrorKind::argument, "an arc in steps of step_rad takes more than 10000000 points");
     }
@@ -136,9 +141,7 @@ void register_path(py::module_& module) {
           "slowest_feed_mm_per_s",
           [](const Path& self) {
             double slowest = std::numeric_limits<double>::infinity();
-            for (const Segment& segment : self.segments()) {
-              slowest = std::min(slowest, segment.feed_mm_per_s);
-            }
+            for (std::size_t i = 0; i < self.size(); ++i) slowest = std::min(slowest, self.feed_mm_per_s(i));
             return slowest;
           },
           "Smallest programmed feed, mm/s; infinity for an empty path.")
@@ -156,9 +159,7 @@ void register_path(py::module_& module) {
           "fastest_feed_mm_per_s",
           [](const Path& self) {
             double fastest = 0.0;
-            for (const Segment& segment : self.segments()) {
-              fastest = std::max(fastest, segment.feed_mm_per_s);
-            }
+            for (std::size_t i = 0; i < self.size(); ++i) fastest = std::max(fastest, self.feed_mm_per_s(i));
             return fastest;
           },
           "Largest programmed feed, mm/s; 0 for an empty path.")

@@ -26,7 +26,8 @@ class Played:
 
     Attributes:
         run: its figures.
-        cut_s: how long all blocks take in it, before any filter, where only their end was played; else 0.
+        cut_s: how much longer all blocks take in it than at 100 %, before any filter, where only their end was played;
+            else 0.
     """
 
     run: _core.PlaybackFigures
@@ -90,7 +91,11 @@ class CasePlayer:
                 command_contour=case.override != 1.0,
                 last_seconds=0.0 if whole else self.model.vibration_memory_s, tracker=self.tracker,
             )  # fmt: skip
-            played[case.name] = Played(run, 0.0 if whole or case.override == 1.0 else self._cut_s(case.override))
+            cut_s = 0.0
+            if not whole and case.override != 1.0:
+                # That at 100 % is taken off it: worked out here, where others need not wait for it.
+                cut_s = self._cut_s(case.override) - self._own_cut_s
+            played[case.name] = Played(run, cut_s)
         return played
 
     def _cut_s(self, override: float) -> float:
@@ -128,7 +133,7 @@ class CasePlayer:
             return CaseFigures(run.residual_mm, Deviation.of([own.command]), response, own.duration_s)
         if whole:
             return case_figures(run)
-        return CaseFigures(run.residual_mm, None, None, own.duration_s + played.cut_s - self._own_cut_s)
+        return CaseFigures(run.residual_mm, None, None, own.duration_s + played.cut_s)
 
 
 def case_figures(run: _core.PlaybackFigures, *, contour: bool = True, response: bool = True) -> CaseFigures:

@@ -172,10 +172,15 @@ class _Run:
         self.program, self.machine, self.budget, self.pool = program, machine, budget, pool
         self.on_progress = on_progress
         self.fixed_period = block_period_s is not None
+        self.model = MachineModel(machine)
+        # Played while the shapers are designed.
+        self.originals = [
+            pool.submit(self.model.play_original, region.path, offset=self.model.offset(region))
+            for region in program.regions
+        ]
         fastest = max((region.path.fastest_feed_mm_per_s for region in program.regions), default=0.0)
         self._grid_for = partial(choose_grid, machine, fastest_mm_per_s=fastest)
         self.grid = self._grid_for(block_period_s)
-        self.model = MachineModel(machine)
         self.writer = TextWriter(program, self.model, self.grid, pool)
         self.judge = Judge(self.model)
         self.reasons = [why_kept(region, machine, self.grid) for region in program.regions]
@@ -183,13 +188,9 @@ class _Run:
         self.room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
         self.kept: dict[int, KeptRegion] = {}
         self.spending = None if budget is None else Spending(budget, program, machine)
-        self.originals = [
-            pool.submit(self.model.play_original, region.path, offset=self.model.offset(region))
-            for region in program.regions
-        ]
-        self.original_s = pool.submit(self.model.cycle_time_s, program.core)
         if budget is None:
             self.writer.begin(self.reasons, self.room_um, self.feed_share)
+        self.original_s = pool.submit(self.model.cycle_time_s, program.core)
 
     def conversion(self, *, shape_all: bool) -> Conversion:
         """Shape, write, read back and judge."""

@@ -405,7 +405,7 @@ def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list
     may take longer than its replacement, and an original longer than its feeds say: neither makes that too fast.
     """
     was_s, now_s = figures.original.duration_s, figures.emitted_s
-    if now_s >= _HASTE * min(was_s, place.region.path.programmed_time_s):
+    if now_s >= _HASTE * was_s or now_s >= _HASTE * place.region.path.programmed_time_s:
         return []
     return [
         f"runs in {now_s:.1f} s instead of {was_s:.1f} s: too slow a feed for blocks of {block_period_s * 1e3:g} ms "
