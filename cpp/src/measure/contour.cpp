@@ -432,7 +432,8 @@ inline double ContourTracker::follow(const Vector3& p, const Bound& bound) noexc
   growing_ = grows ? growing_ + 1 : 0;
   if (i != cursor_) {
     cursor_ = i;
-    if (i >= straight_.last) near_.end = -straight_.end;  // to be looked at anew but at the path's end
+    // The next piece must run straight too, where there is one.
+    if (i >= straight_.last && std::isfinite(straight_.end)) near_.begin = std::numeric_limits<double>::infinity();
   }
   s_ = piece->s + along;
   furthest_ = std::clamp(furthest_, s_, s_ + longest_retreat_mm);

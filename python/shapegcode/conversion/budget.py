@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -151,13 +150,7 @@ class BudgetOutcome:
     given_up: tuple[GivenUp, ...]
 
 
-def measure_load(
-    region: _core.Region,
-    shaped: EmittedRegion,
-    grid: Grid,
-    bits_per_character: float,
-    block_parts: Sequence[bytes] | None = None,
-) -> TransferLoad:
+def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
     """The load of a shaped region; a stretch lasts as long as the shaper: no transition is shorter.
 
     Args:
@@ -165,7 +158,6 @@ def measure_load(
         shaped: its replacement.
         grid: on which it is written.
         bits_per_character: on the serial line.
-        block_parts: those of the replacement, where its text may be handed over meanwhile; None: it still has them.
 
     Returns:
         Bytes, bit/s and blocks/s that it asks for.
@@ -174,27 +166,11 @@ def measure_load(
     np.concatenate(shaped.block_periods, out=durations, casting="same_kind")
     durations *= grid.block_period_s
     stretch = max(grid.duration_s, grid.block_period_s)
-    parts = shaped.block_parts if block_parts is None else block_parts
-    characters = _core.busiest_per_s(durations, _block_bytes(shaped.blocks, parts), stretch)
+    sizes = np.empty(shaped.blocks)
+    np.concatenate(shaped.block_bytes, out=sizes, casting="same_kind")
+    characters = _core.busiest_per_s(durations, sizes, stretch)
     return TransferLoad(
         shaped.text.size - (region.text_end - region.text_begin),
         characters * bits_per_character,
         _core.busiest_per_s(durations, None, stretch),
     )
-
-
-def _block_bytes(blocks: int, parts: Sequence[bytes]) -> FloatArray:
-    """Characters of each block with its line end; comment lines count with the block that follows."""
-    sizes = np.empty(blocks)
-    filled, open_bytes = 0, 0  # blocks that have their size; bytes behind the last of them
-    for part in parts if blocks else ():  # else a region shorter than an increment
-        text = np.frombuffer(part, dtype=np.uint8)
-        ends = np.flatnonzero(text == ord("\n")) + 1
-        begins = np.concatenate([[0], ends[:-1]])
-        last = ends[text[begins] != ord("(")][: blocks - filled]
-        sizes[filled : filled + len(last)] = np.diff(last, prepend=-open_bytes)
-        filled += len(last)
-        open_bytes = len(text) - int(last[-1]) if len(last) else open_bytes + len(text)
-    if filled:
-        sizes[filled - 1] += open_bytes  # comments and N words behind the last block
-    return sizes

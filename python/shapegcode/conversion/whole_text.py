@@ -202,11 +202,11 @@ class TextWriter:
     def _load(self, index: int, region: _core.Region, shaped: EmittedRegion) -> Future[TransferLoad]:
         if index not in self._loads:
             bits = self._machine.controller.dnc_bits_per_character
-            parts = shaped.block_parts  # the text is handed over meanwhile
 
             def measured() -> TransferLoad:
-                load = measure_load(region, shaped, self.grid, bits, parts)
+                load = measure_load(region, shaped, self.grid, bits)
                 shaped.block_periods.clear()  # nobody else asks for them
+                shaped.block_bytes.clear()
                 return load
 
             self._loads[index] = self._pool.submit(measured)

@@ -83,18 +83,15 @@ class EmittedRegion:
         text: whole lines.
         blocks: shaped blocks in it, without the lines around them.
         block_periods: whole block periods that each of them lasts, of each part that holds blocks.
+        block_bytes: likewise the characters of each of them.
         planned_um: deviation of what shall follow the path for which the feed was planned, µm; 0 without a target.
     """
 
     text: RegionText
     blocks: int
     block_periods: list[npt.NDArray[np.uint32]]
+    block_bytes: list[npt.NDArray[np.uint32]]
     planned_um: float
-
-    @property
-    def block_parts(self) -> Sequence[bytes]:
-        """The parts of the text that hold its blocks, before it is handed over."""
-        return self.text.parts()[1:-1]
 
 
 def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
@@ -186,6 +183,31 @@ class _Marks:
                 marks.append(_core.BlockMark(period, number, comment, note.n_digits))
                 breaks.append(period)
         return marks, breaks
+
+
+class _BlockBytes:
+    """Characters of each block with its line end; comment lines count with the block that follows."""
+
+    def __init__(self) -> None:
+        self.parts: list[npt.NDArray[np.uint32]] = []
+        self._open = 0  # behind the last block
+
+    def add(self, part: bytes, blocks: int) -> None:
+        """The next part of a text, and how many blocks it holds."""
+        text = np.frombuffer(part, dtype=np.uint8)
+        ends = np.flatnonzero(text == ord("\n")) + 1
+        begins = np.concatenate([[0], ends[:-1]])
+        last = ends[text[begins] != ord("(")][:blocks] if blocks else ends[:0]
+        self.parts.append(np.diff(last, prepend=-self._open).astype(np.uint32))
+        self._open = len(text) - int(last[-1]) if len(last) else self._open + len(text)
+
+    def end(self) -> list[npt.NDArray[np.uint32]]:
+        """Of each part; comments and N words behind the last block count with it."""
+        for part in reversed(self.parts):
+            if len(part):
+                part[-1] += self._open
+                break
+        return self.parts
 
 
 class RegionWriter:
@@ -292,6 +314,7 @@ class RegionWriter:
         marks = _Marks(program, region.notes)
         texts: list[bytes] = []
         periods: list[npt.NDArray[np.uint32]] = []
+        sizes = _BlockBytes()
         starts: list[list[int]] = []  # of the pieces, in increments
         with closing(_pieces(shaper)) as pieces:
             for piece, share, is_last in pieces:
@@ -307,6 +330,7 @@ class RegionWriter:
                 text, state.motion, state.plane = _core.write_blocks(fitted, starts[-1], here, state)
                 texts.append(text)
                 periods.append(fitted.periods)
+                sizes.add(text, len(fitted.periods))
                 if room is not None:
                     room.require(sum(map(len, texts)), sum(map(len, periods)))
                 on_progress(share)
@@ -317,7 +341,7 @@ class RegionWriter:
         unlock = emission.unlock_lines if emission.override == "lock" else ()
         after = _lines([_restore_line(region, state.motion, state.plane), *unlock, *emission.epilogue], state)
         emitted = RegionText([before, *texts, after])
-        return EmittedRegion(emitted, sum(map(len, periods)), periods, shaper.largest_deviation_mm * 1e3)
+        return EmittedRegion(emitted, sum(map(len, periods)), periods, sizes.end(), shaper.largest_deviation_mm * 1e3)
 
     def _fit(self, region: _core.Region, options: _core.ShapingOptions) -> _core.FitOptions:
         """How shaped motion becomes blocks in the units of a region."""
