@@ -238,23 +238,30 @@ void ModalPlant::forget_nothing() noexcept {
 // The same as of several modes, to the last bit.
 inline void ModalPlant::step_only_mode(std::size_t axis, double jump) noexcept {
   const auto a = static_cast<Eigen::Index>(axis);
-  State& state = states_[first_[axis]];
+  State& stored = states_[first_[axis]];
+  State state = stored;
   state.velocity -= jump;
   const double share2 = state.participation * state.participation;
   const bool may_grow = share2 * state.amplitude2() > surely_below * peak_[a] * peak_[a];
-  if (may_grow && state.reachable() > peak_[a]) look_between(axis);
+  if (may_grow && state.reachable() > peak_[a]) {
+    stored.velocity = state.velocity;
+    look_between(axis);
+  }
   state.propagate();
+  stored.deflection = state.deflection;
+  stored.velocity = state.velocity;
   deflection_[a] = 0.0 + state.participation * state.deflection;
 }
 
 Vector3 ModalPlant::step(const Vector3& command) noexcept {
   if (!place_.empty()) move_to(0.5 * (command_ + command));
+  const Vector3 velocity = (command - command_) * rate_hz_;
+  const Vector3 jumps = velocity - command_velocity_;
+  command_ = command;
+  command_velocity_ = velocity;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
-    const double velocity = (command[a] - command_[a]) * rate_hz_;
-    const double jump = velocity - command_velocity_[a];
-    command_[a] = command[a];
-    command_velocity_[a] = velocity;
+    const double jump = jumps[a];
     const std::size_t first = first_[axis];
     const std::size_t last = first_[axis + 1];
     if (first == last) continue;

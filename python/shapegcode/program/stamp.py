@@ -211,7 +211,9 @@ def _what_counts(lines: bytes) -> bytes:
     """
     if b"(" in lines:
         lines = _ANY_COMMENT.sub(b"", lines)
-    kept = _one_end(b"\n" + lines.translate(_CAPITALS, _BLANKS))
+    if not lines.isupper() or any(blank in lines for blank in _BLANKS):
+        lines = lines.translate(_CAPITALS, _BLANKS)
+    kept = _one_end(b"\n" + lines)
     if b"N" in kept or b"O" in kept or b":" in kept:
         kept = _one_end(_LINE_HEAD.sub(rb"\1", kept))
     return kept.strip()
