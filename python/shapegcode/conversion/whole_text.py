@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from shapegcode import _core
@@ -54,7 +54,7 @@ class Written:
         kept_warnings: a sentence for every region that keeps its text.
         planned_um: per index of a shaped region the deviation that its feed was planned for, µm, where the contour is
             kept by a target.
-        load_tasks: per index of a shaped region what it asks of memory, line and control, under way.
+        loads: per index of a shaped region what it asks of memory, line and control.
         no_room: per index of a region that was to be shaped and keeps its text why there is no room for it.
     """
 
@@ -65,13 +65,8 @@ class Written:
     blocks: int
     kept_warnings: list[str]
     planned_um: dict[int, float]
-    load_tasks: dict[int, Future[TransferLoad]]
+    loads: dict[int, TransferLoad]
     no_room: dict[int, str]
-
-    @property
-    def loads(self) -> dict[int, TransferLoad]:
-        """Per index of a shaped region what it asks of memory, line and control."""
-        return {index: task.result() for index, task in self.load_tasks.items()}
 
     def read_back(self, machine: Machine) -> Program:
         """Read the text and hold it against the original; from then on it stands in the program that is given.
@@ -112,7 +107,7 @@ class TextWriter:
         self._pool = pool
         # By region: tolerance and feed for which it was shaped, and what it came to.
         self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
-        self._loads: dict[int, Future[TransferLoad]] = {}
+        self._loads: dict[int, TransferLoad] = {}
         self._begun: tuple[dict[int, Aim], Ahead[EmittedRegion]] | None = None
 
     def begin(self, reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> None:
@@ -192,24 +187,19 @@ class TextWriter:
                 written.texts.append((shaped.text, begin))
                 if shaped.planned_um > 0.0:
                     written.planned_um[index] = shaped.planned_um
-                written.load_tasks[index] = self._load(index, region, shaped)
+                written.loads[index] = self._load(index, region, shaped)
             line += _lines(texts)
             begin += sum(map(len, texts))
             parts += [between, *texts]
         parts.append(core.slice(position, core.size))
         return replace(written, parts=parts, size=sum(map(len, parts)), blocks=blocks)
 
-    def _load(self, index: int, region: _core.Region, shaped: EmittedRegion) -> Future[TransferLoad]:
+    def _load(self, index: int, region: _core.Region, shaped: EmittedRegion) -> TransferLoad:
         if index not in self._loads:
             bits = self._machine.controller.dnc_bits_per_character
-
-            def measured() -> TransferLoad:
-                load = measure_load(region, shaped, self.grid, bits)
-                shaped.block_periods.clear()  # nobody else asks for them
-                shaped.block_bytes.clear()
-                return load
-
-            self._loads[index] = self._pool.submit(measured)
+            self._loads[index] = measure_load(region, shaped, self.grid, bits)
+            shaped.block_periods.clear()  # nobody else asks for them
+            shaped.block_bytes.clear()
         return self._loads[index]
 
     def _room(self, size: int, moves: int) -> Room:
