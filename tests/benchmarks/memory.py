@@ -9,10 +9,11 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import workload
-from processes import Run, convert
+from processes import ROOM, Run, convert
 
 _MOST_PER_BLOCK = 150  # bytes
 _MOST_MB = 300  # of the program of ten hours
@@ -35,16 +36,19 @@ def main() -> int:
         print(f"each block more: {per_block:.0f} bytes (target {_MOST_PER_BLOCK})")
         missed = per_block > _MOST_PER_BLOCK
         if not arguments.no_hours:
-            hours = _converted(folder, _HOURS_LINES, scale=_HOURS_SCALE)
+            # The moves around the cut count too. There is no room for its shaped text, which has more blocks.
+            hours = _converted(folder, _HOURS_LINES, {"controller.max_program_moves": _HOURS_LINES + 10}, _HOURS_SCALE)
+            roomy = _converted(folder, _HOURS_LINES, ROOM, _HOURS_SCALE)
             print(f"ten hours, {_HOURS_LINES} lines: {hours.peak_mb:.0f} MB (target {_MOST_MB}), {hours.wall_s:.0f} s")
+            print(f"the same with room for its shaped text: {roomy.peak_mb:.0f} MB, {roomy.wall_s:.0f} s")
             missed = missed or hours.peak_mb > _MOST_MB
     return 1 if missed else 0
 
 
-def _converted(folder: Path, lines: int, *, scale: float = 1.0) -> Run:
+def _converted(folder: Path, lines: int, values: Mapping[str, int] = ROOM, scale: float = 1.0) -> Run:
     program = folder / f"{lines}.nc"
     workload.write_program(program, lines, scale=scale)
-    return convert(program, folder / "shaped.nc")
+    return convert(program, folder / "shaped.nc", values)
 
 
 if __name__ == "__main__":

@@ -64,10 +64,10 @@ class Rs274:
 ROOM = {"controller.max_program_moves": 10**8, "controller.max_program_bytes": 4 * 10**9}
 
 
-def convert(program: Path, output: Path) -> Run:
-    """`shapegcode convert` for the built-in VX500, with round trip and plant."""
+def convert(program: Path, output: Path, values: Mapping[str, int] = ROOM) -> Run:
+    """`shapegcode convert` for the built-in VX500 with some values moved, with round trip and plant."""
     command = [Path(sys.executable).with_name("shapegcode"), "convert", program, "-m", "vx500", "-o", output]
-    command += [word for key, value in ROOM.items() for word in ("--set", f"{key}={value}")]
+    command += [word for key, value in values.items() for word in ("--set", f"{key}={value}")]
     return launched(command, os.environ, accepted=(0, 1))  # 1: written, but out of tolerance
 
 
