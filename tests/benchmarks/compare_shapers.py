@@ -24,10 +24,10 @@ import shapegcode as sg
 from shapegcode import _core
 from shapegcode.cli.console import progress
 from shapegcode.conversion import convert as converter
-from shapegcode.conversion.readback import Placed
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping import design, machine_bands
 from shapegcode.shaping.grid import Grid, choose_grid, make_grid
+from shapegcode.verdict.placed import Placed
 
 _ROOT = Path(__file__).resolve().parents[2]
 _GOLDEN = _ROOT / "tests" / "golden" / "programs"

@@ -15,10 +15,10 @@ import workload
 
 import shapegcode as sg
 from shapegcode import _core
-from shapegcode.conversion.case_player import BLOCK_ENDS
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import choose_grid
+from shapegcode.verdict.case_player import BLOCK_ENDS
 
 _HEAD = b"%\nO0001\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\n"
 

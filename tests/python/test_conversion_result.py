@@ -11,11 +11,11 @@ import pytest
 
 import shapegcode as sg
 from acceptance import machine_with
-from shapegcode.conversion.figures import RegionVerdict
 from shapegcode.conversion.rests import RestsOn
 from shapegcode.conversion.tables import BeforeAfter, case_table, rests_table
 from shapegcode.results.json import schema
 from shapegcode.results.result import Pair, Xyz
+from shapegcode.verdict.figures import RegionVerdict
 
 PART = "%\nO1\nG21G17G90G94\nG54G00X0Y0Z0\nG01X20.F6000\nG03X40.Y20.I0J20.\nG01Y40.\nM30\n%\n"
 TWO = PART.replace("M30", "G00X0Y0\nG01X30.F3000\nM30")

@@ -174,6 +174,7 @@ PACKAGE_FOLDERS = [
     "program",
     "model",
     "shaping",
+    "verdict",
     "simulation",
     "timing",
     "checking",

@@ -17,10 +17,10 @@ from scipy.signal import lsim
 
 import shapegcode as sg
 from shapegcode.cli import main
-from shapegcode.conversion.cases import stated_cases
 from shapegcode.results import plot as canvas
 from shapegcode.results.json import schema
 from shapegcode.shaping.bands import machine_bands
+from shapegcode.verdict.cases import stated_cases
 
 FloatArray = npt.NDArray[np.float64]
 PERIOD_S = 1.0 / 2048.0

@@ -18,10 +18,10 @@ from acceptance import Judged, close, convert, machine_with
 from judge import Mode, Move, contour_error_um, durations, play, residual_um, response, starts
 from judge.player import BlockEnd, moving_average
 from shapegcode.cli import main
-from shapegcode.conversion.cases import CaseFigures, RegionLimits, judge_region, stated_cases
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.figures import Deviation
 from shapegcode.shaping import choose_shaper
+from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region, stated_cases
 
 Vector = npt.NDArray[np.float64]
 TICK = 0.001

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.judge import RegionFigures
+from shapegcode.verdict.judge import RegionFigures
 
 __all__ = ["KeptRegion", "gain_um", "most_to_gain_um", "summary"]
 

@@ -13,15 +13,6 @@ from shapegcode import _core
 from shapegcode.conversion.ahead import cores
 from shapegcode.conversion.benefit import KeptRegion, gain_um, most_to_gain_um
 from shapegcode.conversion.budget import Budget
-from shapegcode.conversion.figures import (
-    AppliedLimits,
-    BlockCount,
-    FollowingShapers,
-    GridTaps,
-    PlayedFigures,
-    UsedShaper,
-)
-from shapegcode.conversion.judge import Judge, RegionFigures
 from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids
 from shapegcode.conversion.rests import Begun, RestsOn, begin_rests, rests_on
@@ -38,6 +29,15 @@ from shapegcode.program.compensation import read_for_conversion, require_decisio
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid, choose_grid
+from shapegcode.verdict.figures import (
+    AppliedLimits,
+    BlockCount,
+    FollowingShapers,
+    GridTaps,
+    PlayedFigures,
+    UsedShaper,
+)
+from shapegcode.verdict.judge import Judge, RegionFigures
 
 __all__ = ["convert"]
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from itertools import chain
 
 from shapegcode.conversion.budget import TransferLoad
-from shapegcode.conversion.figures import PlayedFigures
-from shapegcode.conversion.readback import Placed
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.operating import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK, no_room
 from shapegcode.results.table import Column, Table
+from shapegcode.verdict.figures import PlayedFigures
+from shapegcode.verdict.placed import Placed
 
 __all__ = ["ControlNote", "at_the_control", "control_table"]
 

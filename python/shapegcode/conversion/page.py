@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from shapegcode.conversion.figures import CaseVerdict
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled_result import ScheduledConversion
 from shapegcode.conversion.tables import before_after_table, rests_table
@@ -25,6 +24,7 @@ from shapegcode.results.page.model import (
     Section,
 )
 from shapegcode.results.table import Column, Table
+from shapegcode.verdict.figures import CaseVerdict
 
 __all__ = ["light_of", "sections_of"]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from shapegcode import _core
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
+from shapegcode.verdict.placed import Placed
 
 _LARGEST_SWEEP_RAD = math.pi / 2
 
@@ -20,30 +20,6 @@ _STATE_FIELDS = (
     "motion", "plane", "distance", "feed_mode", "units", "compensation", "length_offset",
     "cycle", "cycle_return", "coordinate_system", "exact_stop", "feed",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A region and where its shaped blocks stand in the emitted text.
-
-    Attributes:
-        region: of the original program.
-        first_line: first emitted line, from 1.
-        last_line: last emitted line.
-    """
-
-    region: _core.Region
-    first_line: int
-    last_line: int
-
-    @property
-    def original_lines(self) -> tuple[int, int]:
-        """First and last line of the region in the original program."""
-        return self.region.first_line, self.region.last_line
-
-    def blocks(self, emitted: Program) -> _core.Path:
-        """The shaped blocks as they were read back."""
-        return emitted.core.cutting_path(self.first_line, self.last_line)
 
 
 def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) -> Program:

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from itertools import islice
 
 from shapegcode import _core
-from shapegcode.conversion.case_player import case_figures
-from shapegcode.conversion.cases import Case, CaseFigures, Judged, RegionLimits, judge_region
-from shapegcode.conversion.judge import Judge, RegionFigures
-from shapegcode.conversion.readback import Placed
 from shapegcode.errors import MachineError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.settings.keys import KeyValue
+from shapegcode.verdict.case_player import case_figures
+from shapegcode.verdict.cases import Case, CaseFigures, Judged, RegionLimits, judge_region
+from shapegcode.verdict.judge import Judge, RegionFigures
+from shapegcode.verdict.placed import Placed
 
 __all__ = ["LEAST_SHARE", "RestsOn", "UnknownAxis", "begin_rests", "rests_on", "unknown_axes"]
 

@@ -8,10 +8,8 @@ from typing import Any, ClassVar
 
 from shapegcode.conversion.benefit import KeptRegion
 from shapegcode.conversion.budget import BudgetOutcome
-from shapegcode.conversion.figures import AppliedLimits, BlockCount, PlayedFigures, UsedShaper
 from shapegcode.conversion.operating import ControlNote, control_table
 from shapegcode.conversion.rapids.result import RapidsOutcome
-from shapegcode.conversion.readback import Placed
 from shapegcode.conversion.rests import RestsOn
 from shapegcode.conversion.tables import (
     BeforeAfter,
@@ -30,6 +28,8 @@ from shapegcode.results.made import Made
 from shapegcode.results.page.model import Light, Page, Section
 from shapegcode.results.result import Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table
+from shapegcode.verdict.figures import AppliedLimits, BlockCount, PlayedFigures, UsedShaper
+from shapegcode.verdict.placed import Placed
 
 __all__ = ["Conversion"]
 

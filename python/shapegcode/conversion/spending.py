@@ -13,10 +13,10 @@ from typing import Protocol
 
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget, BudgetOutcome, GivenUp, TextNeeds, TransferLoad
-from shapegcode.conversion.figures import RegionVerdict
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.shaping.grid import Grid
+from shapegcode.verdict.figures import RegionVerdict
 
 __all__ = ["Spending", "keepable"]
 

@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shapegcode.conversion.figures import CaseVerdict
 from shapegcode.conversion.rests import RestsOn
 from shapegcode.results.table import NO_BREAK, Column, Table
+from shapegcode.verdict.figures import CaseVerdict
 
 __all__ = ["BeforeAfter", "before_after_table", "case_table", "change_percent", "percent", "rests_table"]
 

@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from shapegcode.conversion.figures import PlayedFigures
-from shapegcode.conversion.readback import Placed
 from shapegcode.machine import Machine
 from shapegcode.machine.controller import Controller
 from shapegcode.machine.output import Tolerance
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.program.operating import no_room
+from shapegcode.verdict.figures import PlayedFigures
+from shapegcode.verdict.placed import Placed
 
 __all__ = ["open_axes", "played_warnings", "text_warnings"]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from shapegcode import _core
 from shapegcode.conversion.ahead import Ahead, OnShare, cores
 from shapegcode.conversion.budget import TransferLoad, measure_load
-from shapegcode.conversion.readback import Placed, read_back
+from shapegcode.conversion.readback import read_back
 from shapegcode.conversion.spending import keepable
 from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionText, RegionWriter, Room
 from shapegcode.machine import Machine
@@ -18,6 +18,7 @@ from shapegcode.model.shaped_program import stamp_of_machine
 from shapegcode.program import Program
 from shapegcode.program.compensation import guard_lines, header_lines
 from shapegcode.shaping.grid import Grid
+from shapegcode.verdict.placed import Placed
 
 __all__ = ["TextWriter", "Written", "why_kept"]
 

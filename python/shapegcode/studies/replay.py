@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.cases import CaseFigures, RegionLimits, judge_region
 from shapegcode.conversion.convert import convert
-from shapegcode.conversion.judge import Judge, RegionFigures
 from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.program.compensation import read_for_conversion
 from shapegcode.results.figures import Deviation
+from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
+from shapegcode.verdict.judge import Judge, RegionFigures
 
 __all__ = ["CONTOURS", "DEFAULT_MEASURES", "MEASURES", "SHARE", "Replay", "checked_measures"]
 

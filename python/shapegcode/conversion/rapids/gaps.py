@@ -9,10 +9,10 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 
 from shapegcode import _core
-from shapegcode.conversion.figures import RegionVerdict
 from shapegcode.conversion.rapids.candidates import Gap, Rapid
 from shapegcode.conversion.rapids.plant import RapidPlant, Timing
 from shapegcode.conversion.write import EmittedRegion
+from shapegcode.verdict.figures import RegionVerdict
 
 __all__ = ["NO_GAIN", "Choice", "OpenGap"]
 

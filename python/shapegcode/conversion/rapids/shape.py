@@ -17,13 +17,12 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget, measure_load
-from shapegcode.conversion.judge import Judge
 from shapegcode.conversion.rapids.candidates import NO_CUT, find_gaps
 from shapegcode.conversion.rapids.gaps import NO_GAIN, Choice, OpenGap
 from shapegcode.conversion.rapids.plant import RapidPlant
 from shapegcode.conversion.rapids.result import RapidMove, RapidsOutcome
 from shapegcode.conversion.rapids.splice import original_line, splice
-from shapegcode.conversion.readback import Placed, read_back
+from shapegcode.conversion.readback import read_back
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
@@ -31,6 +30,8 @@ from shapegcode.program import Program, least_increment_mm
 from shapegcode.program.stamp import RAPID_MARK
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
+from shapegcode.verdict.judge import Judge
+from shapegcode.verdict.placed import Placed
 
 __all__ = ["ShapedRapids", "shape_rapids"]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shapegcode.conversion.rapids.gaps import Choice
-from shapegcode.conversion.readback import Placed
+from shapegcode.verdict.placed import Placed
 
 __all__ = ["Spliced", "original_line", "splice"]
 

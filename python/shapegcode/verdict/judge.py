@@ -12,8 +12,12 @@ from typing import TypeVar
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.case_player import BLOCK_ENDS, CasePlayer, Played
-from shapegcode.conversion.cases import (
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.program import Program, least_increment_mm
+from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_xyz_um
+from shapegcode.results.result import Pair, Xyz
+from shapegcode.verdict.case_player import BLOCK_ENDS, CasePlayer, Played
+from shapegcode.verdict.cases import (
     ALL_MODES,
     Case,
     CaseFigures,
@@ -23,7 +27,7 @@ from shapegcode.conversion.cases import (
     region_misses,
     stated_cases,
 )
-from shapegcode.conversion.figures import (
+from shapegcode.verdict.figures import (
     CaseVerdict,
     FeedExcess,
     FrequencyResidual,
@@ -32,11 +36,7 @@ from shapegcode.conversion.figures import (
     RegionVerdict,
     worst_counted,
 )
-from shapegcode.conversion.readback import Placed
-from shapegcode.model.machine_model import MachineModel
-from shapegcode.program import Program, least_increment_mm
-from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_xyz_um
-from shapegcode.results.result import Pair, Xyz
+from shapegcode.verdict.placed import Placed
 
 __all__ = ["OVERRIDES", "Judge", "RegionFigures"]
 

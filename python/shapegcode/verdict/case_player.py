@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.cases import ALL_MODES, Case, CaseFigures, Target
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset
 from shapegcode.results.figures import Deviation
+from shapegcode.verdict.cases import ALL_MODES, Case, CaseFigures, Target
 
 __all__ = ["BLOCK_ENDS", "CasePlayer", "case_figures"]
 

@@ -1,0 +1,1 @@
+"""Programs simulated under operating conditions and judged: every cut, shaped or left unchanged."""
