@@ -129,6 +129,8 @@ void register_path(py::module_& module) {
             return self[static_cast<std::size_t>(i)];
           },
           py::arg("index"), "Segment at an index.")
+      .def("moves_as", &Path::moves_as, py::arg("other"),
+           "Whether the motion is the same: geometry, feeds and stops, whatever lines they come from.")
       .def_property_readonly("length_mm", &Path::length_mm, "Whole length, mm.")
       .def_property_readonly(
           "start_mm", [](const Path& self) { return self.size() > 0 ? self.start_mm(0) : Vector3(Vector3::Zero()); },

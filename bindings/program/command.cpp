@@ -122,9 +122,39 @@ Returns:
       .def_property_readonly("is_withdrawn", &RegionShaper::is_withdrawn, "Whether what was given out is void.")
       .def_property_readonly("largest_deviation_mm", &RegionShaper::largest_deviation_mm,
                              "Largest deviation of what shall follow the path, as far as given out, mm.")
+      .def_property_readonly("is_slowed", &RegionShaper::is_slowed,
+                             "Whether any run given out is slower than without a tolerance; without a target always.")
       .def_property_readonly("share", &RegionShaper::share, "How much of the region was given out, 0 to 1.")
       .def_property_readonly("stops", &RegionShaper::stops,
                              "Stops at corners that no speed passes within the tolerance.");
+
+  module.def(
+      "plan_tolerances",
+      [](const std::shared_ptr<Path>& path, const Fir& shaper, const ShapingOptions& options,
+         const std::vector<double>& tolerances_mm) {
+        std::vector<PlannedTolerance> planned;
+        {
+          const py::gil_scoped_release release;
+          planned = plan_tolerances(path, shaper, options, tolerances_mm);
+        }
+        std::vector<std::pair<double, double>> pairs;
+        for (const PlannedTolerance& each : planned) pairs.emplace_back(each.duration_s, each.deviation_mm);
+        return pairs;
+      },
+      py::arg("path").none(false), py::arg("shaper"), py::arg("options"), py::arg("tolerances_mm"),
+      R"(The time that a region takes at several contour tolerances, without giving it out.
+
+Args:
+    path: The programmed path.
+    shaper: Taps in whole block periods, common to all axes.
+    options: How the region is shaped; its own contour tolerance does not count.
+    tolerances_mm: Descending is fastest, as each search starts from the speeds of the one before; infinity: no slowing.
+
+Returns:
+    For each tolerance the duration of the shaped command, s, and the largest deviation of what shall follow the path, mm.
+
+Raises:
+    ArgumentError: As RegionShaper.)");
 
   py::class_<ContourSolver>(module, "ContourSolver",
                             R"(Correction of a command before shaping that brings the shaped command back to the path.

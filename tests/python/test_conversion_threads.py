@@ -14,10 +14,10 @@ import pytest
 import shapegcode as sg
 from shapegcode import _core
 from shapegcode.conversion import convert as module, write
-from shapegcode.conversion.ahead import Ahead
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.program import stamp
 from shapegcode.results.json import plain
+from shapegcode.verdict.ahead import Ahead
 
 
 def pockets(count: int) -> str:

@@ -114,6 +114,12 @@ struct ShapedCommand {
       segment_periods;  ///< per marked segment: period of the region in which its begin is reached
 };
 
+/// What a region takes at a contour tolerance.
+struct PlannedTolerance {
+  double duration_s = 0.0;    ///< of the shaped command, before any filter behind it
+  double deviation_mm = 0.0;  ///< largest, of what shall follow the path; 0 without a target
+};
+
 /// Splits the path at forced stops, plans each run from rest to rest, samples it at half the block period, shapes it
 /// with `shaper` (taps in whole block periods, common to all axes) and puts the runs behind one another. Pieces of a
 /// bounded number of periods, so that memory does not grow with the region.
@@ -140,16 +146,29 @@ class RegionShaper {
   bool begin_anew();
   /// Largest deviation in mm of what the target says shall follow the path, as far as the runs given out tell.
   [[nodiscard]] double largest_deviation_mm() const noexcept;
+  /// Whether any run given out is slower than without a tolerance; without a target always.
+  [[nodiscard]] bool is_slowed() const noexcept;
   /// How much of the region was given out, 0 to 1: by segments, within a run by its periods.
   [[nodiscard]] double share() const noexcept;
   /// Junctions that no speed passes within the tolerance: stops beside the forced ones.
   [[nodiscard]] std::uint32_t stops() const noexcept;
 
  private:
+  friend std::vector<PlannedTolerance> plan_tolerances(const std::shared_ptr<const Path>& path, const Fir& shaper,
+                                                       const ShapingOptions& options,
+                                                       std::span<const double> tolerances_mm);
+
   struct State;
 
   std::unique_ptr<State> state_;
 };
+
+/// The time of a region at several contour tolerances, without giving it out. Each search for the feed starts from the
+/// speeds of the tolerance before, so descending tolerances cost few rounds each; infinity: nothing is slowed. They
+/// replace `options.tolerance.contour_tolerance_mm`. Throws as RegionShaper does.
+[[nodiscard]] std::vector<PlannedTolerance> plan_tolerances(const std::shared_ptr<const Path>& path, const Fir& shaper,
+                                                            const ShapingOptions& options,
+                                                            std::span<const double> tolerances_mm);
 
 /// The whole region in one piece; see RegionShaper.
 [[nodiscard]] ShapedCommand shape_path(const std::shared_ptr<const Path>& path, const Fir& shaper,

@@ -93,6 +93,9 @@ class Path {
   /// Whether it is a line that ends where the next one starts.
   [[nodiscard]] bool is_plain(std::size_t i) const noexcept { return data_->places[i].kept == 0; }
 
+  /// Whether the motion is the same: geometry, feeds and stops, whatever lines they come from.
+  [[nodiscard]] bool moves_as(const Path& other) const noexcept;
+
   /// Position at `s_mm` from the start. `cursor` is the segment index of the previous call: amortised O(1) on a
   /// monotonous walk, and real-time safe.
   [[nodiscard]] Vector3 point(double s_mm, std::size_t& cursor) const noexcept;

@@ -65,7 +65,7 @@ bool FeedSearch::next(Vector3& position) {
 PlannedRun FeedSearch::measured() {
   if (!shaper_) begin_round();
   const std::size_t rows = 2 * static_cast<std::size_t>(shaper_->periods()) + 1;
-  const bool keeps = row_ == 0 && rows <= most_rows_kept;
+  const bool keeps = keeps_rows_ && row_ == 0 && rows <= most_rows_kept;
   Vector3 position;
   while (row_ < rows) {
     const std::size_t row = row_;
@@ -87,6 +87,7 @@ PlannedRun FeedSearch::run() {
     last = measured();
     const bool within = last.largest_deviation_mm <= tolerance_;
     if (within && round == 0) return last;  // nothing was slowed, so nothing can be raised
+    is_slowed_ = true;
     if (within && (!best.profile || last.profile->duration_s() < best.profile->duration_s())) {
       RunRows rows = std::move(last.rows);
       best = last;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "command/run_corrector.hpp"
@@ -43,12 +44,20 @@ class FeedSearch {
   FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
              std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s);
 
+  /// To be called before the first round: starts from these speeds, one per segment, of the same path.
+  void start_from(SpeedCaps caps) noexcept { caps_ = std::move(caps); }
+  /// To be called before the first round: the run itself is not wanted, only its plan.
+  void keep_no_rows() noexcept { keeps_rows_ = false; }
   /// Plans the next round.
   void begin_round();
   /// Of the round that was begun.
   [[nodiscard]] const PlannedRun& plan() const noexcept { return plan_; }
   [[nodiscard]] RunShaper& shaper() noexcept { return *shaper_; }
   [[nodiscard]] double largest_deviation_mm() const noexcept { return deviation_.largest; }
+  /// Whether the first round left the tolerance; to be asked behind run().
+  [[nodiscard]] bool is_slowed() const noexcept { return is_slowed_; }
+  /// Speeds of the last round that was planned.
+  [[nodiscard]] const SpeedCaps& caps() const noexcept { return caps_; }
   /// Its next row, of 2*periods()+1; false if the run has left the tolerance: it is then not the one looked for. One
   /// that never leaves it is.
   bool next(Vector3& position);
@@ -73,6 +82,8 @@ class FeedSearch {
   PlannedRun plan_;  // of the round under way, with its shaper
   std::unique_ptr<RunShaper> shaper_;
   std::size_t row_ = 0;  // rows of it that were measured
+  bool keeps_rows_ = true;
+  bool is_slowed_ = false;
 };
 
 /// The highest feed at which a run keeps the contour tolerance: planned at full speed, shaped, measured, and slowed

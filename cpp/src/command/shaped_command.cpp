@@ -23,6 +23,19 @@ std::shared_ptr<const Path> sub_path(const std::shared_ptr<const Path>& path, st
   return std::make_shared<const Path>(path->segments().part(first, last - first));
 }
 
+SpeedCaps part_of(const SpeedCaps& caps, std::size_t first, std::size_t last) {
+  const auto cut = [&](const std::vector<float>& all) {
+    return std::vector<float>(all.begin() + static_cast<std::ptrdiff_t>(first),
+                              all.begin() + static_cast<std::ptrdiff_t>(last));
+  };
+  return {cut(caps.on_segment), cut(caps.at_junction)};
+}
+
+void put_part(const SpeedCaps& part, std::size_t first, SpeedCaps& caps) {
+  std::ranges::copy(part.on_segment, caps.on_segment.begin() + static_cast<std::ptrdiff_t>(first));
+  std::ranges::copy(part.at_junction, caps.at_junction.begin() + static_cast<std::ptrdiff_t>(first));
+}
+
 // The rows of a piece; a piece without periods has the one row on which it rests.
 void put(const std::vector<Vector3>& grid, const std::vector<Vector3>& middle, const Vector3& at,
          ShapedCommand& piece) {
@@ -95,6 +108,9 @@ struct RegionShaper::State {
 
   [[nodiscard]] bool next(ShapedCommand& piece, std::uint32_t periods);
   [[nodiscard]] bool begin_run();
+  [[nodiscard]] std::unique_ptr<FeedSearch> search_of(const std::shared_ptr<const Path>& part) const;
+  [[nodiscard]] PlannedRun plan_run();
+  [[nodiscard]] PlannedTolerance plan_only(SpeedCaps& caps);
   void begin_anew();
   void note_marks(const PlannedRun& run);
   [[nodiscard]] double share() const noexcept;
@@ -114,6 +130,7 @@ struct RegionShaper::State {
   Piece now_{0, 0};
   std::unique_ptr<FeedSearch> search_;  // of a run that is given out early, or was; refers to the filter above
   std::unique_ptr<Run> run_;            // likewise
+  SpeedCaps* start_caps_ = nullptr;     // of a plan without rows: where the search starts and what it comes to
   bool early_ = false;
   bool withdrawn_ = false;
   std::uint32_t given_ = 0;       // periods of the run given out
@@ -123,6 +140,7 @@ struct RegionShaper::State {
   std::vector<std::uint32_t> segment_periods_;
   double largest_deviation_mm_ = 0.0;
   std::uint32_t stops_ = 0;
+  bool is_slowed_ = false;
 };
 
 RegionShaper::State::State(std::shared_ptr<const Path> path, const Fir& shaper,
@@ -169,35 +187,54 @@ bool RegionShaper::State::begin_run() {
   if (pieces_.empty()) {
     return false;
   }
-  PlannedRun plan;
-  const auto search_of = [&](const std::shared_ptr<const Path>& part) {
-    return std::make_unique<FeedSearch>(part, options_.limits, filter_, steps_per_half_,
-                                        options_.tolerance.contour_tolerance_mm, options_.least_feed_mm_per_s);
-  };
+  if (early_) {
+    now_ = pieces_.back();
+    pieces_.pop_back();
+    search_ = search_of(sub_path(path_, now_.first, now_.last));
+    run_ = std::make_unique<Run>(*search_);
+    given_ = 0;
+    withdrawn_ = !run_->next(at_);
+    note_marks(run_->plan());
+    return true;
+  }
+  PlannedRun plan = plan_run();
+  largest_deviation_mm_ = std::max(largest_deviation_mm_, plan.largest_deviation_mm);
+  run_ = std::make_unique<Run>(std::move(plan), filter_, run_limits(options_.limits), steps_per_half_);
+  given_ = 0;
+  run_->next(at_);
+  note_marks(run_->plan());
+  return true;
+}
+
+std::unique_ptr<FeedSearch> RegionShaper::State::search_of(const std::shared_ptr<const Path>& part) const {
+  return std::make_unique<FeedSearch>(part, options_.limits, filter_, steps_per_half_,
+                                      options_.tolerance.contour_tolerance_mm, options_.least_feed_mm_per_s);
+}
+
+// The next run; where it must be split at corners, the rest stays among the pieces.
+PlannedRun RegionShaper::State::plan_run() {
   for (;;) {
     now_ = pieces_.back();
     pieces_.pop_back();
     const auto part = sub_path(path_, now_.first, now_.last);
-    if (early_) {
-      search_ = search_of(part);
-      run_ = std::make_unique<Run>(*search_);
-      given_ = 0;
-      withdrawn_ = !run_->next(at_);
-      note_marks(run_->plan());
-      return true;
-    }
     if (options_.target == ContourTarget::none) {
-      plan = {part,
+      is_slowed_ = true;  // nobody asks by how much
+      return {part,
               std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits, options_.tolerance)),
               0.0,
               {},
               {}};
-      break;
     }
     const std::unique_ptr<FeedSearch> search = search_ ? std::move(search_) : search_of(part);
-    plan = search->run();
+    if (start_caps_ != nullptr) {
+      search->keep_no_rows();
+      search->start_from(part_of(*start_caps_, now_.first, now_.last));
+    }
+    PlannedRun plan = search->run();
+    is_slowed_ = is_slowed_ || search->is_slowed();
     if (plan.stops.empty()) {
-      break;
+      if (start_caps_ != nullptr) put_part(search->caps(), now_.first, *start_caps_);
+      return plan;
     }
     stops_ += static_cast<std::uint32_t>(plan.stops.size());
     std::size_t last = now_.last;
@@ -207,18 +244,27 @@ bool RegionShaper::State::begin_run() {
     }
     pieces_.push_back({now_.first, last});
   }
-  largest_deviation_mm_ = std::max(largest_deviation_mm_, plan.largest_deviation_mm);
-  run_ = std::make_unique<Run>(std::move(plan), filter_, run_limits(options_.limits), steps_per_half_);
-  given_ = 0;
-  run_->next(at_);
-  note_marks(run_->plan());
-  return true;
+}
+
+// The time of the region without its rows. `caps`: where each search starts; then what it came to.
+PlannedTolerance RegionShaper::State::plan_only(SpeedCaps& caps) {
+  start_caps_ = &caps;
+  std::size_t periods = 0;
+  PlannedTolerance planned;
+  while (!pieces_.empty()) {
+    const PlannedRun plan = plan_run();
+    planned.deviation_mm = std::max(planned.deviation_mm, plan.largest_deviation_mm);
+    periods += RunShaper(plan.path, plan.profile, filter_, run_limits(options_.limits), steps_per_half_).periods();
+    if (!pieces_.empty()) periods += rest_periods_;
+  }
+  planned.duration_s = static_cast<double>(periods) * options_.block_period_s;
+  return planned;
 }
 
 void RegionShaper::State::begin_anew() {
   run_.reset();
   pieces_ = {{0, path_->size()}};
-  early_ = withdrawn_ = false;
+  early_ = withdrawn_ = is_slowed_ = false;
   given_ = resting_ = period_ = stops_ = 0;
   largest_deviation_mm_ = 0.0;
   segment_periods_.clear();
@@ -329,9 +375,30 @@ bool RegionShaper::begin_anew() {
 
 double RegionShaper::largest_deviation_mm() const noexcept { return state_->largest_deviation_mm_; }
 
+bool RegionShaper::is_slowed() const noexcept { return state_->is_slowed_; }
+
 double RegionShaper::share() const noexcept { return state_->share(); }
 
 std::uint32_t RegionShaper::stops() const noexcept { return state_->stops_; }
+
+std::vector<PlannedTolerance> plan_tolerances(const std::shared_ptr<const Path>& path, const Fir& shaper,
+                                              const ShapingOptions& options, std::span<const double> tolerances_mm) {
+  constexpr float none = std::numeric_limits<float>::infinity();
+  SpeedCaps caps{std::vector<float>(path->size(), none), std::vector<float>(path->size(), none)};
+  std::vector<PlannedTolerance> planned;
+  planned.reserve(tolerances_mm.size());
+  ShapingOptions each = options;
+  for (const double tolerance_mm : tolerances_mm) {
+    if (!planned.empty() && tolerance_mm <= each.tolerance.contour_tolerance_mm &&
+        planned.back().deviation_mm <= tolerance_mm && options.target != ContourTarget::none) {
+      planned.push_back(planned.back());  // what kept a larger one already
+      continue;
+    }
+    each.tolerance.contour_tolerance_mm = tolerance_mm;
+    planned.push_back(RegionShaper::State(path, shaper, {}, each).plan_only(caps));
+  }
+  return planned;
+}
 
 ShapedCommand shape_path(const std::shared_ptr<const Path>& path, const Fir& shaper,
                          std::span<const std::uint32_t> marked_segments, const ShapingOptions& options) {

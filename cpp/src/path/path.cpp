@@ -91,6 +91,28 @@ void Path::seek(double s_mm, std::size_t& cursor) const noexcept {
   }
 }
 
+bool Path::moves_as(const Path& other) const noexcept {
+  if (data_ == other.data_) return true;
+  if (size() != other.size()) return false;
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (is_plain(i) && other.is_plain(i)) {
+      if (start_mm(i) != other.start_mm(i) || end_mm(i) != other.end_mm(i) ||
+          feed_mm_per_s(i) != other.feed_mm_per_s(i)) {
+        return false;
+      }
+      continue;
+    }
+    const Segment a = (*this)[i];
+    const Segment b = other[i];
+    if (a.kind != b.kind || a.start_mm != b.start_mm || a.end_mm != b.end_mm || a.feed_mm_per_s != b.feed_mm_per_s ||
+        a.centre_mm != b.centre_mm || a.sweep_rad != b.sweep_rad || a.normal != b.normal ||
+        a.stop_at_end != b.stop_at_end) {
+      return false;
+    }
+  }
+  return true;
+}
+
 Vector3 Path::point(double s_mm, std::size_t& cursor) const noexcept {
   if (size() == 0) {
     return Vector3::Zero();

@@ -20,7 +20,7 @@ from shapegcode.cli.options import (
     output_file,
 )
 from shapegcode.cli.overrides import add_override_arguments, overridden
-from shapegcode.cli.typed import positive, ratio, seconds, size
+from shapegcode.cli.typed import line_ranges, positive, ratio, seconds, size
 
 if TYPE_CHECKING:
     from shapegcode.cli.console import ProgressBar
@@ -40,6 +40,8 @@ MACHINE_KEYS = {
     "--per-axis": "shaping.per_axis",
     "--part-mass": "shaping.part_mass_kg",
     "--shape-rapids": "shaping.rapids",
+    "--max-time-increase": "price.program_time_percent",
+    "--max-cut-time-increase": "price.cut_time_percent",
     "--compensation": "input.compensation",
 }
 """Options that stand for a key of the machine file."""
@@ -66,8 +68,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--shape-all",
         action="store_true",
-        help="shape every region: also where that gains less than shaping.least_gain_um, or misses a tolerance (then "
-        "the program fails as a whole); without it such a region keeps its text",
+        help="shape every cut within the price: also where that gains less than shaping.least_gain_um or becomes "
+        "worse, and where the original is within its tolerance; without it such a cut is left unchanged",
+    )
+    parser.add_argument(
+        "--only",
+        metavar="A-B,...",
+        type=line_ranges,
+        default=None,
+        help="shape nothing but the cuts in these lines of IN, for example 12-80,95-240",
+    )
+    parser.add_argument(
+        "--leave",
+        metavar="A-B,...",
+        type=line_ranges,
+        default=(),
+        help="leave the cuts in these lines of IN unchanged",
+    )
+    parser.add_argument(
+        "--tolerance-curve",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="work out what other contour tolerances would cost in time (default: %(default)s)",
     )
     parser.add_argument(
         "--block-period",
@@ -120,7 +142,6 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode._core import ArgumentError
     from shapegcode.cli import runner
-    from shapegcode.conversion.benefit import summary
     from shapegcode.program.compensation import read_for_conversion
 
     output = output_file(args.output)
@@ -134,15 +155,15 @@ def run(args: argparse.Namespace) -> int:
         with _loading("shapegcode.conversion.convert"):
             program = read_for_conversion(args.input, machine, program_number=args.program)
         result = (_scheduled if args.feed_schedule else _converted)(args, program, machine, bar)
-    target = output if result.ok else failed
+    target = output if result.is_written_as_output else failed
     notes = ["original: the program with these feeds, not yet shaped"] if args.feed_schedule else []
-    if result.kept:
-        notes.append(summary(result.kept, result.least_gain_um))
+    if result.tolerance_curve is not None and (price := result.tolerance_curve.sentence):
+        notes.append(f"tolerance against time: {price}")
     if target == failed and output.exists():
         notes.append(f"{output} is of an earlier run and was left alone")
     if result.unmeasured_tried and not result.rests_on:
         notes.append(
-            f"the verdict rests on nothing that nobody measured: {result.unmeasured_tried} values moved, none matters"
+            f"{result.unmeasured_tried} unverified parameters were changed one at a time: none matters for the verdict"
         )
     return runner.finish(result, args, notes=notes, output=(target, result.emitted.view()))
 
@@ -197,7 +218,10 @@ def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar
         reached = max(reached, begin + share * done / total)
         bar.update(reached)
 
-    return convert(program, machine, **_options(args), shape_all=args.shape_all, on_progress=show)
+    return convert(
+        program, machine, **_options(args), only=args.only, leave=args.leave, shape_all=args.shape_all,
+        tolerance_curve=args.tolerance_curve, on_progress=show,
+    )  # fmt: skip
 
 
 def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:

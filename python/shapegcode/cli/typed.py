@@ -93,6 +93,21 @@ def line_range(text: str) -> tuple[int, int]:
     return first, last
 
 
+def line_ranges(text: str) -> tuple[tuple[int, int], ...]:
+    """Ranges of lines such as ``12-80,95-240``.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        First and last line of each.
+
+    Raises:
+        ArgumentTypeError: one of them is no range of lines.
+    """
+    return tuple(line_range(part.strip()) for part in text.split(","))
+
+
 def count(text: str) -> int:
     """A whole number, 1 or more.
 

@@ -44,10 +44,12 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
         Red where a tolerance is missed; amber where nothing was shaped, a warning is open, or an unmeasured value
         could turn the verdict; else green.
     """
-    if not conversion.ok:
-        return "red", next(conversion.misses(), conversion.next_step)
+    if not conversion.is_written_as_output:
+        return "red", conversion.reason
+    if not conversion.within_tolerance:
+        return "amber", next(conversion.misses(), conversion.reason)
     if conversion.nothing_shaped:
-        return "amber", "nothing was shaped: run the original"
+        return "green", conversion.reason
     turning = [row.key for row in conversion.rests_on if row.moved_um > row.limit_um]
     if turning:
         return "amber", f"a value that nobody measured on this machine could turn the verdict: {turning[0]}"

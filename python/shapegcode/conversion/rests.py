@@ -91,7 +91,7 @@ class _Region:
     place: Placed
     emitted: Program
     judge: Judge
-    tracker: _core.ContourTracker
+    tracker: _core.ContourTracker | None
 
     def play(self, trial: _Trial, *, contour: bool) -> CaseFigures:
         """The figures with a value moved; without the contour they come from the end of the region alone."""
@@ -153,7 +153,7 @@ def _name(trial: _Trial) -> tuple[str, str]:
 def rests_on(
     judge: Judge,
     machine: Machine,
-    played: Sequence[tuple[Placed, RegionFigures, _core.ContourTracker]],
+    played: Sequence[tuple[Placed, RegionFigures, _core.ContourTracker | None]],
     emitted: Program,
     deciding_lines: tuple[int, int],
     pool: Executor,
@@ -342,7 +342,7 @@ def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> It
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
     for case, played in zip(region.judge.cases, figures.cases, strict=True):
         key, said = _key_of(case)
-        if not case.counts and key in unmeasured:
+        if not case.counts and key in unmeasured and played is not None:
             yield _rests(unmeasured[key], said, region.before(figures), judge_region(played, region.limits(figures)))
 
 

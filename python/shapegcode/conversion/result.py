@@ -6,10 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
-from shapegcode.conversion.benefit import KeptRegion
+from shapegcode.conversion.advice import FilterAdvice
 from shapegcode.conversion.budget import BudgetOutcome
+from shapegcode.conversion.curve import ToleranceCurve, curve_table
+from shapegcode.conversion.cuts import CutOutcome, cut_table
 from shapegcode.conversion.operating import ControlNote, control_table
 from shapegcode.conversion.rapids.result import RapidsOutcome
+from shapegcode.conversion.recommendation import Grade
 from shapegcode.conversion.rests import RestsOn
 from shapegcode.conversion.tables import (
     BeforeAfter,
@@ -34,18 +37,24 @@ from shapegcode.verdict.placed import Placed
 __all__ = ["Conversion"]
 
 _VIBRATIONS = {"residual_vibration_um": "residual vibration", "peak_vibration_um": "peak vibration"}
+_LEAST_SHOWN_UM = 0.05
 _DEVIATIONS = {"max": "largest", "rms": "RMS", "gouge": "gouge", "excess": "excess"}
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
 class Conversion(PlayedFigures, Result):
-    """A program, shaped: the emitted text, and what playing it beside the original showed.
+    """A program, shaped: the emitted program, and what simulating it beside the original showed.
 
     Attributes:
         program: name of the original.
         machine: name of the machine.
-        cycle_time_s: whole program: regions, rapids with in-position wait, dwells, drilling cycles.
-        cutting_time_s: the regions alone, until the set-points rest.
+        recommendation: what to do with it: one of the five grades of `recommendation.GRADES`.
+        reason: of the recommendation, in words.
+        cuts: every cut, shaped or left unchanged, with its gain and its price.
+        tolerance_curve: what other contour tolerances cost in time; null: not worked out, or nothing can be shaped.
+        advice: a smaller filter of the control that would do without shaping; null: there is none.
+        cycle_time_s: whole program: cuts, rapids with in-position wait, dwells, drilling cycles.
+        cutting_time_s: the cuts alone, until the set-points rest.
         block_period_s: grid of the shaped blocks.
         shaper: the design on it.
         blocks: how many there are.
@@ -57,7 +66,6 @@ class Conversion(PlayedFigures, Result):
         warnings: what to heed.
         budget: only under one: what it allowed, and what was given up for it.
         rapids: only where rapids may be shaped: what became of them.
-        kept: regions that keep their text because shaping them gains too little, or would miss a tolerance.
         least_gain_um: what is too little.
         rests_on: values that nobody measured on this machine, by how far each moves the deciding figure to its limit.
         unmeasured_tried: how many such values were moved.
@@ -68,10 +76,15 @@ class Conversion(PlayedFigures, Result):
         played: original and emitted program, to play them again for a page.
     """
 
-    json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool, "recommendation": str}
+    json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool, "shaped_cuts_within": bool}
 
     program: str
     machine: str
+    recommendation: Grade
+    reason: str
+    cuts: tuple[CutOutcome, ...]
+    tolerance_curve: ToleranceCurve | None
+    advice: FilterAdvice | None
     cycle_time_s: Pair[float]
     cutting_time_s: Pair[float]
     block_period_s: float
@@ -85,7 +98,6 @@ class Conversion(PlayedFigures, Result):
     warnings: tuple[str, ...]
     budget: BudgetOutcome | None = field(default=None, metadata=sparse())
     rapids: RapidsOutcome | None = field(default=None, metadata=sparse())
-    kept: tuple[KeptRegion, ...] = ()
     least_gain_um: float = 0.0
     rests_on: tuple[RestsOn, ...] = ()
     unmeasured_tried: int = 0
@@ -102,8 +114,13 @@ class Conversion(PlayedFigures, Result):
 
     @property
     def ok(self) -> bool:
-        """Whether every region keeps its tolerances in every case that counts."""
-        return self.within_tolerance
+        """Whether the recommended program can be run with nothing more to decide: exit code 0."""
+        return self.recommendation not in ("better, tolerance not met", "do not run")
+
+    @property
+    def is_written_as_output(self) -> bool:
+        """False: nobody should run it, and it is written under another suffix."""
+        return self.recommendation != "do not run"
 
     @property
     def nothing_shaped(self) -> bool:
@@ -111,48 +128,77 @@ class Conversion(PlayedFigures, Result):
         return self.blocks.emitted == 0
 
     @property
-    def recommendation(self) -> str:
-        """One of three: "worth running", "no benefit: run the original", "do not run"."""
-        if self.nothing_shaped:
-            return "no benefit: run the original"
-        return "worth running" if self.ok else "do not run"
+    def kept(self) -> tuple[CutOutcome, ...]:
+        """The cuts left unchanged, but for those of a budget."""
+        given_up = {each.lines for each in self.budget.given_up} if self.budget is not None else set()
+        return tuple(cut for cut in self.cuts if not cut.is_shaped and cut.lines not in given_up)
 
     @property
     def answer(self) -> str:
-        """What to do with it, and the three figures that people look at first."""
-        if self.nothing_shaped:
-            if self._gave_up:
-                why = "nothing fits the budget"
-            elif self.kept:
-                best = max(self.kept, key=lambda region: region.gain_um)
-                if best.gain_um >= self.least_gain_um:
-                    why = "a tolerance would be missed (lines {} to {}: {})".format(*best.lines, best.reason)
-                else:
-                    why = f"shaping would gain {best.gain_um:.1f} µm at most (least: {self.least_gain_um:g})"
-            else:
-                why = "there is nothing to shape"
-            return f"{self.recommendation}: {why}; the text is unchanged"
+        """What to do with it, its figures and price; then what is not met, and why."""
+        lines = [self._headline(), *self._left_out()[:1]]
+        if self.recommendation == "do not run":
+            lines.append(self.reason)
+        elif self.advice is not None:
+            lines.append(str(self.advice))
+        return "\n".join(lines)
+
+    def _headline(self) -> str:
+        verdict = self.recommendation + ("" if self.is_written_as_output else ", OUT OF TOLERANCE")
+        if not self.cuts:
+            return f"{verdict}: there is nothing to shape; the program is unchanged"
         vibration = self.residual_vibration_um
         axis = max("xyz", key=lambda each: vibration.original[each])
         target = getattr(self.contour_error_um, self.limits.contour_target)
+        if self.nothing_shaped:
+            why = (
+                "nothing fits the budget" if self.budget is not None and self.budget.given_up else self._why_unchanged()
+            )
+            return (
+                f"{verdict}: {why}; residual vibration {axis.upper()} {vibration.original[axis]:.1f} µm, contour "
+                f"{target.original.max:.1f} µm; the program is unchanged"
+            )
         change = change_percent(self.cycle_time_s.original, self.cycle_time_s.emitted)
-        verdict = self.recommendation + ("" if self.within_tolerance else ", OUT OF TOLERANCE")
         return (
             f"{verdict}: residual vibration {axis.upper()} "
             f"{vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
             f"contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}{self._share}"
         )
 
-    @property
-    def _share(self) -> str:
-        """Of which cuts the figures are, where some keep their text."""
-        left = len(self.kept) + (len(self.budget.given_up) if self.budget is not None else 0)
-        shaped = len(self.regions)
-        return f" ({shaped} of {shaped + left} cuts shaped, the others as before)" if left else ""
+    def _why_unchanged(self) -> str:
+        best = max(self.cuts, key=lambda cut: cut.gain_um)
+        if self.within_tolerance and best.gain_um >= self.least_gain_um:
+            return self.reason
+        if best.gain_um < self.least_gain_um:
+            return f"shaping would gain {best.gain_um:.1f} µm at most (least: {self.least_gain_um:g})"
+        return "lines {} to {}: {}".format(*best.lines, best.reason)
+
+    def _left_out(self) -> list[str]:
+        """What is not within its limits: cuts left unchanged first, with their lines and what would cure it."""
+        out = [cut for cut in self.cuts if cut.misses]
+        out.sort(key=lambda cut: cut.is_shaped)
+        said = []
+        for cut in out:
+            where = "lines {} to {}".format(*cut.lines)
+            how = f"left unchanged ({cut.reason})" if not cut.is_shaped else self._cost_of(cut)
+            said.append(f"{where}: {cut.misses[0]}; {how}{': ' + cut.cure if cut.cure else ''}")
+        if len(said) > 1:
+            said[0] += f" (and {len(said) - 1} further cuts out of their limits)"
+        return said
+
+    def _cost_of(self, cut: CutOutcome) -> str:
+        """Why a shaped cut does not keep its tolerance, as far as its price is the reason."""
+        if cut.tolerance_um > self.limits.contour_um:
+            asked = self.tolerance_curve.points[0] if self.tolerance_curve is not None else None
+            cost = f", {asked.tolerance_um:.3g} µm would cost {asked.time_increase_percent:+.3g} %" if asked else ""
+            return f"shaped for {cut.tolerance_um:.3g} µm within the price{cost}"
+        return "shaped as closely as the feed allows"
 
     @property
-    def _gave_up(self) -> bool:
-        return self.budget is not None and bool(self.budget.given_up)
+    def _share(self) -> str:
+        """Of which cuts some are left unchanged."""
+        shaped = len(self.regions)
+        return f" ({shaped} of {len(self.cuts)} cuts shaped, the others unchanged)" if shaped < len(self.cuts) else ""
 
     @property
     def next_step(self) -> str:
@@ -164,28 +210,38 @@ class Conversion(PlayedFigures, Result):
                     "make sure of the unit, as the program has neither G20 nor G21: convert it with "
                     "--set power_on.units=G20 (inch) or G21 (mm), and write that code into it."
                 )
+            if self.recommendation.startswith("already"):
+                return "run the program as it is; --shape-all shapes it all the same."
             return "run the original program: nothing in it was shaped."
-        if not self.ok:
+        if not self.is_written_as_output:
             stated = any("; feasible: " in warning for warning in self.warnings)
             remedy = "a warning says which limit is feasible" if stated else "lower the feed there, and convert again"
-            return f"do not run it ({next(self.misses())}): {remedy}."
+            return f"do not run it ({self.reason}): {remedy}."
+        if not self.within_tolerance:
+            return (
+                "decide whether what stays out matters for this part (the table of cuts says where); then run the "
+                "emitted program above the workpiece, without a tool."
+            )
         if self.warnings:
-            return "settle the warnings, then run the emitted program above the workpiece, without a tool."
+            return "resolve the warnings, then run the emitted program above the workpiece, without a tool."
         return "run the emitted program above the workpiece, without a tool, at 100 % feed override."
 
     def misses(self) -> Iterator[str]:
-        """Every tolerance that a region misses, with the lines of the original program."""
-        for region in self.regions:
-            for miss in region.misses:
-                yield "lines {} to {}: {}".format(*region.lines, miss)
+        """Every tolerance that a cut misses, with the lines of the original program."""
+        for cut in self.all_cuts:
+            for miss in cut.misses:
+                yield "lines {} to {}: {}".format(*cut.lines, miss)
 
     def tables(self) -> list[Table]:
-        """Original against emitted; the cases of the verdict; what it rests on. None where nothing was shaped."""
+        """Original against emitted; cut by cut; tolerance against time; operating conditions; sensitivity."""
+        cuts = [cut_table(self.cuts)] if len(self.cuts) > 1 else []
+        curve = [curve_table(self.tolerance_curve)] if self.tolerance_curve is not None else []
         if self.nothing_shaped:
-            return []
+            return [*cuts, *curve] if any(cut.misses for cut in self.cuts) else cuts
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
         rests = [rests_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []
-        return [before_after_table(self.before_after()), *cases, *rests, control_table(self.at_the_control)]
+        before_after = before_after_table(self.before_after())
+        return [before_after, *cuts, *curve, *cases, *rests, control_table(self.at_the_control)]
 
     def before_after(self) -> list[list[BeforeAfter]]:
         """Every figure of original and emitted, in groups."""
@@ -209,17 +265,23 @@ class Conversion(PlayedFigures, Result):
                 for axis in "xyz"
                 if both.original[axis] or both.emitted[axis]
             ]
+        between = self.rapid_vibration_um
+        yield [
+            BeforeAfter(f"vibration behind rapids {axis.upper()}", "µm", between.original[axis], between.emitted[axis])
+            for axis in "xyz"
+            if between.original[axis] >= _LEAST_SHOWN_UM or between.emitted[axis] >= _LEAST_SHOWN_UM
+        ]
 
     def residual_limit_um(self, axis: str) -> float | None:
-        """Limit of the region with the largest emitted residual, the one that is shown.
+        """Limit of the cut with the largest emitted residual, the one that is shown.
 
         Args:
             axis: "x", "y" or "z".
 
         Returns:
-            The limit; None: nothing was shaped.
+            The limit; None: there is no cut.
         """
-        worst = max(self.regions, key=lambda each: each.residual_vibration_um.emitted[axis], default=None)
+        worst = max(self.all_cuts, key=lambda each: each.residual_vibration_um.emitted[axis], default=None)
         return None if worst is None else worst.residual_limit_um[axis]
 
     def _contours(self) -> Iterator[list[BeforeAfter]]:

@@ -7,7 +7,6 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from shapegcode import _core
-from shapegcode.conversion.ahead import Ahead, OnShare, cores
 from shapegcode.conversion.budget import TransferLoad, measure_load
 from shapegcode.conversion.readback import read_back
 from shapegcode.conversion.spending import keepable
@@ -18,6 +17,7 @@ from shapegcode.model.shaped_program import stamp_of_machine
 from shapegcode.program import Program
 from shapegcode.program.compensation import guard_lines, header_lines
 from shapegcode.shaping.grid import Grid
+from shapegcode.verdict.ahead import Ahead, OnShare, cores
 from shapegcode.verdict.placed import Placed
 
 __all__ = ["TextWriter", "Written", "why_kept"]
@@ -57,6 +57,8 @@ class Written:
             kept by a target.
         loads: per index of a shaped region what it asks of memory, line and control.
         no_room: per index of a region that was to be shaped and keeps its text why there is no room for it.
+        unslowed: indices of shaped cuts that their contour tolerance does not slow.
+        durations_s: per index of a shaped cut the time of its blocks.
     """
 
     parts: list[bytes]
@@ -68,6 +70,8 @@ class Written:
     planned_um: dict[int, float]
     loads: dict[int, TransferLoad]
     no_room: dict[int, str]
+    unslowed: set[int]
+    durations_s: dict[int, float]
 
     def read_back(self, machine: Machine) -> Program:
         """Read the text and hold it against the original; from then on it stands in the program that is given.
@@ -124,6 +128,21 @@ class TextWriter:
             self._begun = aims, self._ahead(aims, lambda _done: None)
             self._begun[1].begin()
 
+    def options(self, index: int, feed_ratio: float) -> _core.ShapingOptions:
+        """How a cut is shaped, but for its tolerance.
+
+        Args:
+            index: of the cut.
+            feed_ratio: of the programmed feed that it is planned with.
+
+        Returns:
+            The options of the core.
+        """
+        limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
+        limits.feed_override = feed_ratio
+        offset = self._model.offset(self._program.regions[index])
+        return self._regions.options(limits, self._regions.tolerance(), offset)
+
     def write(
         self,
         reasons: Sequence[str],
@@ -151,7 +170,7 @@ class TextWriter:
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
         position = core.header_offset
-        written = Written([], [], 0, [], 0, [], {}, {}, {})
+        written = Written([], [], 0, [], 0, [], {}, {}, {}, set(), {})
         blocks, size = 0, core.size
         begin = sum(map(len, parts))
         aims = _aims(reasons, room_um, feed_share)
@@ -186,6 +205,9 @@ class TextWriter:
                 blocks += shaped.blocks
                 written.placed.append(Placed(region, line, line + _lines(texts) - 1))
                 written.texts.append((shaped.text, begin))
+                written.durations_s[index] = shaped.duration_s
+                if not shaped.is_slowed:
+                    written.unslowed.add(index)
                 if shaped.planned_um > 0.0:
                     written.planned_um[index] = shaped.planned_um
                 written.loads[index] = self._load(index, region, shaped)

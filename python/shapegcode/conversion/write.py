@@ -85,6 +85,8 @@ class EmittedRegion:
         block_periods: whole block periods that each of them lasts, of each part that holds blocks.
         block_bytes: likewise the characters of each of them.
         planned_um: deviation of what shall follow the path for which the feed was planned, µm; 0 without a target.
+        is_slowed: it is slower than without a contour tolerance.
+        duration_s: of its blocks.
     """
 
     text: RegionText
@@ -92,6 +94,8 @@ class EmittedRegion:
     block_periods: list[npt.NDArray[np.uint32]]
     block_bytes: list[npt.NDArray[np.uint32]]
     planned_um: float
+    is_slowed: bool = True
+    duration_s: float = 0.0
 
 
 def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
@@ -341,7 +345,11 @@ class RegionWriter:
         unlock = emission.unlock_lines if emission.override == "lock" else ()
         after = _lines([_restore_line(region, state.motion, state.plane), *unlock, *emission.epilogue], state)
         emitted = RegionText([before, *texts, after])
-        return EmittedRegion(emitted, sum(map(len, periods)), periods, sizes.end(), shaper.largest_deviation_mm * 1e3)
+        duration_s = float(sum(int(part.sum()) for part in periods)) * self._grid.block_period_s
+        return EmittedRegion(
+            emitted, sum(map(len, periods)), periods, sizes.end(), shaper.largest_deviation_mm * 1e3, shaper.is_slowed,
+            duration_s,
+        )  # fmt: skip
 
     def _fit(self, region: _core.Region, options: _core.ShapingOptions) -> _core.FitOptions:
         """How shaped motion becomes blocks in the units of a region."""

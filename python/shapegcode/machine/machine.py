@@ -23,7 +23,7 @@ from shapegcode.machine.controller import Controller, PowerOn
 from shapegcode.machine.drive import Drive
 from shapegcode.machine.feed import FeedControl
 from shapegcode.machine.input import Input
-from shapegcode.machine.output import Emission, Shaping, Tolerance, Verdict
+from shapegcode.machine.output import Emission, Price, Shaping, Tolerance, Verdict
 from shapegcode.machine.times import Times
 from shapegcode.settings import change
 from shapegcode.settings.describe import values_of, write_short_toml, write_toml
@@ -50,6 +50,7 @@ __all__ = [
     "Machine",
     "PerAxis",
     "PowerOn",
+    "Price",
     "Shaping",
     "Times",
     "Tolerance",
@@ -75,6 +76,7 @@ class Machine(TomlTable):
     emission: Emission = key("how shaped programs are written", default={})
     shaping: Shaping = key("what is shaped, and how", default={})
     tolerance: Tolerance = key("when an emitted program is good", default={})
+    price: Price = key("what shaping may cost in time", default={})
     verdict: Verdict = key("under which conditions it must be good", default={})
 
     @model_validator(mode="after")

@@ -222,6 +222,17 @@ class Tolerance(TomlTable):
     )
 
 
+class Price(TomlTable):
+    """What shaping may cost: a cut that costs more gets the tightest tolerance within the price, or stays as it is."""
+
+    program_time_percent: Annotated[Positive, Field(le=1e6)] = key(
+        "largest increase of the program's time", unit="%", default=10.0
+    )
+    cut_time_percent: Annotated[Positive, Field(le=1e6)] = key(
+        "largest increase of the time of one cut", unit="%", default=25.0
+    )
+
+
 class Verdict(TomlTable):
     """The stated band: which of the cases that are played decide. All are shown; 100 % override always counts."""
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -74,10 +75,15 @@ class PlayingController:
         self.filters = _core.acceleration_filters(model)
         """Acceleration filters behind the interpolation."""
 
-    def _planned(self, path: _core.Path) -> _core.SpeedProfile | None:
-        """The look-ahead's speed along a path; None where the controller plays block by block."""
-        look_ahead = self.model.motion == _core.MotionKind.look_ahead
-        return _core.plan_speed(path, self.model.limits) if look_ahead else None
+    def _planned(self, path: _core.Path, override: float = 1.0) -> _core.SpeedProfile | None:
+        """The look-ahead's speed along a path; None where the controller executes block by block."""
+        if self.model.motion != _core.MotionKind.look_ahead:
+            return None
+        if override == 1.0:
+            return _core.plan_speed(path, self.model.limits)
+        limits = copy(self.model.limits)
+        limits.feed_override *= override
+        return _core.plan_speed(path, limits)
 
     def play(
         self,
@@ -86,6 +92,7 @@ class PlayingController:
         *,
         against: _core.Path | None = None,
         block_end: _core.BlockEnd | None = None,
+        override: float = 1.0,
     ) -> _core.PlaybackFigures:
         """A path played from rest to rest and measured against itself or another one.
 
@@ -94,16 +101,17 @@ class PlayingController:
             options: plant and what is measured; the filters become the controller's.
             against: what it is measured against; None: itself.
             block_end: rule of block timing, where there is no look-ahead; None: the controller's own.
+            override: feed override, 1 = 100 %.
 
         Returns:
             The figures, positions in mm.
         """
         options.axis_filters = self.filters
-        profile = self._planned(path)
+        profile = self._planned(path, override)
         if profile is not None:
             given = () if against is None else (against,)
             return _core.play_path(path, profile, options, *given)
-        return _core.play_blocks(path, against or path, block_end or self.model.block_end, 1.0, options)
+        return _core.play_blocks(path, against or path, block_end or self.model.block_end, override, options)
 
     def stream(self, path: _core.Path, options: _core.PlaybackOptions, rest_s: float) -> _core.PlayedStream:
         """The same motion piece by piece, and what the plant does for a while behind its end.
@@ -280,21 +288,33 @@ class MachineModel:
         return options
 
     def play_original(
-        self, path: _core.Path, *, record_samples: int = 0, offset: Offset = NO_OFFSET
+        self,
+        path: _core.Path,
+        *,
+        against: _core.Path | None = None,
+        override: float = 1.0,
+        shift: float = 0.0,
+        only: str | None = None,
+        record_samples: int = 0,
+        offset: Offset = NO_OFFSET,
     ) -> _core.PlaybackFigures:
-        """A programmed path as the controller plays an ordinary program.
+        """A cut as the controller executes an ordinary program.
 
         Args:
-            path: of a region.
+            path: of the cut.
+            against: the path that it is measured against; None: its own.
+            override: feed override, 1 = 100 %.
+            shift: see `options`.
+            only: likewise.
             record_samples: samples kept for pictures.
             offset: see `options`.
 
         Returns:
             The figures, positions in mm.
         """
-        options = self.verdict_options(offset=offset)
+        options = self.verdict_options(shift=shift, only=only, offset=offset)
         options.record_samples = record_samples
-        return self.ordinary.play(path, options)
+        return self.ordinary.play(path, options, against=against, override=override)
 
     def play_emitted(
         self,

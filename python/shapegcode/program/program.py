@@ -194,18 +194,19 @@ class Program:
         """
         return self.core.slice(begin, end) if self.unexpanded is None else self.unexpanded[begin:end]
 
-    def with_verdict(self, *, good: bool) -> Program:
+    def with_verdict(self, *, good: bool, better: bool = False) -> Program:
         """The emitted program with verdict and mark in its header; a long text is not copied, but changed in place.
 
         Args:
-            good: the verdict.
+            good: False: nobody should run it.
+            better: it misses a tolerance, as the original does, and is better.
 
         Returns:
             The program.
         """
         if self.unexpanded is not None:
-            return replace(self, unexpanded=judged(self.unexpanded, good=good))
-        judge(self.core, self.mark, good=good)
+            return replace(self, unexpanded=judged(self.unexpanded, good=good, better=better))
+        judge(self.core, self.mark, good=good, better=better)
         return replace(self)  # nothing of it was worked out from the text as it was
 
     @cached_property

@@ -1,7 +1,7 @@
 """The header of an emitted program: written by the converter, read by everything that is given such a program.
 
 (SHAPEGCODE 0.1.0 MACHINE VX500)
-(VERDICT WITHIN TOLERANCE       )
+(VERDICT WITHIN TOLERANCE       )    or (BETTER - TOLERANCE NOT MET     )
 (TEXT 8A1F00C3)
 (MODE X 46 HZ 0.02)
 (BLOCK PERIOD 5 MS SHAPER 20 MS ZVD)
@@ -37,9 +37,10 @@ STAMP_BEGIN = b"(SHAPEGCODE "
 
 _WIDTH = 60
 # One length, so that the verdict can take its place without moving a line; likewise the mark of the text.
-_PENDING, _GOOD, _BAD = (
+_PENDING, _GOOD, _BETTER, _BAD = (
     b"(VERDICT PENDING                )",
     b"(VERDICT WITHIN TOLERANCE       )",
+    b"(BETTER - TOLERANCE NOT MET     )",
     b"(OUT OF TOLERANCE - DO NOT RUN  )",
 )
 _NO_MARK = "0" * 8
@@ -227,17 +228,18 @@ def _one_end(text: bytes) -> bytes:
     return text
 
 
-def judged(text: bytes, *, good: bool) -> bytes:
+def judged(text: bytes, *, good: bool, better: bool = False) -> bytes:
     """An emitted program with verdict and mark in its header.
 
     Args:
         text: with an open verdict, or one that was good before.
-        good: the verdict.
+        good: False: nobody should run it.
+        better: it misses a tolerance, as the original does, and is better.
 
     Returns:
         The text, as long as it was.
     """
-    changes = _changes(text.find, text_mark(text), good=good)
+    changes = _changes(text.find, text_mark(text), good=good, better=better)
     if not changes:
         return text
     changed = bytearray(text)
@@ -258,21 +260,23 @@ def mark_of(program: _core.ProgramText) -> str:
     return _mark_of(_lines_of(program))
 
 
-def judge(program: _core.ProgramText, mark: str, *, good: bool) -> None:
+def judge(program: _core.ProgramText, mark: str, *, good: bool, better: bool = False) -> None:
     """The same in the text of a program that was read; it holds what it held in the same places.
 
     Args:
         program: whose header has an open verdict, or one that was good before.
         mark: of its text.
-        good: the verdict.
+        good: as `judged` takes them.
+        better: likewise.
     """
-    for begin, after in _changes(program.find, mark, good=good):
+    for begin, after in _changes(program.find, mark, good=good, better=better):
         program.overwrite(begin, after)
 
 
-def _changes(find: Callable[[bytes], int], mark: str, *, good: bool) -> list[tuple[int, bytes]]:
+def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: bool) -> list[tuple[int, bytes]]:
     """Where the header says something else, and what: as long as what it takes the place of."""
-    verdicts = [(_PENDING, _GOOD)] if good else [(_PENDING, _BAD), (_GOOD, _BAD)]
+    open_ones = (_PENDING,) if good else (_PENDING, _GOOD, _BETTER)
+    verdicts = [(before, _BAD if not good else _BETTER if better else _GOOD) for before in open_ones]
     wanted = [*verdicts, (_MARK_PENDING, f"(TEXT {mark})".encode())]
     return [(begin, after) for before, after in wanted if (begin := find(before)) >= 0]
 

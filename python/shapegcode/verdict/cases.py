@@ -208,15 +208,26 @@ def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[Judged]:
     return judged
 
 
-def region_misses(cases: Sequence[Case], figures: Sequence[CaseFigures], limits: RegionLimits) -> list[str]:
-    """Every figure of a region that leaves its limit in a case that counts: the worst case of each, in words."""
+def region_misses(
+    cases: Sequence[Case], figures: Sequence[CaseFigures | None], limits: RegionLimits
+) -> list[tuple[str, Judged]]:
+    """Every figure of a cut that leaves its limit in a condition that counts: the worst condition of each, in words.
+
+    Args:
+        cases: the operating conditions.
+        figures: of the cut in each; None: not simulated.
+        limits: of the cut.
+
+    Returns:
+        Each miss in words, and the figure.
+    """
     worst: dict[str, tuple[Judged, Case]] = {}
     for case, played in zip(cases, figures, strict=True):
-        for judged in judge_region(played, limits) if case.counts else ():
+        for judged in judge_region(played, limits) if case.counts and played is not None else ():
             if judged.figure not in worst or judged.value_um > worst[judged.figure][0].value_um:
                 worst[judged.figure] = (judged, case)
     return [
-        str(judged) if case.nominal else f"{judged} ({case.name})"
+        (str(judged) if case.nominal else f"{judged} ({case.name})", judged)
         for judged, case in worst.values()
         if judged.is_missed
     ]

@@ -105,7 +105,9 @@ class AppliedLimits:
         residual_floor_um: residual vibration below this passes.
         residual_floor_increments: likewise, in least increments.
         feed_excess_ratio: share by which the set-points may run faster than programmed.
-        plant: behind which the programs were played, "modal" or "feed-drive".
+        plant: behind which the programs were simulated, "modal" or "feed-drive".
+        program_time_percent: largest increase of the program's time.
+        cut_time_percent: largest increase of the time of one cut.
     """
 
     contour_um: float
@@ -115,6 +117,8 @@ class AppliedLimits:
     residual_floor_increments: float
     feed_excess_ratio: float
     plant: str
+    program_time_percent: float
+    cut_time_percent: float
 
 
 @dataclass(frozen=True)
@@ -229,17 +233,19 @@ class FeedExcess:
 
 @dataclass(frozen=True)
 class RegionVerdict:
-    """One region as programmed and as emitted, beside its limits.
+    """One cut as programmed and as emitted, beside its limits.
 
     Attributes:
         lines: of the original, first and last.
         emitted_lines: of the emitted program.
         time_s: until the set-points rest.
-        residual_vibration_um: largest |table - command| while they rest; emitted: worse of both rules of block timing.
+        residual_vibration_um: maximum of |table - command| while they rest; emitted: worse rule of block timing.
         residual_limit_um: what the emitted one is judged by.
-        contour_error_um: of the emitted blocks, of what the tolerance is about.
-        feed_excess: where they run fastest against the programmed feed.
+        contour_error_um: of the emitted program, of what the tolerance is about.
+        original_contour_error_um: likewise of the original.
+        feed_excess: where shaped blocks run fastest against the programmed feed; null for a cut left unchanged.
         misses: every tolerance that it leaves, in words.
+        worse: those of them in which it is worse than the original.
     """
 
     lines: tuple[int, int]
@@ -248,8 +254,10 @@ class RegionVerdict:
     residual_vibration_um: Pair[Xyz[float]]
     residual_limit_um: Xyz[float]
     contour_error_um: float
-    feed_excess: FeedExcess
+    original_contour_error_um: float
+    feed_excess: FeedExcess | None
     misses: tuple[str, ...]
+    worse: tuple[str, ...] = ()
 
     def over_limit(self) -> Iterator[tuple[float, float]]:
         """Residual and limit of every axis that leaves its limit, um."""
@@ -260,25 +268,31 @@ class RegionVerdict:
 
 @dataclass(frozen=True, repr=False)
 class PlayedFigures:
-    """All regions played, as programmed and as emitted; emitted figures are the worse of both rules of block timing.
+    """Every cut of a program, as programmed and as emitted, shaped or left unchanged.
+
+    Emitted figures of shaped cuts are the worse of both rules of block timing.
 
     Attributes:
-        residual_vibration_um: largest |table - command| from the instant at which the set-points rest.
-        peak_vibration_um: largest |table - command| before that instant.
+        residual_vibration_um: maximum of |table - command| from the instant at which the set-points rest.
+        peak_vibration_um: maximum of |table - command| before that instant.
         contour_error_um: distance to the programmed path of command and table.
+        rapid_vibration_um: maximum of |table - command| behind a rapid that a cut follows; it is held to no limit.
         orbit_error_percent: per arc: area between emitted command and arc over the area of its sector.
-        override_residual: residual vibration of the emitted program at 80, 90, 110 and 120 %.
+        override_residual: residual vibration of the shaped cuts at 80, 90, 110 and 120 %.
         frequency_residual: with every mode off by its uncertainty; empty where none states one.
         slowed_blocks: emitted blocks that step an axis by more than the corner limit of the look-ahead.
         feed_excess: where the emitted blocks run fastest against the programmed feed; null where nothing was shaped.
-        cases: every case in which the emitted program was played.
-        worst_case: the one that decides; null where nothing was shaped.
-        regions: in the order of the program.
+        cases: the operating conditions in which the emitted program was simulated; those that do not count are of the
+            shaped cuts alone.
+        worst_case: the one that decides; null without cuts.
+        regions: the shaped cuts, in the order of the program.
+        unchanged: the cuts left unchanged, likewise.
     """
 
     residual_vibration_um: Pair[Xyz[float]]
     peak_vibration_um: Pair[Xyz[float]]
     contour_error_um: Tracks[Pair[ContourError]]
+    rapid_vibration_um: Pair[Xyz[float]]
     orbit_error_percent: tuple[float, ...]
     override_residual: tuple[OverrideResidual, ...]
     frequency_residual: tuple[FrequencyResidual, ...]
@@ -287,15 +301,27 @@ class PlayedFigures:
     cases: tuple[CaseVerdict, ...]
     worst_case: CaseVerdict | None
     regions: tuple[RegionVerdict, ...]
+    unchanged: tuple[RegionVerdict, ...]
+
+    @property
+    def all_cuts(self) -> list[RegionVerdict]:
+        """Shaped or left unchanged, in the order of the program."""
+        return sorted([*self.regions, *self.unchanged], key=lambda cut: cut.lines)
 
     @property
     def within_tolerance(self) -> bool:
-        """Whether every region keeps its tolerances in every case that counts."""
-        return not any(region.misses for region in self.regions)
+        """Whether every cut, shaped or left unchanged, keeps its limits in every operating condition that counts."""
+        return self.shaped_cuts_within and not any(cut.misses for cut in self.unchanged)
+
+    @property
+    def shaped_cuts_within(self) -> bool:
+        """Whether the shaped cuts alone do."""
+        return not any(cut.misses for cut in self.regions)
 
     def region_time_s(self) -> Pair[float]:
-        """All regions together, until the set-points rest."""
+        """All cuts together, until the set-points rest."""
+        cuts = self.all_cuts
         return Pair(
-            math.fsum(region.time_s.original for region in self.regions),
-            math.fsum(region.time_s.emitted for region in self.regions),
+            math.fsum(cut.time_s.original for cut in cuts),
+            math.fsum(cut.time_s.emitted for cut in cuts),
         )

@@ -16,7 +16,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_xyz_um
 from shapegcode.results.result import Pair, Xyz
-from shapegcode.verdict.case_player import BLOCK_ENDS, CasePlayer, Played
+from shapegcode.verdict.case_player import BLOCK_ENDS, CasePlayer, Played, case_figures
 from shapegcode.verdict.cases import (
     ALL_MODES,
     Case,
@@ -44,28 +44,33 @@ _T = TypeVar("_T")
 
 OVERRIDES = (0.8, 0.9, 1.1, 1.2)  # of `override_residual`; the cases have more
 _HASTE = 0.9  # of its time: a region that takes less cuts faster than programmed
+_WORSE, _WORSE_UM = 1.001, 0.05  # than the original's by more than this, ratio and µm: beyond the last digits
 Step = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class RegionFigures:
-    """One region played: as programmed, and as emitted in every case of the verdict.
+    """One cut simulated: as programmed, and as emitted in every operating condition of the verdict.
 
     Attributes:
         original: the programmed path under the controller's own motion.
-        emitted: the emitted blocks under both rules of block end (ceil, carry).
-        cases: one entry per `stated_cases`.
+        emitted: shaped blocks under both rules of block end (ceil, carry); a cut left unchanged once.
+        cases: one entry per operating condition; None: not simulated for a cut left unchanged.
         slowed_blocks: emitted blocks that the controller's look-ahead limits would slow.
+        is_shaped: False: the cut was left unchanged.
     """
 
     original: _core.PlaybackFigures
     emitted: tuple[_core.PlaybackFigures, ...]
-    cases: tuple[CaseFigures, ...]
+    cases: tuple[CaseFigures | None, ...]
     slowed_blocks: int
+    is_shaped: bool = True
 
     @property
-    def feed_excess(self) -> FeedExcess:
-        """Where the emitted blocks run fastest against the programmed feed, in the worse rule."""
+    def feed_excess(self) -> FeedExcess | None:
+        """Where shaped blocks run fastest against the programmed feed, in the worse rule; None: not shaped."""
+        if not self.is_shaped:
+            return None
         worst = max((run.feed_excess for run in self.emitted), key=lambda each: each.ratio)
         return FeedExcess(worst.ratio, worst.speed_mm_per_s * 60.0, worst.programmed_mm_per_s * 60.0, worst.line)
 
@@ -99,12 +104,13 @@ class Judge:
 
     Args:
         model: of the machine; its file states tolerances, and the band in which a program must be good.
+        cases: operating conditions; None: those of the machine file.
     """
 
-    def __init__(self, model: MachineModel) -> None:
+    def __init__(self, model: MachineModel, cases: Sequence[Case] | None = None) -> None:
         self._machine = model.machine
         self._model = model
-        self.cases = stated_cases(model.machine)
+        self.cases = stated_cases(model.machine) if cases is None else list(cases)
         """In the order of `RegionFigures.cases`."""
         self.own_rule = model.own_rule
         """The controller's own rule of block timing."""
@@ -195,7 +201,7 @@ class Judge:
         for original, each in zip(originals, running, strict=True):
             nominal = tuple(result(run) for run in each.nominal)
             others = {name: run for part in each.others for name, run in result(part).items()}
-            cases = each.player.figures(nominal, result(each.planned), others)
+            cases: tuple[CaseFigures | None, ...] = each.player.figures(nominal, result(each.planned), others)
             results.append(RegionFigures(result(original), nominal, cases, result(each.slowed)))
         return results
 
@@ -214,35 +220,55 @@ class Judge:
         deviations = [
             played.command if self.target == "command" else played.response
             for case, played in zip(self.cases, figures.cases, strict=True)
-            if case.counts and not case.look_ahead and case.starved_s == 0.0 and (turned or case.override == 1.0)
+            if played is not None
+            and case.counts
+            and not case.look_ahead
+            and case.starved_s == 0.0
+            and (turned or case.override == 1.0)
         ]
         return max(each.largest_mm for each in deviations if each is not None) * 1e3
 
     def verdicts(
         self, figures: Sequence[RegionFigures], placed: Sequence[Placed], block_period_s: float
     ) -> tuple[RegionVerdict, ...]:
-        """Every region beside its limits.
+        """Every cut beside its limits.
 
         Args:
-            figures: per region, as played.
-            placed: the regions.
+            figures: per cut, as simulated.
+            placed: the cuts.
             block_period_s: of the emitted blocks, s.
 
         Returns:
-            A verdict for each region.
+            A verdict for each cut.
         """
         return tuple(
             self._verdict(region, place, block_period_s) for region, place in zip(figures, placed, strict=True)
         )
 
     def summarise(
-        self, figures: Sequence[RegionFigures], placed: Sequence[Placed], block_period_s: float
+        self,
+        figures: Sequence[RegionFigures],
+        placed: Sequence[Placed],
+        block_period_s: float,
+        rapid_vibration_um: Pair[Xyz[float]],
     ) -> PlayedFigures:
-        """The figures of all regions; see `verdicts`."""
+        """The figures of all cuts; see `verdicts`.
+
+        Args:
+            figures: per cut, shaped or left unchanged.
+            placed: the cuts.
+            block_period_s: of the emitted blocks, s.
+            rapid_vibration_um: behind rapids, of original and emitted program.
+
+        Returns:
+            The figures of the whole program.
+        """
         emitted = [run for region in figures for run in region.emitted]
         originals = [region.original for region in figures]
         side = self._machine.input.material_side
         cases = self._case_verdicts(figures, placed)
+        excesses = [region.feed_excess for region in figures if region.feed_excess is not None]
+        verdicts = self.verdicts(figures, placed, block_period_s)
         return PlayedFigures(
             residual_vibration_um=Pair(
                 largest_xyz_um(run.residual_mm for run in originals), largest_xyz_um(run.residual_mm for run in emitted)
@@ -254,17 +280,14 @@ class Judge:
                 Pair(*(ContourError.of((run.command for run in runs), side) for runs in (originals, emitted))),
                 Pair(*(ContourError.of((run.response for run in runs), side) for runs in (originals, emitted))),
             ),
+            rapid_vibration_um=rapid_vibration_um,
             orbit_error_percent=tuple(
                 max(pair)
                 for region in figures
                 for pair in zip(*(run.orbit_error_percent for run in region.emitted), strict=True)
             ),
             override_residual=tuple(
-                OverrideResidual(
-                    ratio,
-                    self._residual_um(figures, self._at_dial(ratio)),
-                )
-                for ratio in OVERRIDES
+                OverrideResidual(ratio, self._residual_um(figures, self._at_override(ratio))) for ratio in OVERRIDES
             ),
             frequency_residual=tuple(
                 FrequencyResidual(case.shift, self._residual_um(figures, [case]))
@@ -272,21 +295,28 @@ class Judge:
                 if case.mode == ALL_MODES and case.override == 1.0
             ),
             slowed_blocks=sum(region.slowed_blocks for region in figures),
-            feed_excess=max((region.feed_excess for region in figures), key=lambda each: each.ratio, default=None),
+            feed_excess=max(excesses, key=lambda each: each.ratio, default=None),
             cases=cases,
             worst_case=worst_counted(cases),
-            regions=self.verdicts(figures, placed, block_period_s),
+            regions=tuple(cut for cut, of in zip(verdicts, figures, strict=True) if of.is_shaped),
+            unchanged=tuple(cut for cut, of in zip(verdicts, figures, strict=True) if not of.is_shaped),
         )
 
-    def _at_dial(self, ratio: float) -> list[Case]:
-        """The cases with the dial at a ratio; the nominal ones where it is locked."""
+    def _at_override(self, ratio: float) -> list[Case]:
+        """The conditions at a feed override; the nominal ones where it is locked."""
         turned = [case for case in self.cases if case.override == ratio and case.mode is None]
         return turned or [case for case in self.cases if case.nominal]
 
     def _residual_um(self, figures: Sequence[RegionFigures], cases: Iterable[Case]) -> Xyz[float]:
-        """Largest of all regions in some cases."""
+        """Maximum of the shaped cuts in some conditions."""
         ranks = [self.cases.index(case) for case in cases]
-        return largest_xyz_um(region.cases[rank].residual_mm for region in figures for rank in ranks)
+        simulated = [region.cases[rank] for region in figures if region.is_shaped for rank in ranks]
+        return largest_xyz_um(each.residual_mm for each in simulated if each is not None)
+
+    def deciding(self, figures: Sequence[RegionFigures], placed: Sequence[Placed]) -> tuple[int, int] | None:
+        """Lines of the cut that comes nearest to a limit in a condition that counts; None: there is no cut."""
+        worst = worst_counted(self._case_verdicts(figures, placed))
+        return None if worst is None else worst.lines
 
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
         """What a region is judged by: its residual beside that of the original as programmed, in whatever case.
@@ -309,10 +339,18 @@ class Judge:
     def _verdict(self, figures: RegionFigures, place: Placed, block_period_s: float) -> RegionVerdict:
         limits = self.limits(figures, place)
         after = np.max([run.residual_mm for run in figures.emitted], axis=0)
-        misses = [*region_misses(self.cases, figures.cases, limits), *_haste(figures, place, block_period_s)]
+        found = region_misses(self.cases, figures.cases, limits)
+        misses = [miss for miss, _ in found]
+        worse: list[str] = []
         excess, allowed = figures.feed_excess, self._machine.tolerance.feed_excess_ratio
-        if excess.ratio > 1.0 + allowed:
-            misses.append(f"{excess}, limit {allowed * 100.0:g} %")
+        if excess is not None:
+            before = {each.figure: each.value_um for each in judge_region(case_figures(figures.original), limits)}
+            worse = [miss for miss, judged in found if judged.value_um > before[judged.figure] * _WORSE + _WORSE_UM]
+            too_fast = _haste(figures, place, block_period_s)
+            if excess.ratio > 1.0 + allowed:
+                too_fast.append(f"{excess}, limit {allowed * 100.0:g} %")
+            misses += too_fast
+            worse += too_fast
         return RegionVerdict(
             lines=place.original_lines,
             emitted_lines=(place.first_line, place.last_line),
@@ -320,20 +358,26 @@ class Judge:
             residual_vibration_um=Pair(largest_xyz_um([figures.original.residual_mm]), largest_xyz_um([after])),
             residual_limit_um=Xyz(*limits.residual_um.tolist()),
             contour_error_um=max(getattr(run, limits.target).max_abs_mm for run in figures.emitted) * 1e3,
+            original_contour_error_um=getattr(figures.original, limits.target).max_abs_mm * 1e3,
             feed_excess=excess,
             misses=tuple(misses),
+            worse=tuple(worse),
         )
 
     def _case_verdicts(self, figures: Sequence[RegionFigures], placed: Sequence[Placed]) -> tuple[CaseVerdict, ...]:
-        if not figures:
-            return ()
         limits = [self.limits(region, place) for region, place in zip(figures, placed, strict=True)]
-        lines = [place.original_lines for place in placed]
         side = self._machine.input.material_side
-        return tuple(
-            case_verdict(case, [region.cases[rank] for region in figures], limits, lines, side)
-            for rank, case in enumerate(self.cases)
-        )
+        verdicts = []
+        for rank, case in enumerate(self.cases):
+            rows = [
+                (found, limit, place.original_lines)
+                for region, limit, place in zip(figures, limits, placed, strict=True)
+                if (found := region.cases[rank]) is not None
+            ]
+            if rows:
+                played, within, lines = [row[0] for row in rows], [row[1] for row in rows], [row[2] for row in rows]
+                verdicts.append(case_verdict(case, played, within, lines, side))
+        return tuple(verdicts)
 
 
 def case_verdict(

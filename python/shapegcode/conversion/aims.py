@@ -1,0 +1,222 @@
+"""What each cut is shaped for: its contour tolerance and feed, and what that may cost in time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from shapegcode.conversion.curve import CutCurve
+from shapegcode.conversion.whole_text import Written
+from shapegcode.machine import Machine
+from shapegcode.program import Program
+from shapegcode.verdict.judge import Judge, RegionFigures
+
+__all__ = ["Aims"]
+
+MARGIN = 0.95
+"""Of the tolerance, for which a cut is planned: the rest is for rounding and for what the plan leaves out."""
+
+_SLOWER = 0.98  # than what would just be slow enough
+_LEAST_FEED_RATIO = 0.5  # of the programmed feed: what runs too fast at that is not the feed's doing
+_HELPED = 0.98  # of what was reached before: a tighter plan that brings no more is taken back
+_PRICE_MARGIN = 0.995  # of the time that a price allows, for a plan
+_LOOSER = 1.1  # least step of a tolerance that was still too expensive
+_LEVELS = 40  # steps of a bisection
+
+
+@dataclass
+class _Attempt:
+    """The last plan of a cut that left its tolerance, what it then reached, µm, and whether a tighter one helps.
+
+    `overridden`: it left the tolerance only at another feed override.
+    """
+
+    room_um: float
+    reached_um: float
+    overridden: bool
+    helps: bool = True
+
+
+class Aims:
+    """Tolerance, feed and price of every cut of one conversion.
+
+    Args:
+        program: the original.
+        machine: its tolerances and prices.
+        reasons: why a cut is left unchanged, per cut; empty: it is shaped. Changed here.
+        curve_of: time of a cut over its tolerance, by its index.
+    """
+
+    def __init__(
+        self, program: Program, machine: Machine, reasons: list[str], curve_of: Callable[[int], CutCurve]
+    ) -> None:
+        count = len(program.regions)
+        self._machine, self._curve_of = machine, curve_of
+        self._places = {id(region): index for index, region in enumerate(program.regions)}
+        self.reasons = reasons
+        self.tolerance_um = [machine.tolerance.contour_um] * count
+        """That each cut is shaped for: the machine's, or the tightest that its price allows."""
+        self.room_um = [machine.tolerance.contour_um * MARGIN] * count
+        """Deviation that its feed is planned for."""
+        self.feed_ratio = [1.0] * count
+        """Of the programmed feed, that it is planned with."""
+        self.original_s: dict[int, float] = {}
+        self.emitted_s: dict[int, float] = {}
+        """Of every cut that was shaped once, until the set-points rest."""
+        self._blocks_s: dict[int, float] = {}  # time of its blocks
+        self._tried: dict[int, _Attempt] = {}
+
+    def index(self, figures_place: object) -> int:
+        """Rank of a region of the original."""
+        return self._places[id(figures_place)]
+
+    def note(self, written: Written, figures: Sequence[RegionFigures]) -> None:
+        """Remember how long the cuts take as they were shaped."""
+        for place, region in zip(written.placed, figures, strict=True):
+            index = self.index(place.region)
+            self.original_s[index], self.emitted_s[index] = region.original.duration_s, region.emitted_s
+            self._blocks_s[index] = written.durations_s[index]
+
+    def slow_down(self, written: Written, figures: Sequence[RegionFigures]) -> bool:
+        """Give cuts that run faster along the path than the machine allows a lower feed. False if there are none."""
+        limit = 1.0 + self._machine.tolerance.feed_excess_ratio
+        slower = False
+        for place, region in zip(written.placed, figures, strict=True):
+            excess = region.feed_excess
+            index, ratio = self.index(place.region), 0.0 if excess is None else excess.ratio
+            if ratio > limit and self.feed_ratio[index] > _LEAST_FEED_RATIO:
+                self.feed_ratio[index] = max(_LEAST_FEED_RATIO, self.feed_ratio[index] * _SLOWER * limit / ratio)
+                slower = True
+        return slower
+
+    def tighten(self, written: Written, figures: Sequence[RegionFigures], judge: Judge) -> bool:
+        """Plan cuts that left their contour tolerance more tightly, so that they run slower. False if there is none.
+
+        The bound on feed counts corners and arcs one by one; where several fall into one shaper they add up. Where the
+        feed was searched for a target, what it was planned for counts: a looser plan than that would change nothing. A
+        cut that a tighter plan does not help gets its plan back: slower would only be slower. So does one that is
+        within the limit at 100 % feed override, and after one attempt still not at the stated others.
+        """
+        room_um = self.room_um
+        tightened = False
+        for place, region in zip(written.placed, figures, strict=True):
+            index = self.index(place.region)
+            limit, before = self.tolerance_um[index], self._tried.get(index)
+            reached = judge.contour_um(region, turned=False)
+            if overridden := reached <= limit:
+                reached = judge.contour_um(region)
+            if reached <= limit or (before is not None and not before.helps):
+                continue
+            tightened = True
+            if before is not None and (before.overridden or (not overridden and reached > _HELPED * before.reached_um)):
+                room_um[index] = before.room_um
+                before.helps = False
+                continue
+            self._tried[index] = _Attempt(room_um[index], reached, overridden)
+            room_um[index] = min(room_um[index], written.planned_um.get(index, math.inf))
+            room_um[index] *= MARGIN * limit / reached
+        return tightened
+
+    def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], *, last: bool = False) -> bool:
+        """Loosen cuts that take longer than the price of one cut; leave unchanged what costs more in any case.
+
+        Args:
+            written: what was shaped.
+            keepable: whether a cut may be left unchanged, by its index.
+            last: there is no further attempt: what is above the price is left unchanged.
+
+        Returns:
+            False: every cut was within the price.
+        """
+        percent = self._machine.price.cut_time_percent
+        changed = False
+        for place in written.placed:
+            index = self.index(place.region)
+            allowed_s = self.original_s[index] * (1.0 + percent / 100.0)
+            if self.emitted_s[index] <= allowed_s:
+                continue
+            found_um = self._tightest_um(index, allowed_s)
+            if found_um is not None and not last:
+                self._loosen(index, found_um)
+            elif keepable(index):
+                cost = (self.time_s(index, math.inf) / self.original_s[index] - 1.0) * 100.0
+                self.reasons[index] = (
+                    f"shaping it takes {cost:+.0f} % time at any tolerance, price {percent:g} % "
+                    "(price.cut_time_percent)"
+                )
+            else:
+                continue
+            changed = True
+        return changed
+
+    def keep_program_price(
+        self, excess_s: float, gains_um: Mapping[int, float], keepable: Callable[[int], bool]
+    ) -> bool:
+        """Loosen cuts, all to one tolerance, until the program is within its price; then leave cuts unchanged.
+
+        Args:
+            excess_s: time above what the price allows.
+            gains_um: of each shaped cut.
+            keepable: whether a cut may be left unchanged, by its index.
+
+        Returns:
+            False: nothing can be done.
+        """
+        cuts = [index for index in gains_um if not self.reasons[index]]
+        now_s = math.fsum(self.emitted_s[index] for index in cuts)
+        wanted_s = now_s - excess_s
+
+        def total_s(level_um: float) -> float:
+            return math.fsum(self.time_s(index, max(level_um, self.tolerance_um[index])) for index in cuts)
+
+        if cuts and total_s(math.inf) <= wanted_s:
+            low, high = self._machine.tolerance.contour_um, max(self._curve_of(index).loosest_um for index in cuts)
+            for _ in range(_LEVELS):
+                middle = math.sqrt(low * high)
+                low, high = (middle, high) if total_s(middle) > wanted_s else (low, middle)
+            for index in cuts:
+                if self.time_s(index, self.tolerance_um[index]) - self.time_s(index, high) > 1e-3 * excess_s:
+                    self._loosen(index, max(high, self.tolerance_um[index]))
+            return True
+        costs = {index: self.emitted_s[index] - self.original_s[index] for index in cuts if keepable(index)}
+        order = sorted((i for i in costs if costs[i] > 0.0), key=lambda index: gains_um[index] / costs[index])
+        for index in order:
+            if excess_s <= 0.0:
+                break
+            excess_s -= costs[index]
+            percent = self._machine.price.program_time_percent
+            self.reasons[index] = (
+                f"gains least for its time ({gains_um[index]:.1f} µm for {costs[index]:.2f} s), and the program may "
+                f"take {percent:g} % more (price.program_time_percent)"
+            )
+        return bool(order)
+
+    def _loosen(self, index: int, tolerance_um: float) -> None:
+        if tolerance_um <= self.tolerance_um[index] * (1.0 + 1e-9):
+            tolerance_um = _LOOSER * self.tolerance_um[index]  # the plan was too good
+        self.tolerance_um[index] = tolerance_um
+        self.room_um[index] = tolerance_um * MARGIN
+        self._tried.pop(index, None)
+
+    def _tightest_um(self, index: int, allowed_s: float) -> float | None:
+        """Tightest tolerance at which a cut is within a time; None: there is none."""
+        if self.time_s(index, math.inf) > allowed_s:
+            return None
+        low, high = self.tolerance_um[index], max(self._curve_of(index).loosest_um, self.tolerance_um[index])
+        for _ in range(_LEVELS):
+            middle = math.sqrt(low * high)
+            within = self.time_s(index, middle) <= allowed_s * _PRICE_MARGIN
+            low, high = (low, middle) if within else (middle, high)
+        return high
+
+    def time_s(self, index: int, tolerance_um: float) -> float:
+        """What a cut that was shaped once takes at a tolerance; infinity: nothing is slowed.
+
+        As it is planned, with what the control's own filter adds; never less than what it took at a looser tolerance.
+        """
+        now_s, now_um = self.emitted_s[index], self.tolerance_um[index]
+        if math.isclose(tolerance_um, now_um, rel_tol=1e-9):
+            return now_s
+        planned_s = self._curve_of(index).time_s(tolerance_um * MARGIN) + now_s - self._blocks_s[index]
+        return min(planned_s, now_s) if tolerance_um > now_um else max(planned_s, now_s)

@@ -1,0 +1,220 @@
+"""A whole emitted program beside its original: shaped cuts, cuts left unchanged, and the rapids between them."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.errors import RoundTripError
+from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.program import Program
+from shapegcode.program.pairing import paired_regions
+from shapegcode.results.figures import largest_xyz_um
+from shapegcode.results.result import Pair, Xyz
+from shapegcode.verdict.ahead import cores
+from shapegcode.verdict.case_player import case_figures
+from shapegcode.verdict.cases import ALL_MODES, Case, CaseFigures, stated_cases
+from shapegcode.verdict.figures import PlayedFigures
+from shapegcode.verdict.judge import Judge, RegionFigures
+from shapegcode.verdict.placed import Placed
+
+__all__ = ["begin_unchanged", "judge_program", "rapid_vibration_um", "simulate_unchanged", "unshaped_regions"]
+
+Vector = npt.NDArray[np.float64]
+
+
+def judge_program(emitted: Program, original: Program, machine: Machine) -> PlayedFigures:
+    """An emitted program judged in the operating conditions that count, as `convert` judges its own.
+
+    Args:
+        emitted: what was written, read back.
+        original: from which it was made.
+        machine: whose tolerances and stated band count.
+
+    Returns:
+        The figures of the whole program.
+
+    Raises:
+        ArgumentError: the original has a cut that the emitted program has not.
+    """
+    model = MachineModel(machine)
+    judge = Judge(model, [case for case in stated_cases(machine) if case.counts or case.nominal])
+    pairs = list(paired_regions(emitted, original))
+    placed = [Placed(region, mine.first_line, mine.last_line) for mine, region in pairs]
+    shaped = [place for place, (mine, _) in zip(placed, pairs, strict=True) if mine.shaped]
+    with ThreadPoolExecutor(max_workers=cores()) as pool:
+        originals = [
+            pool.submit(model.play_original, place.region.path, offset=model.offset(place.region)) for place in placed
+        ]
+        of_shaped = [run for run, (mine, _) in zip(originals, pairs, strict=True) if mine.shaped]
+        simulated = iter(judge.measure(emitted, shaped, of_shaped, pool))
+        unchanged = iter(
+            begin_unchanged(
+                judge, model, [pair for pair in pairs if not pair[0].shaped],
+                [run for run, (mine, _) in zip(originals, pairs, strict=True) if not mine.shaped], pool,
+            )
+        )  # fmt: skip
+        figures = [next(simulated) if mine.shaped else next(unchanged).result() for mine, _ in pairs]
+        rapids = Pair(rapid_vibration_um(original, model), rapid_vibration_um(emitted, model))
+    period_s = machine.emission.block_period_s or machine.controller.interpolation_period_s
+    return judge.summarise(figures, placed, period_s, rapids)
+
+
+def begin_unchanged(
+    judge: Judge,
+    model: MachineModel,
+    pairs: Sequence[tuple[_core.Region, _core.Region]],
+    originals: Sequence[Future[_core.PlaybackFigures]],
+    pool: Executor,
+) -> list[Future[RegionFigures]]:
+    """Begin to simulate cuts left unchanged.
+
+    Args:
+        judge: whose operating conditions count.
+        model: of the machine.
+        pairs: each cut as it stands in the emitted program, and in the original.
+        originals: simulations of the original cuts under way.
+        pool: runs the simulations.
+
+    Returns:
+        The figures of each cut, under way.
+    """
+    return [
+        pool.submit(_later, judge, model, mine, region, original)
+        for (mine, region), original in zip(pairs, originals, strict=True)
+    ]
+
+
+def _later(
+    judge: Judge,
+    model: MachineModel,
+    mine: _core.Region,
+    region: _core.Region,
+    original: Future[_core.PlaybackFigures],
+) -> RegionFigures:
+    return simulate_unchanged(judge, model, mine, region, original.result())
+
+
+def simulate_unchanged(
+    judge: Judge, model: MachineModel, mine: _core.Region, region: _core.Region, original: _core.PlaybackFigures
+) -> RegionFigures:
+    """A cut left unchanged in every operating condition that counts for it.
+
+    Rules of block timing, a buffer underrun and look-ahead left on concern shaped blocks alone: there it is as it is
+    meant to run. Other feed overrides and uncertain modes are simulated where they count.
+
+    Args:
+        judge: whose operating conditions count.
+        model: of the machine.
+        mine: the cut as it stands in the emitted program.
+        region: the cut of the original.
+        original: it, simulated.
+
+    Returns:
+        Its figures.
+    """
+    path, offset = mine.path, model.offset(region)
+    same = path.moves_as(region.path)
+    run = original if same else model.play_original(path, against=region.path, offset=offset)
+
+    def figures(case: Case) -> CaseFigures | None:
+        if case.override == 1.0 and case.mode is None:
+            return case_figures(run)
+        if not case.counts:
+            return None
+        only = None if case.mode == ALL_MODES else case.mode
+        return case_figures(
+            model.play_original(
+                path, against=None if same else region.path, override=case.override, shift=case.shift, only=only,
+                offset=offset,
+            )
+        )  # fmt: skip
+
+    return RegionFigures(original, (run,), tuple(map(figures, judge.cases)), 0, is_shaped=False)
+
+
+def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
+    """Vibration that rapids leave where a cut follows: maximum of |table - command| once their set-points rest.
+
+    Args:
+        program: any; shaped rapids are simulated as shaped blocks.
+        model: of the machine.
+
+    Returns:
+        Per axis, µm; it is held to no limit, as nothing is cut while a rapid moves.
+    """
+    found: dict[tuple[float, ...], Vector] = {}
+    for start_mm, end_mm in _rapids_before_cuts(program):
+        key = tuple(np.round(end_mm - start_mm, 9))
+        if key not in found:
+            found[key] = _behind(start_mm, end_mm, model)
+    shaped = [
+        model.play_emitted(region.path, region.path, rule, contour=False, offset=model.offset(region)).residual_mm
+        for region in program.regions
+        if region.was_rapid
+        for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry)
+    ]
+    return largest_xyz_um([*found.values(), *shaped])
+
+
+def _behind(start_mm: Vector, end_mm: Vector, model: MachineModel) -> Vector:
+    options = model.verdict_options()
+    options.measure_contour = False
+    samples = _core.rapid_samples(start_mm, end_mm, model.ordinary.model)
+    still = _core.Path([_core.Segment.line(start_mm, start_mm, 1.0)])
+    return np.array(_core.play_samples(np.asfortranarray(samples), still, options).residual_mm)
+
+
+def _rapids_before_cuts(program: Program) -> Iterator[tuple[Vector, Vector]]:
+    """Start and end of every rapid that nothing but functions and dwells lies between it and a cut."""
+    moves = program.core.other_moves
+    last: _core.Segment | None = None
+    regions = program.regions
+    for kind, index, _ in program.core.steps:
+        if kind == _core.StepKind.move:
+            segment, dwell_s = moves[index]
+            if segment.kind == _core.SegmentKind.rapid and segment.length_mm > 0.0:
+                last = segment
+            elif dwell_s <= 0.0:
+                last = None
+        elif kind == _core.StepKind.region:
+            if last is not None and not regions[index].was_rapid:
+                yield np.asarray(last.start_mm), np.asarray(last.end_mm)
+            last = None
+
+
+def unshaped_regions(
+    emitted: Program, shaped_lines: Sequence[tuple[int, int]], expected: Sequence[_core.Region]
+) -> list[_core.Region]:
+    """The cuts of an emitted program that were left unchanged.
+
+    Args:
+        emitted: read back.
+        shaped_lines: of it, first and last, of each shaped cut and shaped rapid.
+        expected: the cuts of the original that were left unchanged, in order.
+
+    Returns:
+        One for each of them.
+
+    Raises:
+        RoundTripError: there are others.
+    """
+    starts = sorted(shaped_lines)
+    begins = [begin for begin, _ in starts]
+
+    def is_shaped(region: _core.Region) -> bool:
+        rank = bisect_right(begins, region.first_line) - 1
+        return rank >= 0 and region.first_line <= starts[rank][1]
+
+    found = [region for region in emitted.regions if not is_shaped(region)]
+    if len(found) != len(expected):
+        raise RoundTripError(
+            f"the emitted program has {len(found)} cuts beside the shaped ones, expected {len(expected)}"
+        )
+    return found
