@@ -21,7 +21,7 @@ _SLOWER = 0.98  # than what would just be slow enough
 _LEAST_FEED_RATIO = 0.5  # of the programmed feed: what runs too fast at that is not the feed's doing
 _HELPED = 0.98  # of what was reached before: a tighter plan that brings no more is taken back
 _PRICE_MARGIN = 0.995  # of the time that a price allows, for a plan
-_LOOSER = 1.1  # least step of a tolerance that was still too expensive
+_LOOSER = 1.05  # least step of a plan that was still too expensive
 _LEVELS = 40  # steps of a bisection
 
 
@@ -55,8 +55,7 @@ class Aims:
         self._machine, self._curve_of = machine, curve_of
         self._places = {id(region): index for index, region in enumerate(program.regions)}
         self.reasons = reasons
-        self.tolerance_um = [machine.tolerance.contour_um] * count
-        """That each cut is shaped for: the machine's, or the tightest that its price allows."""
+        self._asked_um = machine.tolerance.contour_um
         self.room_um = [machine.tolerance.contour_um * MARGIN] * count
         """Deviation that its feed is planned for."""
         self.feed_ratio = [1.0] * count
@@ -66,6 +65,7 @@ class Aims:
         """Of every cut that was shaped once, until the set-points rest."""
         self._blocks_s: dict[int, float] = {}  # time of its blocks
         self._tried: dict[int, _Attempt] = {}
+        self._priced: set[int] = set()  # planned as closely as their price allows, whatever that reaches
 
     def index(self, figures_place: object) -> int:
         """Rank of a region of the original."""
@@ -102,7 +102,9 @@ class Aims:
         tightened = False
         for place, region in zip(written.placed, figures, strict=True):
             index = self.index(place.region)
-            limit, before = self.tolerance_um[index], self._tried.get(index)
+            limit, before = self._asked_um, self._tried.get(index)
+            if index in self._priced:
+                continue
             reached = judge.contour_um(region, turned=False)
             if overridden := reached <= limit:
                 reached = judge.contour_um(region)
@@ -118,13 +120,13 @@ class Aims:
             room_um[index] *= MARGIN * limit / reached
         return tightened
 
-    def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], *, last: bool = False) -> bool:
+    def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], attempts_left: int) -> bool:
         """Loosen cuts that take longer than the price of one cut; leave unchanged what costs more in any case.
 
         Args:
             written: what was shaped.
             keepable: whether a cut may be left unchanged, by its index.
-            last: there is no further attempt: what is above the price is left unchanged.
+            attempts_left: in the last but one nothing is slowed, in the last what costs more is left unchanged.
 
         Returns:
             False: every cut was within the price.
@@ -137,10 +139,11 @@ class Aims:
             if self.emitted_s[index] <= allowed_s:
                 continue
             found_um = self._tightest_um(index, allowed_s)
-            if found_um is not None and not last:
-                self._loosen(index, found_um)
+            if found_um is not None and attempts_left > 0:
+                self._loosen(index, found_um if attempts_left > 1 else self._curve_of(index).loosest_um)
             elif keepable(index):
-                cost = (self.time_s(index, math.inf) / self.original_s[index] - 1.0) * 100.0
+                least_s = self.emitted_s[index] if found_um is not None else self._planned_s(index, math.inf)
+                cost = (least_s / self.original_s[index] - 1.0) * 100.0
                 self.reasons[index] = (
                     f"shaping it takes {cost:+.0f} % time at any tolerance, price {percent:g} % "
                     "(price.cut_time_percent)"
@@ -164,20 +167,20 @@ class Aims:
             False: nothing can be done.
         """
         cuts = [index for index in gains_um if not self.reasons[index]]
-        now_s = math.fsum(self.emitted_s[index] for index in cuts)
-        wanted_s = now_s - excess_s
+        wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
 
         def total_s(level_um: float) -> float:
-            return math.fsum(self.time_s(index, max(level_um, self.tolerance_um[index])) for index in cuts)
+            return math.fsum(self._planned_s(index, max(level_um, self.room_um[index])) for index in cuts)
 
         if cuts and total_s(math.inf) <= wanted_s:
-            low, high = self._machine.tolerance.contour_um, max(self._curve_of(index).loosest_um for index in cuts)
-            for _ in range(_LEVELS):
-                middle = math.sqrt(low * high)
-                low, high = (middle, high) if total_s(middle) > wanted_s else (low, middle)
+            level_um = _bisect(
+                min(self.room_um), max(self._curve_of(index).loosest_um for index in cuts),
+                lambda room_um: total_s(room_um) <= wanted_s,
+            )  # fmt: skip
             for index in cuts:
-                if self.time_s(index, self.tolerance_um[index]) - self.time_s(index, high) > 1e-3 * excess_s:
-                    self._loosen(index, max(high, self.tolerance_um[index]))
+                saved_s = self._planned_s(index, self.room_um[index]) - self._planned_s(index, level_um)
+                if level_um > self.room_um[index] and saved_s > 1e-3 * excess_s:
+                    self._loosen(index, level_um)
             return True
         costs = {index: self.emitted_s[index] - self.original_s[index] for index in cuts if keepable(index)}
         order = sorted((i for i in costs if costs[i] > 0.0), key=lambda index: gains_um[index] / costs[index])
@@ -192,31 +195,48 @@ class Aims:
             )
         return bool(order)
 
-    def _loosen(self, index: int, tolerance_um: float) -> None:
-        if tolerance_um <= self.tolerance_um[index] * (1.0 + 1e-9):
-            tolerance_um = _LOOSER * self.tolerance_um[index]  # the plan was too good
-        self.tolerance_um[index] = tolerance_um
-        self.room_um[index] = tolerance_um * MARGIN
-        self._tried.pop(index, None)
-
-    def _tightest_um(self, index: int, allowed_s: float) -> float | None:
-        """Tightest tolerance at which a cut is within a time; None: there is none."""
-        if self.time_s(index, math.inf) > allowed_s:
-            return None
-        low, high = self.tolerance_um[index], max(self._curve_of(index).loosest_um, self.tolerance_um[index])
-        for _ in range(_LEVELS):
-            middle = math.sqrt(low * high)
-            within = self.time_s(index, middle) <= allowed_s * _PRICE_MARGIN
-            low, high = (low, middle) if within else (middle, high)
-        return high
+    def shaped_for_um(self, index: int) -> float:
+        """Contour tolerance that a cut is shaped for: what was asked, or the tightest that its price allows."""
+        return max(self._asked_um, self.room_um[index] / MARGIN) if index in self._priced else self._asked_um
 
     def time_s(self, index: int, tolerance_um: float) -> float:
-        """What a cut that was shaped once takes at a tolerance; infinity: nothing is slowed.
+        """What a cut that was shaped once takes at a contour tolerance; infinity: nothing is slowed.
 
-        As it is planned, with what the control's own filter adds; never less than what it took at a looser tolerance.
+        As simulated at the tolerance that it is shaped for; else as planned, with what the control's own filter adds.
         """
-        now_s, now_um = self.emitted_s[index], self.tolerance_um[index]
-        if math.isclose(tolerance_um, now_um, rel_tol=1e-9):
-            return now_s
-        planned_s = self._curve_of(index).time_s(tolerance_um * MARGIN) + now_s - self._blocks_s[index]
-        return min(planned_s, now_s) if tolerance_um > now_um else max(planned_s, now_s)
+        if math.isclose(tolerance_um, self.shaped_for_um(index), rel_tol=1e-9):
+            return self.emitted_s[index]
+        return self._planned_s(index, tolerance_um * MARGIN)
+
+    def _planned_s(self, index: int, room_um: float) -> float:
+        """What a cut takes where its feed is planned for a deviation.
+
+        What slowing costs, in the ratio in which it cost it as simulated; what is not slowed takes what is planned.
+        """
+        curve, blocks_s = self._curve_of(index), self._blocks_s[index]
+        least_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.room_um[index], room_um))
+        ratio = max(0.0, blocks_s - least_s) / (now_s - least_s) if now_s > least_s else 1.0
+        slowest_s = least_s if now_s > least_s else max(least_s, blocks_s)
+        return self.emitted_s[index] - blocks_s + slowest_s + ratio * (then_s - least_s)
+
+    def _loosen(self, index: int, room_um: float) -> None:
+        self.room_um[index] = max(room_um, _LOOSER * self.room_um[index])  # more, where a plan was too good
+        self._priced.add(index)
+
+    def _tightest_um(self, index: int, allowed_s: float) -> float | None:
+        """Smallest deviation for which a cut can be planned within a time; None: there is none."""
+        if self._planned_s(index, math.inf) > allowed_s:
+            return None
+        now_um = self.room_um[index]
+        return _bisect(
+            now_um, max(self._curve_of(index).loosest_um, now_um),
+            lambda room_um: self._planned_s(index, room_um) <= allowed_s * _PRICE_MARGIN,
+        )  # fmt: skip
+
+
+def _bisect(low: float, high: float, is_enough: Callable[[float], bool]) -> float:
+    """Smallest value that is enough, over the logarithm; the upper end if nothing is."""
+    for _ in range(_LEVELS):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if is_enough(middle) else (middle, high)
+    return high

@@ -50,7 +50,8 @@ from shapegcode.verdict.program import rapid_vibration_um, simulate_unchanged, u
 __all__ = ["convert"]
 
 _ATTEMPTS = 10  # each for cuts that left their tolerance, ran too fast or cost too much; few need more than two
-_PRICE_ROUNDS = 4
+_PRICE_ROUNDS = 6
+_NEAR_PRICE = 0.7  # of the price: from here on the time of the program is worked out in full
 
 Progress = Callable[[str, float, int], None]
 
@@ -322,10 +323,12 @@ class _Run:
     def _excess_s(self, settled: _Settled) -> float:
         """Time above what the price of the program allows."""
         original_s = self.original_s.result()
-        allowed_s = original_s * (1.0 + self.machine.price.program_time_percent / 100.0)
+        price_s = original_s * self.machine.price.program_time_percent / 100.0
         cuts_s = math.fsum(figures.emitted_s - figures.original.duration_s for figures in settled.figures)
         cuts_s += self.machine.emission.prefill_dwell_s * len(settled.figures)
-        return original_s + cuts_s - allowed_s
+        if cuts_s < _NEAR_PRICE * price_s or not self.machine.emission.header:
+            return cuts_s - price_s
+        return self.model.cycle_time_s(settled.emitted.core) - original_s - price_s
 
     def _is_benefit(self, settled: _Settled) -> bool:
         least, limit_um = self.machine.shaping.least_gain_um, self.machine.tolerance.contour_um
@@ -368,7 +371,7 @@ class _Run:
             changed = self.aims.slow_down(written, figures)
             last = attempt + 1 == _ATTEMPTS
             changed = (not last and self.aims.tighten(written, figures, self.judge)) or changed
-            changed = self.aims.keep_cut_price(written, self._is_keepable, last=last) or changed
+            changed = self.aims.keep_cut_price(written, self._is_keepable, _ATTEMPTS - 1 - attempt) or changed
             if not changed:
                 break
             settled.trackers.clear()  # nobody asks for them any more: they take room beside the next text
@@ -524,7 +527,7 @@ class _Run:
             rows.append(
                 outcome_of(
                     cut, is_shaped=index in sizes, reason=self.reasons[index], gain_um=gained,
-                    tolerance_um=self.aims.tolerance_um[index], tool=tools.get(index),
+                    tolerance_um=self.aims.shaped_for_um(index), tool=tools.get(index),
                     size=Pair(read, sizes.get(index, read)),
                 )
             )  # fmt: skip

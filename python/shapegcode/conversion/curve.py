@@ -24,6 +24,7 @@ __all__ = ["CutCurve", "CutCurves", "ToleranceCurve", "TolerancePoint", "curve_t
 FACTORS = (1.0, 1.25, 1.5, 2.0)
 """Of the tolerance that was asked for: at these it is planned."""
 
+_BETWEEN = (2.8, 4.0, 5.6, 8.0)  # likewise, so that the curve between them is known where a price asks for it
 _FLAT = 0.002  # of the time: a curve that falls by less has no knee
 
 
@@ -111,7 +112,9 @@ def plan_curve(
     Returns:
         Its time at each.
     """
-    wanted = sorted({*(factor * asked_um for factor in FACTORS), max(original_um, asked_um)}, reverse=True)
+    wanted = sorted(
+        {*(factor * asked_um for factor in (*FACTORS, *_BETWEEN)), max(original_um, asked_um)}, reverse=True
+    )
     tried = [math.inf, *(each * 1e-3 for each in wanted)]
     planned = _core.plan_tolerances(path, fir, options, tried)
     reached_um = max(planned[0][1] * 1e3, 1e-3)
