@@ -63,6 +63,7 @@ class Aims:
         self.original_s: dict[int, float] = {}
         self.emitted_s: dict[int, float] = {}
         """Of every cut that was shaped once, until the set-points rest."""
+        self._asked_s: dict[int, float] = {}  # likewise, for the tolerance that was asked for
         self._blocks_s: dict[int, float] = {}  # time of its blocks
         self._tried: dict[int, _Attempt] = {}
         self._priced: set[int] = set()  # planned as closely as their price allows, whatever that reaches
@@ -77,6 +78,8 @@ class Aims:
             index = self.index(place.region)
             self.original_s[index], self.emitted_s[index] = region.original.duration_s, region.emitted_s
             self._blocks_s[index] = written.durations_s[index]
+            if index not in self._priced:
+                self._asked_s[index] = region.emitted_s
 
     def slow_down(self, written: Written, figures: Sequence[RegionFigures]) -> bool:
         """Give cuts that run faster along the path than the machine allows a lower feed. False if there are none."""
@@ -202,11 +205,11 @@ class Aims:
     def time_s(self, index: int, tolerance_um: float) -> float:
         """What a cut that was shaped once takes at a contour tolerance; infinity: nothing is slowed.
 
-        As simulated at the tolerance that it is shaped for; else as planned, with what the control's own filter adds.
+        As simulated at the tolerance that was asked for; else as planned, with what the control's own filter adds.
         """
-        if math.isclose(tolerance_um, self.shaped_for_um(index), rel_tol=1e-9):
-            return self.emitted_s[index]
-        return self._planned_s(index, tolerance_um * MARGIN)
+        if tolerance_um <= self._asked_um:
+            return self._asked_s[index]
+        return min(self._asked_s[index], self._planned_s(index, tolerance_um * MARGIN))
 
     def _planned_s(self, index: int, room_um: float) -> float:
         """What a cut takes where its feed is planned for a deviation.

@@ -17,7 +17,6 @@ from shapegcode.conversion.rests import RestsOn
 from shapegcode.conversion.tables import (
     BeforeAfter,
     before_after_table,
-    case_table,
     change_percent,
     percent,
     rests_table,
@@ -33,6 +32,7 @@ from shapegcode.results.result import Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table
 from shapegcode.verdict.figures import AppliedLimits, BlockCount, PlayedFigures, UsedShaper
 from shapegcode.verdict.placed import Placed
+from shapegcode.verdict.tables import case_table
 
 __all__ = ["Conversion"]
 

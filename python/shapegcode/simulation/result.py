@@ -16,6 +16,8 @@ from shapegcode.results.json import hidden, sparse
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result, Xyz
 from shapegcode.results.table import Column, Table, xyz_columns
+from shapegcode.verdict.figures import PlayedFigures
+from shapegcode.verdict.tables import case_table
 
 __all__ = ["Motion", "RegionRun", "ShapedFigures", "Simulation"]
 
@@ -164,6 +166,8 @@ class Simulation(Result):
         response_orbit_error_percent: of the table, likewise.
         regions: the cutting regions in order.
         of_shaped: the shaped regions alone; None: there are none.
+        verdict: with `against`: the whole program judged beside its original in the operating conditions that count, as
+            `convert` judges what it writes.
         motion: the whole program in time; None: not asked for.
         warnings: of the program and of the machine.
         played: the program, to play it again for a page.
@@ -187,13 +191,14 @@ class Simulation(Result):
     regions: tuple[RegionRun, ...]
     warnings: tuple[str, ...]
     of_shaped: ShapedFigures | None = None
+    verdict: PlayedFigures | None = field(default=None, metadata=sparse())
     motion: Motion | None = field(default=None, metadata=sparse())
     played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def ok(self) -> bool:
-        """It was played; nothing is held against a tolerance."""
-        return True
+        """Without `against` nothing is held against a tolerance; with it every cut keeps its limits."""
+        return self.verdict is None or self.verdict.within_tolerance
 
     @property
     def answer(self) -> str:
@@ -201,12 +206,28 @@ class Simulation(Result):
         takes = f"{Path(self.program).name} takes {self.cycle_time_s:.2f} s on {self.machine}"
         if not self.regions:
             return f"{takes}; no cutting region ({self.plant} plant)"
+        if self.verdict is not None:
+            return f"{takes}; {self._judged_answer(self.verdict)}"
         axis = max("xyz", key=lambda each: self.residual_vibration_um[each])
         return (
             f"{takes}, {self.cutting_time_s:.2f} s of it in cutting regions; {_NAMES[self.plant][0]} "
             f"{axis.upper()} {self.residual_vibration_um[axis]:.2f} µm, contour error {self._contour.max:.2f} µm "
             f"{'against its own blocks ' if self.shaped and self._own_path else ''}"
             f"({self.plant} plant)"
+        )
+
+    @staticmethod
+    def _judged_answer(verdict: PlayedFigures) -> str:
+        """The figures of `convert`, and the worst cut that misses a limit."""
+        out = [cut for cut in verdict.all_cuts if cut.misses]
+        residual = verdict.residual_vibration_um
+        axis = max("xyz", key=lambda each: residual.original[each])
+        contour = verdict.contour_error_um.response
+        missed = "lines {} to {}: {}".format(*out[0].lines, out[0].misses[0]) if out else ""
+        return (
+            f"{'out of tolerance' if out else 'within tolerance'}: residual vibration {axis.upper()} "
+            f"{residual.original[axis]:.1f} → {residual.emitted[axis]:.1f} µm, contour {contour.original.max:.1f} → "
+            f"{contour.emitted.max:.1f} µm{'; ' + missed if out else ''}"
         )
 
     @property
@@ -243,6 +264,8 @@ class Simulation(Result):
     def tables(self) -> list[Table]:
         """Vibration and settling by axis; contour and orbit errors; the motion in time."""
         regions = [self._vibration_table(), self._contour_table()] if self.regions else []
+        if self.verdict is not None and self.verdict.cases:
+            regions.append(case_table(self.verdict.cases, self.verdict.worst_case))
         return [*regions, *([self.motion.table()] if self.motion is not None else [])]
 
     def _vibration_table(self) -> Table:

@@ -25,6 +25,7 @@ from shapegcode.results.result import Xyz
 from shapegcode.simulation.files import csv_file, npz_file
 from shapegcode.simulation.motion import MotionRecorder
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
+from shapegcode.verdict.program import judge_program
 
 __all__ = ["play_motion", "simulate"]
 
@@ -55,8 +56,9 @@ def simulate(
         shaped: whether cuts are shaped blocks: played at their feed, without look-ahead, behind the control's own
             filter (`controller.shaped_time_constant_s`), in the worse of both rules of block timing. None: those
             regions of which the program says so, as one that shapegcode wrote does.
-        against: the program whose path the contour error is measured against, such as the original of a shaped one;
-            None: the program's own path.
+        against: the original of a shaped program: the contour error is measured against its path, and the whole program
+            is judged beside it in the operating conditions that count, as `convert` judges what it writes. None: the
+            program's own path, and no verdict.
         record_samples: samples of command and response kept per region, at most; 0: figures only.
         on_progress: called with regions done and regions in all.
 
@@ -74,10 +76,11 @@ def simulate(
     program = given_program(program, machine)
     model, band_um = MachineModel(machine), machine.tolerance.residual_floor_um
     limit_s = _rest_s(model, plant)
-    nominal = {}
+    nominal, verdict = {}, None
     if against is not None:
         against = given_program(against, machine)
         nominal = {mine.first_line: other.path for mine, other in paired_regions(program, against)}
+        verdict = judge_program(program, against, machine, shaped=shaped)
     runs: list[RegionRun] = []
     played: list[_core.PlaybackFigures] = []
     of_shaped: list[_core.PlaybackFigures] = []
@@ -130,6 +133,7 @@ def simulate(
         orbit_error_percent=tuple(error for figures in own for error in figures.orbit_error_percent),
         response_orbit_error_percent=tuple(error for figures in own for error in figures.response_orbit_error_percent),
         of_shaped=_shaped_figures([run for run in runs if run.shaped and not run.was_rapid], of_shaped),
+        verdict=verdict,
         regions=tuple(runs),
         warnings=tuple(warnings),
         played=PlayedPrograms(program, machine, labels=("program", ""), plant=plant),

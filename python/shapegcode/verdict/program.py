@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,18 +25,22 @@ from shapegcode.verdict.figures import PlayedFigures
 from shapegcode.verdict.judge import Judge, RegionFigures
 from shapegcode.verdict.placed import Placed
 
-__all__ = ["begin_unchanged", "judge_program", "rapid_vibration_um", "simulate_unchanged", "unshaped_regions"]
+__all__ = ["judge_program", "rapid_vibration_um", "simulate_unchanged", "unshaped_regions"]
 
+T = TypeVar("T")
 Vector = npt.NDArray[np.float64]
 
 
-def judge_program(emitted: Program, original: Program, machine: Machine) -> PlayedFigures:
+def judge_program(
+    emitted: Program, original: Program, machine: Machine, *, shaped: bool | None = None
+) -> PlayedFigures:
     """An emitted program judged in the operating conditions that count, as `convert` judges its own.
 
     Args:
         emitted: what was written, read back.
         original: from which it was made.
         machine: whose tolerances and stated band count.
+        shaped: whether cuts are shaped blocks; None: those of which the program says so.
 
     Returns:
         The figures of the whole program.
@@ -46,59 +51,26 @@ def judge_program(emitted: Program, original: Program, machine: Machine) -> Play
     model = MachineModel(machine)
     judge = Judge(model, [case for case in stated_cases(machine) if case.counts or case.nominal])
     pairs = list(paired_regions(emitted, original))
+    is_shaped = [mine.shaped if shaped is None else shaped for mine, _ in pairs]
     placed = [Placed(region, mine.first_line, mine.last_line) for mine, region in pairs]
-    shaped = [place for place, (mine, _) in zip(placed, pairs, strict=True) if mine.shaped]
     with ThreadPoolExecutor(max_workers=cores()) as pool:
         originals = [
             pool.submit(model.play_original, place.region.path, offset=model.offset(place.region)) for place in placed
         ]
-        of_shaped = [run for run, (mine, _) in zip(originals, pairs, strict=True) if mine.shaped]
-        simulated = iter(judge.measure(emitted, shaped, of_shaped, pool))
-        unchanged = iter(
-            begin_unchanged(
-                judge, model, [pair for pair in pairs if not pair[0].shaped],
-                [run for run, (mine, _) in zip(originals, pairs, strict=True) if not mine.shaped], pool,
-            )
-        )  # fmt: skip
-        figures = [next(simulated) if mine.shaped else next(unchanged).result() for mine, _ in pairs]
+
+        def of(wanted: bool, rows: Sequence[T]) -> list[T]:
+            return [row for row, each in zip(rows, is_shaped, strict=True) if each == wanted]
+
+        simulated = iter(judge.measure(emitted, of(True, placed), of(True, originals), pool))
+        unchanged = [
+            pool.submit(simulate_unchanged, judge, model, mine, region, original.result())
+            for (mine, region), original in zip(of(False, pairs), of(False, originals), strict=True)
+        ]
+        left = iter(run.result() for run in unchanged)
+        figures = [next(simulated if each else left) for each in is_shaped]
         rapids = Pair(rapid_vibration_um(original, model), rapid_vibration_um(emitted, model))
     period_s = machine.emission.block_period_s or machine.controller.interpolation_period_s
     return judge.summarise(figures, placed, period_s, rapids)
-
-
-def begin_unchanged(
-    judge: Judge,
-    model: MachineModel,
-    pairs: Sequence[tuple[_core.Region, _core.Region]],
-    originals: Sequence[Future[_core.PlaybackFigures]],
-    pool: Executor,
-) -> list[Future[RegionFigures]]:
-    """Begin to simulate cuts left unchanged.
-
-    Args:
-        judge: whose operating conditions count.
-        model: of the machine.
-        pairs: each cut as it stands in the emitted program, and in the original.
-        originals: simulations of the original cuts under way.
-        pool: runs the simulations.
-
-    Returns:
-        The figures of each cut, under way.
-    """
-    return [
-        pool.submit(_later, judge, model, mine, region, original)
-        for (mine, region), original in zip(pairs, originals, strict=True)
-    ]
-
-
-def _later(
-    judge: Judge,
-    model: MachineModel,
-    mine: _core.Region,
-    region: _core.Region,
-    original: Future[_core.PlaybackFigures],
-) -> RegionFigures:
-    return simulate_unchanged(judge, model, mine, region, original.result())
 
 
 def simulate_unchanged(
