@@ -89,7 +89,8 @@ def convert(drawn: Draw, *, shape_all: bool) -> Case:
     """The package's conversion of a draw."""
     machine = machine_with(drawn.keys, drawn.machine)
     program = sg.Program.from_text(drawn.text, machine, source=f"draw {drawn.seed}")
-    conversion = sg.convert(program, machine, shape_all=shape_all)
+    prices = {"max_time_increase_percent": 1e6, "max_cut_time_increase_percent": 1e6} if shape_all else {}
+    conversion = sg.convert(program, machine, shape_all=shape_all, **prices)
     emitted = conversion.text.decode("latin-1")
     return Case(drawn, machine, program, conversion, read(drawn.text, drawn), read(emitted, drawn))
 

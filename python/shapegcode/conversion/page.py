@@ -6,6 +6,8 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
+from shapegcode.conversion.curve import curve_table
+from shapegcode.conversion.cuts import cut_table
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled_result import ScheduledConversion
 from shapegcode.conversion.tables import before_after_table, rests_table
@@ -82,6 +84,7 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
         table = rests_table(conversion.rests_on, conversion.unmeasured_tried)
         how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
         yield Section("rests", "What the verdict rests on", (table,), how=how)
+    yield from _price(conversion)
     yield _times(conversion)
     if isinstance(conversion, ScheduledConversion):
         yield Section("feeds", "Feeds and cutting forces", tuple(conversion.feed_schedule.tables()), printed=False)
@@ -93,6 +96,18 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     yield from pictures_of(conversion, ("path", "vibration"))
     if conversion.at_the_control:
         yield _sheet(conversion, made)
+
+
+def _price(conversion: Conversion) -> Iterator[Section]:
+    """Cut by cut, and what other tolerances would cost."""
+    if len(conversion.cuts) > 1:
+        how = "Red: a limit is missed. A cut left unchanged is as it was, and its figures are the original's."
+        yield Section("cuts", "Cut by cut", (cut_table(conversion.cuts, every=True),), how=how, folded=True)
+    if conversion.tolerance_curve is not None:
+        sentence = conversion.tolerance_curve.sentence
+        how = f"{sentence}. " if sentence else ""
+        how += "Planned for the cuts that can be shaped; the price is price.program_time_percent of the machine file."
+        yield Section("price", "Tolerance against time", (curve_table(conversion.tolerance_curve),), how=how)
 
 
 def _figures(conversion: Conversion) -> Iterator[Figure]:

@@ -1,14 +1,20 @@
-"""The pictures of a conversion: the region that vibrates most, before and after."""
+"""The pictures of a conversion: the cut that vibrates most, before and after, and tolerance against time."""
 
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING
 
+from shapegcode.conversion.curve import ToleranceCurve
 from shapegcode.conversion.result import Conversion
+from shapegcode.results import plot
 from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
 from shapegcode.results.result import Plot
 
-__all__ = ["plots_of"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_tolerance", "plots_of"]
 
 
 def plots_of(conversion: Conversion) -> dict[str, Plot]:
@@ -20,7 +26,40 @@ def plots_of(conversion: Conversion) -> dict[str, Plot]:
     Returns:
         By name; none for a program without shaped regions.
     """
-    return motion_pictures(partial(_played, conversion)) if conversion.placed else {}
+    found = motion_pictures(partial(_played, conversion)) if conversion.placed else {}
+    if conversion.tolerance_curve is not None and len(conversion.tolerance_curve.points) > 1:
+        found["tolerance"] = partial(plot_tolerance, conversion.tolerance_curve)
+    return found
+
+
+def plot_tolerance(curve: ToleranceCurve, ax: Axes | None = None) -> Axes:
+    """What does a tighter contour cost in time, and where is the knee?
+
+    Args:
+        curve: of a conversion.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel.
+    """
+    panel = plot.axes(ax, title="Tolerance against time")
+    points = curve.points
+    tolerances = [point.tolerance_um for point in points]
+    increases = [point.time_increase_percent for point in points]
+    panel.plot(tolerances, increases, "o-", color=plot.COLOURS[1])
+    for point in points:
+        if point.is_knee:
+            panel.plot([point.tolerance_um], [point.time_increase_percent], "o", color=plot.COLOURS[0], markersize=11)
+            panel.annotate(
+                f"knee: {point.tolerance_um:.3g} µm, {point.time_increase_percent:+.3g} %",
+                (point.tolerance_um, point.time_increase_percent), (10, 12), textcoords="offset points",
+            )  # fmt: skip
+    panel.set_xscale("log")
+    panel.set_xticks(tolerances, [f"{each:.3g}" for each in tolerances])
+    panel.minorticks_off()
+    panel.set_xlabel("contour tolerance in µm")
+    panel.set_ylabel("time of the program, increase in %")
+    return panel
 
 
 def _played(conversion: Conversion) -> PlayedRegion:

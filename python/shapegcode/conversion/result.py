@@ -329,7 +329,7 @@ class Conversion(PlayedFigures, Result):
         return rows
 
     def plots(self) -> Mapping[str, Plot]:
-        """`path`, `feed` and `vibration` of the region that vibrates most, before and after."""
+        """`path`, `feed` and `vibration` of the cut that vibrates most, before and after; `tolerance` against time."""
         return self._drawn_beside()
 
     @property

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -68,22 +67,20 @@ class PlayingController:
 
     Args:
         model: the controller; `model.motion` says which of the two.
+        override: feed override, 1 = 100 %.
     """
 
-    def __init__(self, model: _core.ControllerModel) -> None:
+    def __init__(self, model: _core.ControllerModel, override: float = 1.0) -> None:
         self.model = model
+        self._override = override
+        model.limits.feed_override *= override
         self.filters = _core.acceleration_filters(model)
         """Acceleration filters behind the interpolation."""
 
-    def _planned(self, path: _core.Path, override: float = 1.0) -> _core.SpeedProfile | None:
+    def _planned(self, path: _core.Path) -> _core.SpeedProfile | None:
         """The look-ahead's speed along a path; None where the controller executes block by block."""
-        if self.model.motion != _core.MotionKind.look_ahead:
-            return None
-        if override == 1.0:
-            return _core.plan_speed(path, self.model.limits)
-        limits = copy(self.model.limits)
-        limits.feed_override *= override
-        return _core.plan_speed(path, limits)
+        look_ahead = self.model.motion == _core.MotionKind.look_ahead
+        return _core.plan_speed(path, self.model.limits) if look_ahead else None
 
     def play(
         self,
@@ -92,7 +89,6 @@ class PlayingController:
         *,
         against: _core.Path | None = None,
         block_end: _core.BlockEnd | None = None,
-        override: float = 1.0,
     ) -> _core.PlaybackFigures:
         """A path played from rest to rest and measured against itself or another one.
 
@@ -101,17 +97,16 @@ class PlayingController:
             options: plant and what is measured; the filters become the controller's.
             against: what it is measured against; None: itself.
             block_end: rule of block timing, where there is no look-ahead; None: the controller's own.
-            override: feed override, 1 = 100 %.
 
         Returns:
             The figures, positions in mm.
         """
         options.axis_filters = self.filters
-        profile = self._planned(path, override)
+        profile = self._planned(path)
         if profile is not None:
             given = () if against is None else (against,)
             return _core.play_path(path, profile, options, *given)
-        return _core.play_blocks(path, against or path, block_end or self.model.block_end, override, options)
+        return _core.play_blocks(path, against or path, block_end or self.model.block_end, self._override, options)
 
     def stream(self, path: _core.Path, options: _core.PlaybackOptions, rest_s: float) -> _core.PlayedStream:
         """The same motion piece by piece, and what the plant does for a while behind its end.
@@ -314,7 +309,10 @@ class MachineModel:
         """
         options = self.verdict_options(shift=shift, only=only, offset=offset)
         options.record_samples = record_samples
-        return self.ordinary.play(path, options, against=against, override=override)
+        controller = self.ordinary
+        if override != 1.0:
+            controller = PlayingController(controller_model(self.machine), override)
+        return controller.play(path, options, against=against)
 
     def play_emitted(
         self,
