@@ -39,9 +39,13 @@ MOVE_KINDS = {_core.SegmentKind.rapid: "rapid", _core.SegmentKind.line: "line", 
 HEADER_LINE = re.compile(r"\([A-Z0-9 .-]{1,60}\)\r?")
 
 
+#: Of any price: for tests of what shaping does.
+ANY_PRICE = {"price.program_time_percent": 1e6, "price.cut_time_percent": 1e6}
+
+
 def machine_with(keys: Mapping[str, Any] | None = None, base: str = "vx500") -> sg.Machine:
-    """A built-in machine with other values for some dotted keys."""
-    return sg.Machine.load(base).with_values(keys or {})
+    """A built-in machine with other values for some dotted keys, on which shaping may cost any time."""
+    return sg.Machine.load(base).with_values({**ANY_PRICE, **(keys or {})})
 
 
 def moves_of(program: sg.Program) -> list[tuple[Any, float]]:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 import shapegcode as sg
-from acceptance import machine_with, memory
+from acceptance import ANY_PRICE, memory
 from judge import Mode, Move, contour_error_um, play, residual_um, response, rest_index
 from judge.dialect import Item, play as play_dialect
 from judge.dialect.moves import as_move
@@ -87,10 +87,9 @@ def _length(item: Item) -> float:
 
 def convert(drawn: Draw, *, shape_all: bool) -> Case:
     """The package's conversion of a draw."""
-    machine = machine_with(drawn.keys, drawn.machine)
+    machine = sg.Machine.load(drawn.machine).with_values(drawn.keys | (ANY_PRICE if shape_all else {}))
     program = sg.Program.from_text(drawn.text, machine, source=f"draw {drawn.seed}")
-    prices = {"max_time_increase_percent": 1e6, "max_cut_time_increase_percent": 1e6} if shape_all else {}
-    conversion = sg.convert(program, machine, shape_all=shape_all, **prices)
+    conversion = sg.convert(program, machine, shape_all=shape_all)
     emitted = conversion.text.decode("latin-1")
     return Case(drawn, machine, program, conversion, read(drawn.text, drawn), read(emitted, drawn))
 
@@ -102,7 +101,7 @@ def complaints(case: Case) -> list[str]:
         programmed = _cuts(case.original, entry["lines"])
         blocks = _cuts(case.emitted, entry["emitted_lines"])
         found += [f"lines {entry['lines']}: {what}" for what in _region(case, programmed, blocks, entry)]
-    return found + list(_largest(case))
+    return found + list(_largest(case)) + _unchanged(case) + _price(case)
 
 
 def _cuts(items: Sequence[Item], lines: Sequence[int]) -> list[Move]:
@@ -194,6 +193,49 @@ def _original(case: Case, programmed: list[Move], entry: dict[str, Any]) -> list
     return found
 
 
+def _unchanged(case: Case) -> list[str]:
+    """The cuts left unchanged in the emitted program, where the judge can simulate an ordinary control."""
+    controller = case.machine.controller
+    if controller.motion != "after_interpolation" or _COMPUTED.search(case.drawn.text):
+        return []
+    found = []
+    ticks = round(controller.time_constant_s / case.tick_s)
+    origin, emitted_origin = case.program.core.origin, case.conversion.emitted.core.origin
+    for entry in case.conversion.to_dict()["unchanged"]:
+        programmed = _cuts(case.original, [origin(line)[0] for line in entry["lines"]])
+        blocks = _cuts(case.emitted, [emitted_origin(line)[0] for line in entry["emitted_lines"]])
+        points = play(blocks, period_s=case.tick_s, block_end=controller.block_end, acceleration_samples=ticks)
+        residual = residual_um(points, case.modes, case.tick_s, still_mm=1e-9)
+        where = f"unchanged lines {entry['lines']}"
+        for axis, ours in zip("xyz", residual, strict=True):
+            if not agree(ours, theirs := entry["residual_vibration_um"]["emitted"][axis]):
+                found.append(f"{where}: residual {axis} {ours:.3f} um, report {theirs:.3f}")
+        nearest = contour_error_um(_followed(case, points), programmed).max_um
+        if entry["contour_error_um"] < nearest - max(ABSOLUTE_UM, RELATIVE * nearest):
+            found.append(f"{where}: contour {nearest:.3f} um, report {entry['contour_error_um']:.3f}")
+        over = any(
+            ours > limit * 1.001 for ours, limit in zip(residual, entry["residual_limit_um"].values(), strict=True)
+        )
+        over |= nearest > case.machine.tolerance.contour_um + 0.01
+        if over and not entry["misses"]:
+            found.append(
+                f"{where}: residual {residual} um, contour {nearest:.3f} um, and no limit is said to be missed"
+            )
+    return found
+
+
+def _price(case: Case) -> list[str]:
+    """Nothing takes more time than its price: the program by the report, a cut by the judge's own times."""
+    price, times = case.machine.price, case.conversion.cycle_time_s
+    found = []
+    if times.emitted > times.original * (1.0 + price.program_time_percent / 100.0) + 1e-6:
+        found.append(f"the program takes {times.emitted:.3f} s for {times.original:.3f} s")
+    for cut in case.conversion.cuts:
+        if cut.time_s.emitted > cut.time_s.original * (1.0 + price.cut_time_percent / 100.0) + 1e-6:
+            found.append(f"lines {cut.lines}: takes {cut.time_s.emitted:.3f} s for {cut.time_s.original:.3f} s")
+    return found
+
+
 def _set_points(case: Case, blocks: list[Move], rule: BlockEnd) -> Vector:
     ticks = round(case.machine.controller.shaped_time_constant_s / case.tick_s)
     return play(blocks, period_s=case.tick_s, block_end=rule, acceleration_samples=ticks)
@@ -245,8 +287,10 @@ def _largest(case: Case) -> list[str]:
             _, command, moved = response(points, case.modes, case.tick_s)
             peaks.append(1e3 * np.abs(moved - command).max(axis=0))
     theirs = case.conversion.peak_vibration_um.emitted
+    # Of cuts left unchanged too, which the judge does not simulate.
+    exact = not case.conversion.unchanged
     return [
         f"peak vibration {axis} {ours:.3f} um, report {theirs[axis]:.3f}"
         for axis, ours in zip("xyz", np.max(peaks, axis=0), strict=True)
-        if not agree(ours, theirs[axis])
+        if (exact or ours > theirs[axis]) and not agree(ours, theirs[axis])
     ]

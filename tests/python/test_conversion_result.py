@@ -12,10 +12,11 @@ import pytest
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode.conversion.rests import RestsOn
-from shapegcode.conversion.tables import BeforeAfter, case_table, rests_table
+from shapegcode.conversion.tables import BeforeAfter, rests_table
 from shapegcode.results.json import schema
 from shapegcode.results.result import Pair, Xyz
 from shapegcode.verdict.figures import RegionVerdict
+from shapegcode.verdict.tables import case_table
 
 PART = "%\nO1\nG21G17G90G94\nG54G00X0Y0Z0\nG01X20.F6000\nG03X40.Y20.I0J20.\nG01Y40.\nM30\n%\n"
 TWO = PART.replace("M30", "G00X0Y0\nG01X30.F3000\nM30")
@@ -101,18 +102,19 @@ def test_the_limit_is_that_of_the_region_shown() -> None:
 
 def test_nothing_to_shape_is_one_line() -> None:
     air = converted("%\nG90G21\nG0X10.Y0Z0\nM30\n%\n")
-    assert air.answer == "no benefit: run the original: there is nothing to shape; the text is unchanged"
+    assert air.answer == "no benefit: run the original: there is nothing to shape; the program is unchanged"
     assert air.tables() == [] and dict(air.plots()) == {}
     assert air.next_step.startswith("run the original")
     given_up = converted(budget=sg.Budget(max_bytes=len(PART)))
-    assert given_up.answer == "no benefit: run the original: nothing fits the budget; the text is unchanged"
+    assert given_up.answer.startswith("no benefit: run the original: nothing fits the budget; residual vibration ")
 
 
 def test_the_next_step_follows_the_verdict() -> None:
     good = replace(converted(), warnings=())
     assert good.next_step.startswith("run the emitted program")
-    assert replace(good, warnings=("w",)).next_step.startswith("settle the warnings")
-    bad = replace(good, regions=(replace(good.regions[0], lines=(3, 9), misses=("contour error too large",)),))
+    assert replace(good, warnings=("w",)).next_step.startswith("resolve the warnings")
+    wrong = replace(good.regions[0], lines=(3, 9), misses=("contour error too large",))
+    bad = replace(good, regions=(wrong,), recommendation="do not run", reason="lines 3 to 9: contour error too large")
     assert (bad.ok, bad.exit_code, bad.within_tolerance) == (False, 1, False)
     assert bad.answer.startswith("do not run, OUT OF TOLERANCE: ")
     assert bad.next_step.startswith("do not run it (lines 3 to 9: contour error too large)")
@@ -122,7 +124,7 @@ def test_pictures_are_drawn_into_the_callers_axes() -> None:
     from matplotlib.figure import Figure
 
     drawn = converted().plots()
-    assert set(drawn) == {"path", "feed", "vibration"}
+    assert set(drawn) == {"path", "feed", "vibration", "tolerance"}
     ax = Figure().subplots()
     assert drawn["path"](ax).get_figure(root=True) is ax.get_figure(root=True)
 

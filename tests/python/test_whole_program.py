@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import shapegcode as sg
-from acceptance import PROGRAMS, machine_with
+from acceptance import PROGRAMS
 from command import run
 from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from judge.in_order import Way, deviation_um, missed_um
@@ -28,6 +28,10 @@ FACETS = "".join(
 SQUARE = "G1X20.F5000.\nY20.\nX0.\nY0.\n"
 SLOW = "G1X20.F200.\nY5.\n"
 DENSE = "".join(f"G1X{0.5 * (i % 2) + 0.3 * i:.3f}Y{0.4 * (i % 3):.3f}F4000.\n" for i in range(60))
+
+
+def machine_with(keys: Mapping[str, object]) -> sg.Machine:
+    return sg.Machine.load("vx500").with_values(dict(keys))
 
 
 def part(*cuts: str) -> str:
@@ -336,7 +340,7 @@ def test_rounding_by_the_control_is_told_apart_from_vibration() -> None:
     assert advice is not None
     assert advice.key == "controller.time_constant_s"
     assert str(advice) in conversion.answer
-    # Closed form: a corner of 90 degrees behind a moving average of T is passed at a distance of T / 8 * hypot(v, w); the
+    # Closed form: a corner of 90 degrees behind a moving average of T is missed by T / 8 * hypot(v, w); the
     # first one is from the plunge at 1000 mm/min into the square.
     expected_um = math.hypot(1000.0, 800.0) / 60.0 * 0.048 / 8.0 * 1e3
     assert advice.rounding_um == pytest.approx(expected_um, rel=0.05)

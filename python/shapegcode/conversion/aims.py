@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from shapegcode.conversion.curve import CutCurve
+from shapegcode.conversion.curve import FACTORS, MARGIN, CutCurve, ToleranceCurve, TolerancePoint, knee_of
 from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.verdict.judge import Judge, RegionFigures
 
 __all__ = ["Aims"]
-
-MARGIN = 0.95
-"""Of the tolerance, for which a cut is planned: the rest is for rounding and for what the plan leaves out."""
 
 _SLOWER = 0.98  # than what would just be slow enough
 _LEAST_FEED_RATIO = 0.5  # of the programmed feed: what runs too fast at that is not the feed's doing
@@ -210,6 +207,41 @@ class Aims:
         if tolerance_um <= self._asked_um:
             return self._asked_s[index]
         return min(self._asked_s[index], self._planned_s(index, tolerance_um * MARGIN))
+
+    def tolerance_curve(self, original_s: float, original_um: float) -> ToleranceCurve | None:
+        """Tolerance against time of the program.
+
+        Args:
+            original_s: time of the original program.
+            original_um: its contour error.
+
+        Returns:
+            The curve of the cuts that were shaped once, whether they still are or not; None: there are none.
+        """
+        cuts = list(self.emitted_s)
+        if not cuts:
+            return None
+        asked = self._asked_um
+        wanted = [("as asked", asked), *((f"{factor:g} times", factor * asked) for factor in FACTORS[1:])]
+        if original_um > asked:
+            wanted.append(("the original's contour error", original_um))
+        loosest = max(asked, *(self._curve_of(index).planned_um[-1] / MARGIN for index in cuts))
+        wanted.append(("no slowing", loosest))
+        points = [self._point(name, um, cuts, original_s) for name, um in sorted(wanted, key=lambda each: each[1])]
+        tolerances, times = [each.tolerance_um for each in points], [each.time_s for each in points]
+        knee = knee_of(tolerances, times)
+        if knee is not None:
+            points[knee] = replace(points[knee], is_knee=True)
+        return ToleranceCurve(tuple(points), len(cuts))
+
+    def _point(self, name: str, tolerance_um: float, cuts: Sequence[int], original_s: float) -> TolerancePoint:
+        price = self._machine.price
+        times = {index: self.time_s(index, tolerance_um) for index in cuts}
+        dearest = max(times[index] / self.original_s[index] - 1.0 for index in cuts)
+        time_s = original_s + math.fsum(times[index] - self.original_s[index] for index in cuts)
+        increase = (time_s / original_s - 1.0) * 100.0 if original_s > 0.0 else 0.0
+        within = increase <= price.program_time_percent and dearest * 100.0 <= price.cut_time_percent
+        return TolerancePoint(name, tolerance_um, time_s, increase, within)
 
     def _planned_s(self, index: int, room_um: float) -> float:
         """What a cut takes where its feed is planned for a deviation.

@@ -536,7 +536,7 @@ class _Run:
     def _curve(self, times: Pair[float]) -> ToleranceCurve | None:
         """Tolerance against time, of the cuts that were shaped once; None: there are none."""
         original_um = max((getattr(run.result(), self.judge.target).max_abs_mm for run in self.originals), default=0.0)
-        return self.curves.of_program(self.aims, times.original, original_um * 1e3)
+        return self.aims.tolerance_curve(times.original, original_um * 1e3)
 
     def _rests_on(self, settled: _Settled) -> tuple[tuple[RestsOn, ...], int]:
         """Sensitivity of the shaped cut that comes nearest to a limit."""

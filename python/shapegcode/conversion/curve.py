@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,10 +15,10 @@ from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.results.table import Column, Table
 
-if TYPE_CHECKING:
-    from shapegcode.conversion.aims import Aims
-
 __all__ = ["CutCurve", "CutCurves", "ToleranceCurve", "TolerancePoint", "curve_table", "knee_of", "plan_curve"]
+
+MARGIN = 0.95
+"""Of the tolerance, for which a cut is planned: the rest is for rounding and for what the plan leaves out."""
 
 FACTORS = (1.0, 1.25, 1.5, 2.0)
 """Of the tolerance that was asked for: at these it is planned."""
@@ -178,53 +177,13 @@ class CutCurves:
         known = self._known.get(index)
         if known is not None and known[0] is writer.grid:
             return known[1]
-        asked_um = self._machine.tolerance.contour_um * 0.95
+        asked_um = self._machine.tolerance.contour_um * MARGIN
         target = "command" if self._machine.shaping.contour != "response" else "response"
         original_um = getattr(self._originals[index].result(), target).max_abs_mm * 1e3
         path = self._program.regions[index].path
         curve = plan_curve(path, writer.grid.fir, writer.options(index, 1.0), asked_um, original_um)
         self._known[index] = writer.grid, curve
         return curve
-
-    def of_program(self, aims: Aims, original_s: float, original_um: float) -> ToleranceCurve | None:
-        """Tolerance against time of the program.
-
-        Args:
-            aims: what the cuts were shaped for, and how long they take.
-            original_s: time of the original program.
-            original_um: its contour error.
-
-        Returns:
-            The curve of the cuts that were shaped once, whether they still are or not; None: there are none.
-        """
-        cuts = list(aims.emitted_s)
-        if not cuts:
-            return None
-        asked = self._machine.tolerance.contour_um
-        wanted = [("as asked", asked), *((f"{factor:g} times", factor * asked) for factor in FACTORS[1:])]
-        if original_um > asked:
-            wanted.append(("the original's contour error", original_um))
-        loosest = max(asked, *(self.of(index).planned_um[-1] / 0.95 for index in cuts))
-        wanted.append(("no slowing", loosest))
-        points = [
-            self._point(name, um, aims, cuts, original_s) for name, um in sorted(wanted, key=lambda each: each[1])
-        ]
-        tolerances, times = [each.tolerance_um for each in points], [each.time_s for each in points]
-        knee = knee_of(tolerances, times)
-        if knee is not None:
-            points[knee] = replace(points[knee], is_knee=True)
-        return ToleranceCurve(tuple(points), len(cuts))
-
-    def _point(
-        self, name: str, tolerance_um: float, aims: Aims, cuts: Sequence[int], original_s: float
-    ) -> TolerancePoint:
-        price = self._machine.price
-        times = {index: aims.time_s(index, tolerance_um) for index in cuts}
-        dearest = max(times[index] / aims.original_s[index] - 1.0 for index in cuts)
-        time_s = original_s + math.fsum(times[index] - aims.original_s[index] for index in cuts)
-        increase = (time_s / original_s - 1.0) * 100.0 if original_s > 0.0 else 0.0
-        within = increase <= price.program_time_percent and dearest * 100.0 <= price.cut_time_percent
-        return TolerancePoint(name, tolerance_um, time_s, increase, within)
 
 
 def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | None:

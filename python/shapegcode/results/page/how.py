@@ -12,6 +12,7 @@ HOW: Mapping[str, str] = {
     "path": "The programmed path beside the table's, magnified as the title says: a gap is an error.",
     "feed": "Speed along the path over time: a dip is a corner or a short block, and costs time.",
     "vibration": "Table minus command over time: what still swings behind the stop is the residual vibration.",
+    "tolerance": "Each point is the program at a contour tolerance: left of the knee each micrometre is dear.",
     "motion": "The whole program in time; each band spans the least and the largest value of a stretch.",
     "time": "Each bar is a tool or a region; its colours are where its time goes.",
     "measure-part": "Where on the part each program leaves the contour: further from its line is worse.",
