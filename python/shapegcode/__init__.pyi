@@ -94,6 +94,7 @@ from shapegcode.checking.result import (
 )
 from shapegcode.conversion.budget import Budget as Budget
 from shapegcode.conversion.convert import convert as convert
+from shapegcode.conversion.plots import plot_tolerance as plot_tolerance
 from shapegcode.conversion.result import Conversion as Conversion
 from shapegcode.conversion.scheduled import convert_scheduled as convert_scheduled
 from shapegcode.conversion.scheduled_result import ScheduledConversion as ScheduledConversion

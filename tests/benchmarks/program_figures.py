@@ -1,16 +1,18 @@
-"""What `convert` makes of every program of some folders, as a table.
+"""What `convert` makes of every program of some folders, and of drawn ones, as a table.
 
-    python tests/benchmarks/program_figures.py FOLDER... [-m MACHINE] [--set KEY=VALUE] [--markdown]
+    python tests/benchmarks/program_figures.py FOLDER... [--draws N] [-m MACHINE] [--set KEY=VALUE] [--markdown]
 
-Read or refused (and whether a control would refuse it too), share of the cutting time that is shaped, vibration and
-contour before and after, size, recommendation. Below the table: what would be a fault of shapegcode, such as a program
-that was left unshaped without a word, or rewritten for nothing. Exit code 1 if there is one.
+Read or refused (and whether a control would refuse it too), cuts shaped of all, vibration and contour of the whole
+program before and after, price (of the program, and of the dearest cut), size, recommendation. Drawn programs
+(`tests/oracles/judge/draws.py`, each on a machine of its own) are held against the tests' independent interpreter,
+player and plant too: shaped cuts, cuts left unchanged, rapids and everything between. Below the table: what would be a
+fault of shapegcode, such as a price that is exceeded, a cut left unshaped without a reason, or figures that
+`simulate --against` or the independent judge do not confirm. Exit code 1 if there is one.
 """
 
 from __future__ import annotations
 
 import argparse
-import math
 import statistics
 import sys
 import tomllib
@@ -20,7 +22,10 @@ from pathlib import Path
 import shapegcode as sg
 
 _SUFFIXES = {".nc", ".tap", ".cnc", ".ngc", ".gcode", ".prg", ".min", ".txt", ".eia", ".iso"}
-_HEADS = ("program", "result", "cutting s", "shaped", "residual µm", "contour µm", "time", "size", "recommendation")
+_HEADS = (
+    "program", "result", "cutting s", "cuts shaped", "residual µm", "contour µm", "time", "dearest cut", "size",
+    "recommendation",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -57,31 +62,6 @@ def refused(path: Path, error: sg.ShapegcodeError) -> Row:
     return Row((path.name, said, *("",) * (len(_HEADS) - 2)), None, faults)
 
 
-def cutting_s(conversion: sg.Conversion, path: Path, machine: sg.Machine) -> tuple[float, float, float]:
-    """Cutting time of the original: shaped, kept by choice, and outside of what can be shaped; s."""
-    program = sg.Program.read(path, machine)
-    shaped = conversion.cutting_time_s.original
-    regions = sg.cycle_time(program, machine, full=False).regions
-    outside = math.fsum(
-        segment.length_mm / segment.feed_mm_per_s
-        for segment, dwell_s in program.core.other_moves
-        if dwell_s <= 0.0 and segment.feed_mm_per_s > 0.0
-    )
-    return shaped, max(0.0, math.fsum(region.duration_s for region in regions) - shaped), outside
-
-
-def least_gain_um(conversion: sg.Conversion, path: Path, machine: sg.Machine) -> float:
-    """What the shaped region that gains least gains, of residual vibration or contour, µm: both texts played anew."""
-    before = {run.lines: run for run in sg.simulate(path, machine, record_samples=0).regions}
-    after = sg.simulate(conversion.emitted, machine, record_samples=0, against=path).regions
-    gains = []
-    for region, run in zip(conversion.regions, (run for run in after if run.shaped and not run.was_rapid), strict=True):
-        was = before[region.lines]
-        contour_mm = was.figures.response.max_abs_mm - run.figures.response.max_abs_mm
-        gains.append(max(max(was.residual_vibration_um) - max(run.residual_vibration_um), 1e3 * contour_mm))
-    return min(gains)
-
-
 def row(path: Path, machine: sg.Machine) -> Row:
     """One program, converted."""
     try:
@@ -90,40 +70,52 @@ def row(path: Path, machine: sg.Machine) -> Row:
         return refused(path, error)
     if settings:
         machine = machine.with_values({"input.arc_centre": settings.split()[-1]})
-    shaped, kept, outside = cutting_s(conversion, path, machine)
-    whole = shaped + kept + outside
+    return row_of(path.name, conversion, machine, settings, path)
+
+
+def row_of(name: str, conversion: sg.Conversion, machine: sg.Machine, settings: str, original: Path | None) -> Row:
+    """A conversion as a row."""
     vibration, contour = conversion.residual_vibration_um, conversion.contour_error_um.response
-    before, after = max(vibration.original), max(vibration.emitted)
-    ratio = len(conversion.text) / path.stat().st_size
-    faults = []
-    told = len(conversion.kept) + sum("kept untouched" in warning for warning in conversion.warnings)
-    if kept + outside > 0.0 and not told and conversion.placed:
-        faults.append(f"{path.name}: {kept + outside:.1f} s are unshaped without a word")
-    # Regions with absolute arc centres are no FANUC text: they cannot be kept as they are.
-    if conversion.placed and not settings:
-        gain = least_gain_um(conversion, path, machine)
-        if gain < machine.shaping.least_gain_um - 0.05:
-            faults.append(f"{path.name}: a region is rewritten for {gain:.1f} µm")
-    if not conversion.ok:
-        faults.append(f"{path.name}: {next(conversion.misses())}")
-    figures = ("", "", "")
-    if conversion.placed:
-        times = conversion.cycle_time_s
-        figures = (
-            f"{before:.1f} → {after:.1f}",
-            f"{contour.original.max:.1f} → {contour.emitted.max:.1f}",
-            f"{(times.emitted / times.original - 1.0) * 100:+.1f} %",
-        )
-    share = f"{100 * shaped / whole:.0f} %" if whole > 0.0 else "no cut"
-    cells = (path.name, f"read{', ' + settings if settings else ''}", f"{whole:.0f}", share, *figures, f"{ratio:.2f}")
-    return Row((*cells, conversion.recommendation), ratio, tuple(faults))
+    whole, cuts = conversion.cycle_time_s, conversion.cuts
+    increase = (whole.emitted / whole.original - 1.0) * 100.0 if whole.original > 0.0 else 0.0
+    dearest = max(((cut.time_s.emitted / cut.time_s.original - 1.0) * 100.0 for cut in cuts), default=0.0)
+    faults = [
+        f"{name}: lines {cut.lines} unshaped without a reason" for cut in cuts if not cut.is_shaped and not cut.reason
+    ]
+    if increase > machine.price.program_time_percent + 1e-6 or dearest > machine.price.cut_time_percent + 1e-6:
+        faults.append(f"{name}: takes {increase:.2f} % more, one cut {dearest:.2f} %: above the price")
+    if original is not None and not settings:
+        verdict = sg.simulate(conversion.emitted, machine, record_samples=0, against=original).verdict
+        assert verdict is not None
+        for figure in ("residual_vibration_um", "contour_error_um", "rapid_vibration_um"):
+            if getattr(verdict, figure) != getattr(conversion, figure):
+                faults.append(f"{name}: {figure}: simulate --against {getattr(verdict, figure)}")
+    shaped = sum(cut.is_shaped for cut in cuts)
+    ratio = conversion.bytes_emitted / max(conversion.bytes_read, 1)
+    cells = (
+        name, f"read{', ' + settings if settings else ''}", f"{conversion.cutting_time_s.original:.0f}",
+        f"{shaped} of {len(cuts)}", f"{max(vibration.original):.1f} → {max(vibration.emitted):.1f}",
+        f"{contour.original.max:.1f} → {contour.emitted.max:.1f}", f"{increase:+.1f} %", f"{dearest:+.1f} %",
+        f"{ratio:.2f}", conversion.recommendation,
+    )  # fmt: skip
+    return Row(cells, ratio, tuple(faults))
+
+
+def drawn(seed: int) -> Row:
+    """A drawn program on its own machine, with what the independent judge says of it."""
+    from judge.draws import draw
+    from random_verdict import complaints, convert
+
+    case = convert(draw(seed), shape_all=False)
+    found = row_of(f"draw {seed}", case.conversion, case.machine, "", None)
+    return Row(found.cells, found.size_ratio, (*found.faults, *(f"draw {seed}: {what}" for what in complaints(case))))
 
 
 def shown(rows: list[Row], *, markdown: bool) -> str:
     """The table."""
     table = [_HEADS, *(each.cells for each in rows)]
     if markdown:
-        rule = "|" + "|".join(["---", "---", *["--:"] * 6, "---"]) + "|"
+        rule = "|" + "|".join(["---", "---", *["--:"] * 7, "---"]) + "|"
         lines = ["| " + " | ".join(cells) + " |" for cells in table]
         return "\n".join([lines[0], rule, *lines[1:]])
     widths = [max(len(cells[k]) for cells in table) for k in range(len(_HEADS))]
@@ -133,7 +125,8 @@ def shown(rows: list[Row], *, markdown: bool) -> str:
 def main() -> int:
     """Table, median size, faults."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="folders of programs, or programs")
+    parser.add_argument("--draws", type=int, default=0, metavar="N", help="drawn programs, held against the judge")
+    parser.add_argument("folders", nargs="*", type=Path, metavar="FOLDER", help="folders of programs, or programs")
     parser.add_argument("-m", "--machine", default="vx500", help="machine file or built-in machine")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="another value for a key")
     parser.add_argument("--markdown", action="store_true", help="as a table of a page")
@@ -142,7 +135,8 @@ def main() -> int:
     if args.set:
         pairs = (assignment.partition("=") for assignment in args.set)
         machine = machine.with_values({key: tomllib.loads(f"v = {value}")["v"] for key, _, value in pairs})
-    rows = [row(path, machine) for path in programs_in(args.folders)]
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
+    rows = [row(path, machine) for path in programs_in(args.folders)] + [drawn(seed) for seed in range(args.draws)]
     print(shown(rows, markdown=args.markdown))
     ratios = [each.size_ratio for each in rows if each.size_ratio is not None]
     rewritten = [ratio for ratio in ratios if ratio != 1.0]

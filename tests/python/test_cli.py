@@ -22,7 +22,7 @@ from shapegcode.cli.options import load_machine
 from shapegcode.cli.overrides import overridden
 from shapegcode.results.json import schema
 
-GOOD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F6000\nG3X40.Y20.R20.\nG1Y40.\nG0Z50.\nM30\n%\n"
+GOOD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F12000\nG3X40.Y20.R20.\nG1Y40.\nG0Z50.\nM30\n%\n"
 PAIR = {"original", "emitted"}
 AXES = {"x", "y", "z"}
 
@@ -117,9 +117,9 @@ def test_plots_are_png_and_svg(folder: Path) -> None:
 
 def test_out_of_tolerance_gets_the_suffix_and_exit_code_1(folder: Path) -> None:
     words = ("convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--shape-all", "--json", "r.json")
-    # A limit that no program with words of 1 um can keep.
-    strict = ("--set", "tolerance.residual_floor_um=0", "--set", "tolerance.residual_ratio=1e-6",
-              "--set", "tolerance.residual_floor_increments=0")  # fmt: skip
+    # A contour of the command that the original keeps, and no program with words of 1 um can.
+    strict = ("--contour", "command", "--contour-tolerance", "0.4um", "--max-time-increase", "1e5",
+              "--max-cut-time-increase", "1e5")  # fmt: skip
     done = run(folder, *words, *strict)
     assert done.returncode == 1
     assert files(folder) == ["out.nc.out-of-tolerance", "part.nc", "r.json"]
@@ -127,7 +127,7 @@ def test_out_of_tolerance_gets_the_suffix_and_exit_code_1(folder: Path) -> None:
     check_report(report)
     assert report["within_tolerance"] is False
     assert report["output"] == "out.nc.out-of-tolerance"
-    assert any("residual vibration" in w and "limit" in w for w in report["warnings"])
+    assert any("contour error" in w and "limit" in w for w in report["warnings"])
     assert "OUT OF TOLERANCE" in done.stdout
     assert "do not run it" in done.stdout
     other = run(folder, *words, *strict, "--set", "emission.failed_suffix=.bad")
@@ -142,7 +142,7 @@ def test_options_change_the_result(folder: Path) -> None:
         return dict(json.loads(done.stdout))
 
     plain = report()
-    slow = report("--arc-feed", "60%")
+    slow = report("--arc-feed", "60%", "--max-time-increase", "100", "--max-cut-time-increase", "100")
     assert slow["cycle_time_s"]["emitted"] > plain["cycle_time_s"]["emitted"] + 0.1
     assert slow["orbit_error_percent"][0] < plain["orbit_error_percent"][0]
     coarse = report("--block-period", "8ms")
@@ -240,7 +240,7 @@ def test_simulate_writes_plots_and_prints_a_table(folder: Path) -> None:
     done = run(folder, "simulate", "part.nc", "-m", "vx500", "--plots", "plots")
     assert (done.returncode, done.stderr) == (0, "")
     assert len(files(folder / "plots")) == 8
-    assert done.stdout.startswith("part.nc takes 1.16 s on VX500, ")
+    assert done.stdout.startswith("part.nc takes 0.80 s on VX500, ")
     assert "residual vibration µm" in done.stdout
     assert files(folder) == ["part.nc", "plots"]
 

@@ -261,7 +261,7 @@ def test_bytes_of_a_comment_are_kept() -> None:
     """Whatever code page a shop's comments are in: their bytes are not the converter's."""
     text = part("G1X10.F600(\xe9)\n(\xfc\xb5)\nX0\n").encode("latin-1")
     machine = machine_with()
-    lines = sg.convert(sg.Program.from_text(text, machine), machine).text.split(b"\n")
+    lines = sg.convert(sg.Program.from_text(text, machine), machine, shape_all=True).text.split(b"\n")
     assert b"(\xe9)" in lines
     assert b"(\xfc\xb5)" in lines
 

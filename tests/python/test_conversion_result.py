@@ -18,7 +18,7 @@ from shapegcode.results.result import Pair, Xyz
 from shapegcode.verdict.figures import RegionVerdict
 from shapegcode.verdict.tables import case_table
 
-PART = "%\nO1\nG21G17G90G94\nG54G00X0Y0Z0\nG01X20.F6000\nG03X40.Y20.I0J20.\nG01Y40.\nM30\n%\n"
+PART = "%\nO1\nG21G17G90G94\nG54G00X0Y0Z0\nG01X20.F12000\nG03X40.Y20.I0J20.\nG01Y40.\nM30\n%\n"
 TWO = PART.replace("M30", "G00X0Y0\nG01X30.F3000\nM30")
 
 
@@ -38,7 +38,7 @@ def test_the_answer_is_the_verdict_with_the_figures_of_the_json() -> None:
     conversion = converted()
     report = conversion.to_dict()
     was, now = (report["residual_vibration_um"][side]["y"] for side in ("original", "emitted"))
-    assert conversion.answer.startswith(f"worth running: residual vibration Y {was:.1f} → {now:.1f} µm, contour ")
+    assert conversion.answer.startswith(f"worth running: residual vibration X {was:.1f} → {now:.1f} µm, contour ")
     both = report["contour_error_um"]["response"]
     assert f"contour {both['original']['max']:.1f} → {both['emitted']['max']:.1f} µm" in conversion.answer
     time = report["cycle_time_s"]

@@ -173,8 +173,8 @@ def test_one_program_out_of_tolerance_sends_the_file_beside_the_one_asked_for(tm
     punch(tmp_path, "%\n" + program("O0001", 30) + program("O0002", 60) + "%\n")
     told = run(
         tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--shape-all", "-o", "out.nc",
-        "--set", "tolerance.residual_floor_um=1e-6", "--set", "tolerance.residual_ratio=1e-9",
-        "--set", "tolerance.residual_floor_increments=0",
+        "--contour", "command", "--contour-tolerance", "0.4um", "--max-time-increase", "1e5",
+        "--max-cut-time-increase", "1e5",
     )  # fmt: skip
     if told.returncode == 2:
         pytest.fail(told.stderr)

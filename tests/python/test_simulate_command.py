@@ -546,5 +546,6 @@ def test_the_original_is_the_program_of_the_same_number(folder: Path) -> None:
     first, second = (f"G21 G90 G17\nG00 X0 Y0 Z5.\nG01 X{x}. F3000\nY40.\nM30\n" for x in (30, 60))
     (folder / "two.nc").write_text(f"%\nO0001\n{first}O0002\n{second}%\n")
     (folder / "part.nc").write_text(f"%\nO0002\n{second}%\n")
-    assert main(["simulate", "part.nc", "-m", "vx500", "--program", "O2", "--against", "two.nc"]) == 0
+    assert main(["simulate", "part.nc", "-m", "vx500", "--program", "O2", "--against", "two.nc",
+                 "--set", "tolerance.contour_um=500", "--set", "tolerance.residual_floor_um=500"]) == 0  # fmt: skip
     assert main(["simulate", "part.nc", "-m", "vx500", "--against", "two.nc"]) == 2

@@ -19,6 +19,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 import shapegcode as sg
+from acceptance import ANY_PRICE
 from command import run
 from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from shapegcode.demos.path import path_program
@@ -75,6 +76,7 @@ def test_one_mode_behind_zv_leaves_what_the_closed_form_says() -> None:
     known_hz, speed, time_s = 50.0, 100.0, 0.045
     machine = VX500.with_values(
         {
+            **ANY_PRICE,
             "axes.x.modes": [{"frequency_hz": known_hz, "damping_ratio": 1e-6}],
             "axes.y.modes": [], "axes.y.rigid": True, "emission.block_period_s": 0.005,
             "shaping.family": "zv", "shaping.contour": "off", "controller.block_end": "ceil",

@@ -17,10 +17,13 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "override", "rapid_override", "part_mass", "shell",
     ),
     "what to do": ("write", "fit", "servo", "runs", "tap_plan", "list_families"),
-    "what to shape": ("shaper", "contour", "per_axis", "shape_rapids", "arc_feed", "shape_all", "block_period"),
+    "what to shape": (
+        "shaper", "contour", "per_axis", "shape_rapids", "arc_feed", "shape_all", "only", "leave", "block_period",
+    ),
     "tolerance": (
         "at_least", "contour_tolerance", "vibration_limit", "max_duration", "max_abs_sum", "margin", "settling_band",
     ),
+    "price": ("max_time_increase", "max_cut_time_increase", "tolerance_curve"),
     "budget": ("max_bytes", "baud", "max_blocks_per_second"),
     "cut": (
         "feed_schedule", "tool", "stock", "resolution", "tool_diameter", "spindle", "axial_depth", "feed", "feeds",

@@ -206,7 +206,8 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
     machine, said = Machine.load(args.machine), ""
     with runner.progress(f"converting {args.input}", args):
         if any(axis.modes for axis in machine.axes.as_tuple()):
-            conversion = convert(args.input, machine)
+            # What matters is asked of a shaped program, whether or not shaping it is worth its price.
+            conversion = convert(args.input, machine, shape_all=True, tolerance_curve=False, **ANY_PRICE)
             rows = conversion.rests_on
             if conversion.worst_case is None:
                 said = f"{args.input}: nothing in it was shaped, so nothing is ranked"

@@ -137,7 +137,7 @@ class Conversion(PlayedFigures, Result):
     def answer(self) -> str:
         """What to do with it, its figures and price; then what is not met, and why."""
         lines = [self._headline(), *self._left_out()[:1]]
-        if self.recommendation == "do not run":
+        if self.recommendation == "do not run" and not any(self.reason in line for line in lines):
             lines.append(self.reason)
         elif self.advice is not None:
             lines.append(str(self.advice))

@@ -80,6 +80,7 @@ def convert_scheduled(
             block_period_s=block_period_s,
             budget=budget,
             shape_all=True,
+            tolerance_curve=attempt == 0,
         )
         on_progress(0.2 + 0.8 * (attempt + 1) / _ROUNDS)
         emitted = _measured(planned, conversion, machine, wanted)
@@ -88,8 +89,14 @@ def convert_scheduled(
             break
         margin += excess + _MORE_MARGIN
     warnings = tuple(dict.fromkeys([*emitted.warnings, *conversion.warnings]))
-    program = conversion.emitted if emitted.ok else conversion.emitted.with_verdict(good=False)
-    return ScheduledConversion(**vars(conversion) | {"emitted": program, "warnings": warnings}, feed_schedule=emitted)
+    changed: dict[str, object] = {"warnings": warnings}
+    if not emitted.ok:
+        changed |= {
+            "emitted": conversion.emitted.with_verdict(good=False),
+            "recommendation": "do not run",
+            "reason": emitted.answer,
+        }
+    return ScheduledConversion(**vars(conversion) | changed, feed_schedule=emitted)
 
 
 def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, margin: float) -> FeedSchedule:

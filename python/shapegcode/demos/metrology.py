@@ -228,7 +228,7 @@ def _machine(contour: str) -> Machine:
 def _measured(original: Program, machine: Machine) -> Measurement:
     """The program and its conversions side by side, called as the paper's cases."""
     emitted = [
-        convert(original, _machine(contour), arc_feed_ratio=ratio, shape_all=True).emitted
+        convert(original, _machine(contour), arc_feed_ratio=ratio, shape_all=True, **ANY_PRICE).emitted
         for ratio, contour in _SHAPED.values()
     ]
     played = measure([original, *emitted], machine, _TOOL_DIAMETER_MM, against=original)

@@ -186,7 +186,7 @@ def _condition(feed: int, reduction: int, machine: Machine) -> PathCondition:
     path = program.regions[-1].path
     unshaped_s = _core.plan_speed(path, motion_limits(machine)).duration_s
     _, ideal = ideal_command(path, machine, ratio)
-    conversion = convert(program, machine, arc_feed_ratio=ratio, shape_all=True)
+    conversion = convert(program, machine, arc_feed_ratio=ratio, shape_all=True, **ANY_PRICE)
     region = conversion.regions[-1]
 
     def run(time_s: float, orbit_percent: float, residual_um: Xyz[float]) -> PathRun:

@@ -139,7 +139,7 @@ class Replay:
             OSError: its file cannot be read.
         """
         original = program if isinstance(program, Program) else read_for_conversion(program, machine)
-        found = convert(original, machine, shape_all=shape_all)
+        found = convert(original, machine, shape_all=shape_all, tolerance_curve=False)
         if not found.placed:
             raise ArgumentError(
                 f"{found.program} on {machine.name}: nothing was shaped that could be played: {found.answer}"
