@@ -18,7 +18,7 @@ from prompt_toolkit.output import DummyOutput
 import shapegcode as sg
 from command import run
 from shapegcode.cli.setup import ask_all
-from shapegcode.conversion.convert import ANY_PRICE
+from shapegcode.machine.output import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.settings.schema import toml_schema
 
@@ -225,7 +225,9 @@ def test_show_ranks_what_nobody_measured_on_a_program(tmp_path: Path) -> None:
     assert "--for part.nc" in plain.stdout
     ranked = run(tmp_path, "machine", "show", "m.toml", "--for", "part.nc", "--json", "s.json")
     report = json.loads((tmp_path / "s.json").read_text())
-    conversion = sg.convert(tmp_path / "part.nc", sg.Machine.load(tmp_path / "m.toml"), shape_all=True, **ANY_PRICE)
+    conversion = sg.convert(
+        tmp_path / "part.nc", sg.Machine.load(tmp_path / "m.toml").with_values(ANY_PRICE), shape_all=True
+    )
     assert [row["key"] for row in report["matters"]] == [row.key for row in conversion.rests_on]
     assert f"most of all {conversion.rests_on[0].key}" in ranked.stdout.splitlines()[0]
 

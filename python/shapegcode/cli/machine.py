@@ -202,12 +202,13 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
     from shapegcode.conversion.open_axes import open_axes
     from shapegcode.machine import Machine
     from shapegcode.machine.description_result import OpenValue
+    from shapegcode.machine.output import ANY_PRICE
 
     machine, said = Machine.load(args.machine), ""
     with runner.progress(f"converting {args.input}", args):
         if any(axis.modes for axis in machine.axes.as_tuple()):
             # What matters is asked of a shaped program, whether or not shaping it is worth its price.
-            conversion = convert(args.input, machine, shape_all=True, tolerance_curve=False, **ANY_PRICE)
+            conversion = convert(args.input, machine.with_values(ANY_PRICE), shape_all=True, tolerance_curve=False)
             rows = conversion.rests_on
             if conversion.worst_case is None:
                 said = f"{args.input}: nothing in it was shaped, so nothing is ranked"

@@ -47,10 +47,7 @@ from shapegcode.verdict.judge import Judge, RegionFigures
 from shapegcode.verdict.placed import Placed
 from shapegcode.verdict.program import rapid_vibration_um, simulate_unchanged, unshaped_regions
 
-__all__ = ["ANY_PRICE", "convert"]
-
-ANY_PRICE = {"max_time_increase_percent": 1e6, "max_cut_time_increase_percent": 1e6}
-"""Options with which shaping may take any time: where its effect is asked for, not its worth."""
+__all__ = ["convert"]
 
 _ATTEMPTS = 10  # each for cuts that left their tolerance, ran too fast or cost too much; few need more than two
 _PRICE_ROUNDS = 6

@@ -17,6 +17,7 @@ from shapegcode.conversion.convert import convert
 from shapegcode.demos.path import ideal_command, path_program
 from shapegcode.demos.result import Demonstration, Statement
 from shapegcode.machine import Machine
+from shapegcode.machine.output import ANY_PRICE
 from shapegcode.metrology.measure import measure, measure_samples
 from shapegcode.metrology.result import MeasuredRegion, Measurement
 from shapegcode.metrology.section import MeasuredSection
@@ -228,7 +229,7 @@ def _machine(contour: str) -> Machine:
 def _measured(original: Program, machine: Machine) -> Measurement:
     """The program and its conversions side by side, called as the paper's cases."""
     emitted = [
-        convert(original, _machine(contour), arc_feed_ratio=ratio, shape_all=True, **ANY_PRICE).emitted
+        convert(original, _machine(contour).with_values(ANY_PRICE), arc_feed_ratio=ratio, shape_all=True).emitted
         for ratio, contour in _SHAPED.values()
     ]
     played = measure([original, *emitted], machine, _TOOL_DIAMETER_MM, against=original)

@@ -16,6 +16,7 @@ from shapegcode import _core
 from shapegcode.conversion.convert import convert
 from shapegcode.demos.result import Demonstration, Statement, compared, stated
 from shapegcode.machine import Machine
+from shapegcode.machine.output import ANY_PRICE
 from shapegcode.model.controller import motion_limits
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
@@ -186,7 +187,7 @@ def _condition(feed: int, reduction: int, machine: Machine) -> PathCondition:
     path = program.regions[-1].path
     unshaped_s = _core.plan_speed(path, motion_limits(machine)).duration_s
     _, ideal = ideal_command(path, machine, ratio)
-    conversion = convert(program, machine, arc_feed_ratio=ratio, shape_all=True, **ANY_PRICE)
+    conversion = convert(program, machine.with_values(ANY_PRICE), arc_feed_ratio=ratio, shape_all=True)
     region = conversion.regions[-1]
 
     def run(time_s: float, orbit_percent: float, residual_um: Xyz[float]) -> PathRun:

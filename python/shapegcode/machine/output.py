@@ -233,6 +233,10 @@ class Price(TomlTable):
     )
 
 
+ANY_PRICE = {"price.program_time_percent": 1e6, "price.cut_time_percent": 1e6}
+"""Values of a machine on which shaping may take any time: where its effect is asked for, not its worth."""
+
+
 class Verdict(TomlTable):
     """The stated band: which of the cases that are played decide. All are shown; 100 % override always counts."""
 
