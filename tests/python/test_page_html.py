@@ -70,7 +70,7 @@ def test_every_text_is_escaped() -> None:
     assert "<b onclick" not in text
     assert text.count(html.escape(EVIL)) > 20
     # Only the elements that the page makes itself.
-    assert text.count("</script>") == text.count("<script") == 5
+    assert text.count("</script>") == text.count("<script") == 6
     data = dict(re.findall(r'<script type="application/json" id="([\w-]+)">(.*?)</script>', text, re.DOTALL))
     assert json.loads(data["result"]) == {"name": EVIL, "value": 1.0}
     assert json.loads(data["scene-head"])["thinned"] == EVIL
@@ -88,7 +88,12 @@ def test_it_names_no_address_to_load_from() -> None:
 
 
 def test_what_colours_say_words_say_too() -> None:
-    for light, word in (("green", "Go ahead"), ("amber", "Heed first"), ("red", "Do not use")):
+    for light, word in (
+        ("green", "Go ahead"),
+        ("calm", "Nothing to do"),
+        ("amber", "Check first"),
+        ("red", "Do not use"),
+    ):
         assert f"<strong>{word}</strong>" in to_html(page(light=light))
     text = to_html(page(*every_part()))
     assert "▲ over</b> the limit" in text

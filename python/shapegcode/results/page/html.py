@@ -58,7 +58,8 @@ def to_html(page: Page, script: Script = "inline") -> str:
     before, after = page.sections[: page.before_scene], page.sections[page.before_scene :]
     parts = [section_of(section) for section in before]
     scripts = [_data("result", page.report)]
-    allowed = [_hash(own)]
+    start = _asset("start.js")
+    allowed = [_hash(start), _hash(own)]
     if page.scene is not None:
         head, data = packed(page.scene)
         head["plotly"] = "" if script == "inline" else plotly_name()
@@ -92,6 +93,7 @@ def to_html(page: Page, script: Script = "inline") -> str:
 <meta name="referrer" content="no-referrer">
 <title>{escape(page.title)}</title>
 <style>{_assets(STYLES)}</style>
+<noscript><style>.loading {{ display: none; }}</style></noscript>
 </head>
 <body>
 <header id="top">
@@ -110,6 +112,7 @@ def to_html(page: Page, script: Script = "inline") -> str:
 <footer><p>Made by shapegcode {_version()}. The numbers are those of the JSON that this file holds:
 <button type="button" id="save-json" class="needs-script">Save the JSON</button></p></footer>
 {chr(10).join(scripts)}
+<script>{start}</script>
 <script>{own}</script>
 </body>
 </html>
@@ -120,7 +123,7 @@ def _problems(page: Page) -> str:
     if not page.problems:
         return ""
     rows = "".join(f"<li>{prose(problem)}</li>" for problem in page.problems)
-    title = "<h2>Heed this about the report itself</h2>"
+    title = "<h2>Caution: about this page itself</h2>"
     return f'<div class="warning problems" role="alert">{title}<ul>{rows}</ul></div>'
 
 

@@ -25,12 +25,15 @@ from shapegcode.results.table import NO_BREAK, Column, Table
 
 __all__ = ["LIGHT_WORDS", "light_sign", "number", "prose", "section_of"]
 
-LIGHT_WORDS: dict[Light, str] = {"green": "Go ahead", "amber": "Heed first", "red": "Do not use"}
+LIGHT_WORDS: dict[Light, str] = {
+    "green": "Go ahead", "calm": "Nothing to do", "amber": "Check first", "red": "Do not use"
+}  # fmt: skip
 """What a traffic light says, for those who cannot see its colour."""
 
 _SIGNS: dict[Light, str] = {
-    # Each colour has a shape of its own: disc, triangle, octagon.
+    # Each colour has a shape of its own: disc, square, triangle, octagon.
     "green": '<circle cx="16" cy="16" r="14"/><path class="mark" d="M9 16.5l5 5 9-11"/>',
+    "calm": '<rect x="3" y="3" width="26" height="26" rx="5"/><path class="mark" d="M10 12.5h12m-12 7h12"/>',
     "amber": '<path d="M16 2.5 30.5 29h-29z"/><path class="mark" d="M16 12v8m0 3.2v2.2"/>',
     "red": '<path d="M10.2 2h11.6L30 10.2v11.6L21.8 30H10.2L2 21.8V10.2z"/>'
     '<path class="mark" d="M10.5 10.5l11 11m0-11l-11 11"/>',

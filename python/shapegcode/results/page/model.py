@@ -35,8 +35,8 @@ __all__ = [
 Script = Literal["inline", "beside"]
 """Where the script of a page is: in its file, or in one beside it."""
 
-Light = Literal["green", "amber", "red"]
-"""Run it; heed something first; do not."""
+Light = Literal["green", "calm", "amber", "red"]
+"""Run it; leave it as it is, there is nothing to do; do something first; do not run it."""
 
 
 @dataclass(frozen=True)
