@@ -15,7 +15,7 @@ import pypdf
 import pytest
 from selenium.webdriver import Keys
 
-from browser import ROOT, SEEN, Browser, chromium
+from browser import ROOT, SEEN, Browser, chromium, grave
 from command import run
 from small_page import COMMENT, NAME, convert, marked, write_small
 
@@ -245,21 +245,6 @@ def test_dark_colours_by_system_and_by_button(chrome: Browser, folder: Path) -> 
         assert chrome.js(ground) == "rgb(255, 255, 255)"
     chrome.open(folder / "small.html", SEEN)
     assert chrome.js(ground) == "rgb(255, 255, 255)"
-
-
-def grave(browser: Browser) -> list[str]:
-    """Serious and critical findings of axe-core on the page that is open."""
-    script = ROOT / ".cache" / "axe" / "node_modules" / "axe-core" / "axe.min.js"
-    assert script.is_file(), "tests/tools/fetch_axe.sh brings it"
-    browser.js("document.querySelectorAll('details').forEach(one => { one.open = true; })")
-    browser.js(script.read_text(encoding="utf-8"))
-    found = browser.later("axe.run(document, {resultTypes: ['violations']}).then(arguments[0])")
-    assert len(found["passes"]) > 10
-    return [
-        f"{one['id']}: {one['help']}: {node['html'][:160]} {node['failureSummary']}"
-        for one in found["violations"] if one["impact"] in ("serious", "critical")
-        for node in one["nodes"]
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("colours", ["light", "dark"])

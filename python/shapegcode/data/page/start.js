@@ -1,5 +1,8 @@
-// Before the other scripts, in words that every browser knows: says so where they do not run.
+// Before the other scripts, in words that every browser knows. Until they have run, long tables are short: what is taken
+// out again need not be laid out. Where they do not run, everything is shown, and it is said.
+document.documentElement.className = "starting";
 window.addEventListener("error", function (event) {
+  document.documentElement.className = document.documentElement.className.replace("starting", "");
   var message = document.getElementById("scene-message");
   if (!message || window.scenePage) return;
   message.hidden = false;
