@@ -140,6 +140,7 @@ def main() -> int:
                 figures["renderer"] = renderer(trace)
                 figures["browser"] = browser.driver.capabilities["browserVersion"]
                 figures["first_paint_s"].append(first_paint_s(browser, trace, folder / "inline.html"))
+                browser.one("[data-show=both]").click()
                 browser.js("document.getElementById('view').scrollIntoView()")
                 figures["frames_per_s"].append(frames_per_s(browser, trace, OURS))
             with chromium(*SWIFTSHADER) as browser:

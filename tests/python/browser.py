@@ -128,3 +128,18 @@ class Browser:
         """Run a script before those of the pages; what is given back ends it."""
         key = self.cdp("Page.addScriptToEvaluateOnNewDocument", source=source)["identifier"]
         return lambda: self.cdp("Page.removeScriptToEvaluateOnNewDocument", identifier=key)
+
+
+def grave(browser: Browser) -> list[str]:
+    """Serious and critical findings of axe-core on the page that is open."""
+    script = ROOT / ".cache" / "axe" / "node_modules" / "axe-core" / "axe.min.js"
+    assert script.is_file(), "tests/tools/fetch_axe.sh brings it"
+    browser.js("document.querySelectorAll('details').forEach(one => { one.open = true; })")
+    browser.js(script.read_text(encoding="utf-8"))
+    found = browser.later("axe.run(document, {resultTypes: ['violations']}).then(arguments[0])")
+    assert len(found["passes"]) > 10
+    return [
+        f"{one['id']}: {one['help']}: {node['html'][:160]} {node['failureSummary']}"
+        for one in found["violations"] if one["impact"] in ("serious", "critical")
+        for node in one["nodes"]
+    ]  # fmt: skip

@@ -15,7 +15,7 @@ import pypdf
 import pytest
 from selenium.webdriver import Keys
 
-from browser import ROOT, SEEN, Browser, chromium
+from browser import ROOT, SEEN, Browser, chromium, grave
 from command import run
 from small_page import COMMENT, NAME, convert, marked, write_small
 
@@ -78,6 +78,8 @@ def test_texts_of_others_stay_texts(small: Browser) -> None:
     """A comment and a file name that are HTML are read as they stand, and nothing of them runs."""
     assert small.js("return window.broken") is None
     assert NAME in small.one("h1").text
+    small.one("[data-show=original]").click()
+    small.js("document.querySelector('[data-program=original] .lines').scrollTop = 0")
     chosen = small.one("[data-program=original] [data-line='2']")
     assert COMMENT in chosen.text
     assert NAME in small.one("[data-program=original] h3").text
@@ -136,6 +138,7 @@ def test_numbers_of_cards_and_tables_are_in_the_json(chrome: Browser, folder: Pa
 def test_lines_of_both_programs_stand_for_each_other(chrome: Browser, folder: Path) -> None:
     """What was emitted keeps the N words of the original, so that they tell which lines belong together."""
     chrome.open(folder / "large.html", SEEN)
+    chrome.one("[data-show=both]").click()
     numbers = re.compile(r"N(\d+)")
     emitted = (folder / "P.NC").read_text().splitlines()
     ranked = {int(found[1]): rank for rank, line in enumerate(emitted, 1) if (found := numbers.match(line))}
@@ -168,8 +171,25 @@ def test_without_a_script_it_is_read(chrome: Browser, folder: Path) -> None:
         words = chrome.one("body").text
         chrome.keep("without-script")
         assert chrome.one("#theme").is_displayed() is False
-    for part in ("Why:", "What it gains", "cycle time", "Run sheet", "drawn by a script, which is not running"):
+    for part in ("Why:", "What it gains", "cycle time", "Run sheet", "JavaScript is off in this browser"):
         assert part in words
+    assert "loading" not in words
+
+
+def test_it_says_that_it_is_loading_until_it_has_loaded(chrome: Browser, folder: Path) -> None:
+    said = "return document.getElementById('scene-message').textContent"
+    end = chrome.before_scripts("globalThis.requestAnimationFrame = () => 0")
+    chrome.open(folder / "small.html")
+    assert chrome.js(said + ".startsWith('The motion is still loading')")
+    assert chrome.one("#scene-message").is_displayed()
+    assert "JavaScript is off" not in chrome.one("#scene").text
+    end()
+    end = chrome.before_scripts("globalThis.matchMedia = () => { throw new Error('none here'); }")
+    chrome.open(folder / "small.html")
+    assert "does not run in this browser" in chrome.js(said)
+    assert "none here" in chrome.js(said)
+    end()
+    chrome.complaints()
 
 
 def test_an_old_browser_is_told_what_it_lacks(chrome: Browser, folder: Path) -> None:
@@ -227,21 +247,6 @@ def test_dark_colours_by_system_and_by_button(chrome: Browser, folder: Path) -> 
     assert chrome.js(ground) == "rgb(255, 255, 255)"
 
 
-def grave(browser: Browser) -> list[str]:
-    """Serious and critical findings of axe-core on the page that is open."""
-    script = ROOT / ".cache" / "axe" / "node_modules" / "axe-core" / "axe.min.js"
-    assert script.is_file(), "tests/tools/fetch_axe.sh brings it"
-    browser.js("document.querySelectorAll('details').forEach(one => { one.open = true; })")
-    browser.js(script.read_text(encoding="utf-8"))
-    found = browser.later("axe.run(document, {resultTypes: ['violations']}).then(arguments[0])")
-    assert len(found["passes"]) > 10
-    return [
-        f"{one['id']}: {one['help']}: {node['html'][:160]} {node['failureSummary']}"
-        for one in found["violations"] if one["impact"] in ("serious", "critical")
-        for node in one["nodes"]
-    ]  # fmt: skip
-
-
 @pytest.mark.parametrize("colours", ["light", "dark"])
 def test_it_has_no_barriers(chrome: Browser, folder: Path, colours: str) -> None:
     """By axe-core: nothing serious, nothing critical."""
@@ -268,7 +273,7 @@ def test_pages_of_other_results(chrome: Browser, folder: Path, words: tuple[str,
     if chrome.all("#scene-head"):
         chrome.wait(SEEN)
     assert chrome.complaints() == []
-    assert chrome.one(".light strong").text in ("Go ahead", "Heed first", "Do not use")
+    assert chrome.one(".light strong").text in ("Go ahead", "Check first", "Do not use")
     chrome.keep(words[0], whole=True)
     data = chrome.cdp("Page.printToPDF", preferCSSPageSize=True, printBackground=True)["data"]
     assert len(pypdf.PdfReader(io.BytesIO(base64.b64decode(data))).pages) <= 4

@@ -13,9 +13,13 @@ import numpy as np
 import pytest
 
 from shapegcode.errors import ArgumentError
+from shapegcode.results.outcome import Pair
 from shapegcode.results.page.html import plotly_name, save, to_html
 from shapegcode.results.page.model import (
     Bars,
+    CutPicker,
+    CutRow,
+    CutTotals,
     Figure,
     Figures,
     HeatMap,
@@ -61,7 +65,10 @@ def every_part() -> tuple[Section, ...]:
     steps = NextSteps((NextStep(EVIL, EVIL),))
     picture = Picture(EVIL, lambda ax=None: axes(ax, title=EVIL), EVIL)
     table = Table(EVIL, (Column(EVIL, EVIL, value=str, text=True),), (EVIL,), caption=EVIL)
-    parts = (Figures((figure,)), heat, bars, notes, steps, picture, Text((EVIL,), warning=True), table)
+    none: Pair[Any] = Pair(1, None)
+    cut = CutRow((1, 2), EVIL, 1.0, none, none, none, none, EVIL, is_shaped=True, selected=True)
+    cuts = CutPicker((cut,), EVIL, CutTotals(1.0, 1))
+    parts = (Figures((figure,)), heat, bars, notes, steps, picture, Text((EVIL,), warning=True), table, cuts)
     return (Section("all", EVIL, parts, how=EVIL), Section("folded", EVIL, (), folded=True))
 
 
@@ -70,7 +77,7 @@ def test_every_text_is_escaped() -> None:
     assert "<b onclick" not in text
     assert text.count(html.escape(EVIL)) > 20
     # Only the elements that the page makes itself.
-    assert text.count("</script>") == text.count("<script") == 5
+    assert text.count("</script>") == text.count("<script") == 7
     data = dict(re.findall(r'<script type="application/json" id="([\w-]+)">(.*?)</script>', text, re.DOTALL))
     assert json.loads(data["result"]) == {"name": EVIL, "value": 1.0}
     assert json.loads(data["scene-head"])["thinned"] == EVIL
@@ -88,7 +95,12 @@ def test_it_names_no_address_to_load_from() -> None:
 
 
 def test_what_colours_say_words_say_too() -> None:
-    for light, word in (("green", "Go ahead"), ("amber", "Heed first"), ("red", "Do not use")):
+    for light, word in (
+        ("green", "Go ahead"),
+        ("calm", "Nothing to do"),
+        ("amber", "Check first"),
+        ("red", "Do not use"),
+    ):
         assert f"<strong>{word}</strong>" in to_html(page(light=light))
     text = to_html(page(*every_part()))
     assert "▲ over</b> the limit" in text

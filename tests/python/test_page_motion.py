@@ -12,8 +12,11 @@ from selenium.webdriver import ActionChains, Keys
 
 import shapegcode as sg
 from browser import SEEN, Browser, chromium
+from shapegcode import _core
 from shapegcode.model.scene import scene_of
+from shapegcode.model.stream import stream
 from shapegcode.program import Program
+from shapegcode.program.pairing import paired_regions
 from small_page import DOWN, LINES, NAME, UP, marked, write_small
 
 
@@ -70,6 +73,48 @@ def set_slider(browser: Browser, name: str, value: float) -> None:
     script = "const it = document.getElementById(arguments[0]); it.value = arguments[1]; "
     script += "it.dispatchEvent(new Event('input'))"
     browser.js(script, name, value)
+
+
+def largest_deviation_um(program: Program, nominal: Program, machine: sg.Machine) -> tuple[float, int, float]:
+    """In the one cut of a program, from the path, with its line; and from table to command anywhere."""
+    ((cut, own),) = paired_regions(program, nominal)
+    follower = _core.PathFollower(own.path)
+    largest, line, everywhere = 0.0, 0, 0.0
+    for chunk in stream(program, machine):
+        everywhere = max(everywhere, float(np.linalg.norm(chunk.error_mm, axis=1).max()) * 1e3)
+        inside = (chunk.line >= cut.first_line) & (chunk.line <= cut.last_line)
+        if inside.any():
+            off = np.linalg.norm(follower.step(chunk.command_mm[inside], chunk.response_mm[inside]), axis=1) * 1e3
+            if off.max() > largest:
+                largest, line = float(off.max()), int(chunk.line[inside][off.argmax()])
+    return largest, line, everywhere
+
+
+def test_it_opens_at_the_largest_deviation_of_what_was_emitted(chrome: Browser, folder: Path) -> None:
+    """Of its cuts, not of a rapid, which nobody measures; against the samples that the model gives."""
+    chrome.open(folder / "small.html", SEEN)
+    assert [one.get_attribute("data-show") for one in chrome.all("#show [aria-pressed=true]")] == ["emitted"]
+    assert chrome.one("#colour").get_attribute("value") == "deviation"
+    assert "deviation from the path" in chrome.one("#colours").text
+    machine = sg.Machine.load("vx500")
+    original, emitted = (Program.read(folder / name, machine) for name in (NAME, "out.nc"))
+    largest, line, everywhere = largest_deviation_um(emitted, original, machine)
+    assert everywhere > 1.2 * largest, "a rapid deviates more: it must not be taken"
+    place = reading(chrome, "emitted")
+    assert float(place["deviation from the path µm"]) == pytest.approx(largest, rel=0.01)
+    assert int(place["line"]) == line == marked(chrome, "emitted")[0]
+    assert f"at line {line}," in chrome.one("#worst-said").text
+    assert float(chrome.one("#clock").get_attribute("value")) == pytest.approx(float(place["time s"]), abs=2e-3)
+    high = re.search(r"([\d.]+)\s*\(middle", chrome.one("#colours").text)
+    assert high is not None
+    of_both = max(largest, largest_deviation_um(original, original, machine)[0])
+    assert float(high[1]) == pytest.approx(of_both, rel=0.01), "colours are for the cuts of both"
+    chrome.keep("worst-spot")
+    set_slider(chrome, "clock", 0.0)
+    chrome.one("#worst").click()
+    assert int(reading(chrome, "emitted")["line"]) == line
+    chrome.one("[data-show=both]").click()
+    assert marked(chrome, "original")[1] in LINES, "it has scrolled while it was hidden"
 
 
 def test_a_click_on_the_path_finds_the_line(small: Browser) -> None:

@@ -62,6 +62,7 @@ def main() -> int:
             browser.wait("return document.querySelector('#' + arguments[0] + ' .main-svg')", part)
         browser.js("scrollTo(0, 0)")
         write(browser, "top", box_of(browser, "header", "#next"))
+        browser.one("[data-show=both]").click()
         browser.js("scenePage.seek(scenePage.chief, 77.4)")
         browser.js("scenePage.stage.drawNow()")
         write(browser, "motion", box_of(browser, "#scene h2", "#reading"))

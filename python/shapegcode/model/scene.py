@@ -170,7 +170,7 @@ def _variant(
     text = program.expanded_text.decode("utf-8", "replace")
     variant = Variant(
         key, label, program.source, text, kept.sample, line, block, kept.command_mm, kept.deviation_um, channels,
-        thinner.samples,
+        thinner.samples, tuple((cut.first_line, cut.last_line) for cut in cuts),
     )  # fmt: skip
     return variant, spectrum.lines(key, most_hz=_most_hz(machine, period_s)), kept
 

@@ -57,7 +57,7 @@ class Result(Outcome):
         if not self.ok:
             return "red", self.next_step
         if said := len(self.warnings):
-            return "amber", f"{said} warning{'s' if said > 1 else ''} to heed first"
+            return "amber", f"{said} warning{'s' if said > 1 else ''} to resolve first"
         return "green", "done, without a warning"
 
     @property

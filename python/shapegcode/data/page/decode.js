@@ -33,7 +33,7 @@ function columnOf(buffer, said) {
 /** A program in time: columns, texts, and where its lines and blocks begin. */
 class Motion {
   constructor(buffer, said, period, channels) {
-    Object.assign(this, { key: said.key, label: said.label, file: said.file, samples: said.samples, period });
+    Object.assign(this, { key: said.key, label: said.label, file: said.file, samples: said.samples, period, cuts: said.cuts });
     const column = (name) => columnOf(buffer, said.columns[name]);
     [this.sample, this.line, this.block] = ["sample", "line", "block"].map(column);
     this.place = ["x", "y", "z"].map(column);
@@ -46,6 +46,25 @@ class Motion {
     this.duration = this.count ? this.sample[this.count - 1] * period : 0;
     this.first = this.#firstOfLines();
     this.length = this.#lengths();
+    this.inCuts = this.#samplesInCuts();
+  }
+
+  /** Whether each sample counts for the largest deviation: those in cuts; where no cut is known, all. */
+  #samplesInCuts() {
+    const lines = new Uint8Array(this.lines.length + 2);
+    for (const [first, last] of this.cuts) lines.fill(1, first, last + 1);
+    const found = Uint8Array.from(this.line, (line) => lines[line]);
+    return found.includes(1) ? found : found.fill(1);
+  }
+
+  /** Sample of the largest deviation from the path. */
+  get worst() {
+    const deviation = this.channels.deviation ?? [];
+    let found = Math.max(this.inCuts.indexOf(1), 0);
+    for (let i = found; i < deviation.length; i++) {
+      if (this.inCuts[i] && deviation[i] > deviation[found]) found = i;
+    }
+    return found;
   }
 
   /** Of each line the first sample at it, or of the next line that moves. */

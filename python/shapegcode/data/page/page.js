@@ -50,7 +50,8 @@ function setUpCopies() {
   for (const button of document.querySelectorAll("button.copy")) {
     button.addEventListener("click", async () => {
       const done = await copyText(button.previousElementSibling.textContent);
-      button.textContent = done ? "Copied" : "Select and copy";
+      if (!done) getSelection().selectAllChildren(button.previousElementSibling);
+      button.textContent = done ? "Copied" : "Selected: Ctrl+C";
       setTimeout(() => { button.textContent = "Copy"; }, 2000);
     });
   }

@@ -49,7 +49,12 @@ class ProgramList {
     this.note.textContent = note;
     if (line === this.line && stretch?.[0] === this.stretch?.[0]) return;
     Object.assign(this, { line, stretch });
-    const top = (line - 1) * LINE_PIXELS;
+    this.reveal();
+  }
+
+  /** Scroll to the marked line, unless it is seen. */
+  reveal() {
+    const top = (this.line - 1) * LINE_PIXELS;
     const seen = this.list.clientHeight;
     if (top < this.list.scrollTop || top + LINE_PIXELS > this.list.scrollTop + seen) {
       this.list.scrollTop = top - seen / 2 + LINE_PIXELS;

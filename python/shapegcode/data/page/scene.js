@@ -16,8 +16,8 @@ class ScenePage {
     this.lists = this.motions.map((motion) => new ProgramList(byId("program-texts"), motion, pick));
     this.charts = new Charts(scene, (motion, time) => this.seek(motion, time));
     this.#offer();
-    this.show(this.motions.length > 1 ? "both" : this.chief.key);
-    this.seek(this.chief, 0);
+    this.show(this.chief.key);
+    this.seekWorst();
     byId("thinned").textContent = scene.thinned;
     window.addEventListener("beforeprint", () => this.paint());
   }
@@ -35,6 +35,7 @@ class ScenePage {
     const add = (id, rows) => byId(id).append(...rows.map(([value, text]) => new Option(text, value)));
     add("colour", Object.entries(this.scene.channels).map(([name, { label, unit }]) => [name, `${label}, ${unit}`]));
     if (shown.length) add("colour", [["program", "program"]]);
+    if (this.scene.channels.deviation) byId("colour").value = "deviation";
     add("pace", PACES.map((pace) => [pace, `${pace}× as fast`]));
     byId("pace").value = PACES.find((pace) => this.chief.duration / pace < 60) ?? PACES[PACES.length - 1];
     byId("magnify").max = MAGNIFY.length - 1;
@@ -47,15 +48,16 @@ class ScenePage {
     on("view-fit", "click", () => this.stage.fit());
     on("play", "click", () => (this.playing ? this.stop() : this.play()));
     on("clock", "input", () => { this.stop(); this.seek(this.chief, Number(byId("clock").value)); });
+    on("worst", "click", () => { this.stop(); this.seekWorst(); });
     on("block-back", "click", () => this.step(-1));
     on("block-on", "click", () => this.step(1));
     on("trace-kind", "change", () => this.charts.set({ kind: byId("trace-kind").value }));
   }
 
-  /** So that the largest deviation is drawn as a thirtieth of the path. */
+  /** So that the largest deviation in a cut is drawn as a thirtieth of the path. */
   #fittingMagnify() {
-    const most = Math.max(...this.motions.map(({ off }) => off.reduce((best, column) =>
-      column.reduce((a, b) => Math.max(a, Math.abs(b)), best), 0)));
+    const most = Math.max(...this.motions.map(({ off, inCuts }) => off.reduce((best, column) =>
+      column.reduce((a, b, i) => (inCuts[i] ? Math.max(a, Math.abs(b)) : a), best), 0)));
     const wanted = (this.stage.camera.radius * 1e3) / 30 / (most || 1);
     return Math.max(MAGNIFY.findLastIndex((factor) => factor <= wanted), 0);
   }
@@ -78,7 +80,21 @@ class ScenePage {
     this.colourBy(byId("colour").value);
     this.magnify();
     if (before !== this.chief) this.seek(before, this.time);
-    this.lists.forEach((list) => list.render());
+    this.lists.forEach((list) => list.reveal());
+    this.#sayWorst();
+  }
+
+  seekWorst() {
+    this.seek(this.chief, this.chief.timeOf(this.chief.worst));
+  }
+
+  #sayWorst() {
+    const { label, line, channels, worst } = this.chief;
+    byId("worst").hidden = byId("worst-said").hidden = !channels.deviation;
+    if (!channels.deviation) return;
+    const at = `line ${line[worst]}, ${this.chief.timeOf(worst).toFixed(3)} s`;
+    const size = Number(channels.deviation[worst].toPrecision(4));
+    byId("worst-said").textContent = `Largest deviation in a cut: ${size} µm at ${at} (${label}).`;
   }
 
   plan(plan) {
@@ -95,11 +111,13 @@ class ScenePage {
     this.stage.draw();
   }
 
-  /** Least and largest value of a channel, of all programs, so that colours can be compared. */
+  /** Least and largest value of a channel, of all programs, so that colours can be compared; of a deviation in cuts. */
   #limits(name) {
     let [low, high] = [Infinity, -Infinity];
-    for (const { channels } of this.motions) {
-      for (const value of channels[name] ?? []) [low, high] = [Math.min(low, value), Math.max(high, value)];
+    for (const { channels, inCuts } of this.motions) {
+      (channels[name] ?? []).forEach((value, i) => {
+        if (name !== "deviation" || inCuts[i]) [low, high] = [Math.min(low, value), Math.max(high, value)];
+      });
     }
     if (!(high > low)) return [low === Infinity ? 0 : low, (low === Infinity ? 0 : low) + 1];
     return LOGARITHMIC.has(name) && low >= 0 ? [Math.max(low, high * 1e-3), high] : [Math.min(low, 0), high];
@@ -113,10 +131,11 @@ class ScenePage {
     const log = LOGARITHMIC.has(channel);
     const scaled = log
       ? (value) => Math.log(Math.max(value, low) / low) / Math.log(high / low)
-      : (value) => (value - low) / (high - low);
+      : (value) => Math.min((value - low) / (high - low), 1);
     const none = (motion) => new Float32Array(motion.count);
     this.stage.setValues((motion) => Float32Array.from(motion.channels[channel] ?? none(motion), scaled));
-    this.limits = { low, high, middle: log ? Math.sqrt(low * high) : (low + high) / 2 };
+    const beyond = this.motions.some(({ channels }) => channels[channel]?.some((value) => value > high));
+    this.limits = { low, high, beyond, middle: log ? Math.sqrt(low * high) : (low + high) / 2 };
     this.charts.set({ channel });
     this.#legend();
   }
@@ -135,11 +154,11 @@ class ScenePage {
       return;
     }
     const { label, unit, how } = this.scene.channels[this.colour];
-    const { low, middle, high } = this.limits;
+    const { low, middle, high, beyond } = this.limits;
     const number = (value) => String(Number(value.toPrecision(3)));
     legend.replaceChildren(span(`${label}, ${unit}`, ""), span(number(low), ""),
       span("", "ramp", `linear-gradient(90deg, ${RAMP.join(",")})`), span(number(high), ""),
-      span(`(middle ${number(middle)})`, ""));
+      span(`(middle ${number(middle)}${beyond ? "; outside of the cuts it is larger" : ""})`, ""));
     byId("colour-how").textContent = how;
   }
 

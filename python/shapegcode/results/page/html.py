@@ -10,27 +10,23 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
-import io
-import json
 import re
-from collections.abc import Mapping
 from functools import cache
 from html import escape
 from importlib import metadata, resources
 from pathlib import Path
-from typing import Any
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_bytes, write_text
-from shapegcode.results.json import Streamed
-from shapegcode.results.page.markup import light_sign, prose, section_of
+from shapegcode.results.page.markup import json_script, light_sign, prose, section_of
 from shapegcode.results.page.model import Page, Script
 from shapegcode.results.page.scene import packed
 
 __all__ = ["SCRIPTS", "STYLES", "is_shared", "plotly_name", "save", "to_html"]
 
 SCRIPTS = tuple(
-    f"{name}.js" for name in ("page", "decode", "view", "pixels", "axes", "stage", "programs", "charts", "scene")
+    f"{name}.js"
+    for name in ("page", "cuts", "decode", "view", "pixels", "axes", "stage", "programs", "charts", "scene")
 )
 STYLES = ("page.css", "scene.css", "print.css")
 """Files of `shapegcode/data/page`, in the order in which they are put together."""
@@ -57,13 +53,14 @@ def to_html(page: Page, script: Script = "inline") -> str:
         raise ValueError(f"{', '.join(sorted(taken))}: a section cannot have the key of a part of the page")
     before, after = page.sections[: page.before_scene], page.sections[page.before_scene :]
     parts = [section_of(section) for section in before]
-    scripts = [_data("result", page.report)]
-    allowed = [_hash(own)]
+    scripts = [json_script("result", page.report)]
+    start = _asset("start.js")
+    allowed = [_hash(start), _hash(own)]
     if page.scene is not None:
         head, data = packed(page.scene)
         head["plotly"] = "" if script == "inline" else plotly_name()
         parts.append(_asset("scene.html"))
-        scripts.append(_data("scene-head", head))
+        scripts.append(json_script("scene-head", head))
         scripts.append(f'<script type="text/plain" id="scene-data">{data}</script>')
         if script == "inline":
             text, source = _plotly()
@@ -92,6 +89,8 @@ def to_html(page: Page, script: Script = "inline") -> str:
 <meta name="referrer" content="no-referrer">
 <title>{escape(page.title)}</title>
 <style>{_assets(STYLES)}</style>
+<script>{start}</script>
+<noscript><style>.loading {{ display: none; }}</style></noscript>
 </head>
 <body>
 <header id="top">
@@ -120,7 +119,7 @@ def _problems(page: Page) -> str:
     if not page.problems:
         return ""
     rows = "".join(f"<li>{prose(problem)}</li>" for problem in page.problems)
-    title = "<h2>Heed this about the report itself</h2>"
+    title = "<h2>Caution: about this page itself</h2>"
     return f'<div class="warning problems" role="alert">{title}<ul>{rows}</ul></div>'
 
 
@@ -207,17 +206,3 @@ def _version() -> str:
 def _hash(script: str) -> str:
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return f"'sha256-{digest}'"
-
-
-def _data(key: str, value: Any) -> str:
-    """JSON inside of HTML: what could end the element or start another one is written by its number."""
-    encoder = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    if isinstance(value, Mapping) and any(isinstance(each, Streamed) for each in value.values()):
-        stream = io.StringIO()
-        stream.writelines(encoder.iterencode(value))
-        text = stream.getvalue()
-    else:
-        text = encoder.encode(value)
-    for sign in "<>&\u2028\u2029":
-        text = text.replace(sign, f"\\u{ord(sign):04x}")
-    return f'<script type="application/json" id="{key}">{text}</script>'

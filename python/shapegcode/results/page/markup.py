@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import io
+import json
 import re
+from collections.abc import Mapping
+from functools import partial
 from html import escape
 from operator import attrgetter
+from typing import Any
 from urllib.parse import quote
 
+from shapegcode.results.json import Streamed, plain
 from shapegcode.results.page.model import (
     Bars,
+    CutPicker,
+    CutRow,
     Figure,
     Figures,
     HeatMap,
@@ -23,14 +31,17 @@ from shapegcode.results.page.model import (
 )
 from shapegcode.results.table import NO_BREAK, Column, Table
 
-__all__ = ["LIGHT_WORDS", "light_sign", "number", "prose", "section_of"]
+__all__ = ["LIGHT_WORDS", "json_script", "light_sign", "number", "prose", "section_of"]
 
-LIGHT_WORDS: dict[Light, str] = {"green": "Go ahead", "amber": "Heed first", "red": "Do not use"}
+LIGHT_WORDS: dict[Light, str] = {
+    "green": "Go ahead", "calm": "Nothing to do", "amber": "Check first", "red": "Do not use"
+}  # fmt: skip
 """What a traffic light says, for those who cannot see its colour."""
 
 _SIGNS: dict[Light, str] = {
-    # Each colour has a shape of its own: disc, triangle, octagon.
+    # Each colour has a shape of its own: disc, square, triangle, octagon.
     "green": '<circle cx="16" cy="16" r="14"/><path class="mark" d="M9 16.5l5 5 9-11"/>',
+    "calm": '<rect x="3" y="3" width="26" height="26" rx="5"/><path class="mark" d="M10 12.5h12m-12 7h12"/>',
     "amber": '<path d="M16 2.5 30.5 29h-29z"/><path class="mark" d="M16 12v8m0 3.2v2.2"/>',
     "red": '<path d="M10.2 2h11.6L30 10.2v11.6L21.8 30H10.2L2 21.8V10.2z"/>'
     '<path class="mark" d="M10.5 10.5l11 11m0-11l-11 11"/>',
@@ -104,6 +115,8 @@ def _part(part: Part, key: str) -> str:
             return f"<div{kind}>" + "".join(f"<p>{prose(text)}</p>" for text in part.paragraphs) + "</div>"
         case Table():
             return _table(part)
+        case CutPicker():
+            return _cut_picker(part, key)
 
 
 def _card(figure: Figure) -> str:
@@ -207,10 +220,14 @@ def _steps(steps: NextSteps) -> str:
     for step in steps.rows:
         command = ""
         if step.command:
-            copy = '<button type="button" class="copy needs-script" aria-label="Copy the command">Copy</button>'
-            command = f'<div class="command"><code tabindex="0">{escape(step.command)}</code>{copy}</div>'
+            command = _command(step.command)
         rows.append(f"<li>{prose(step.text)}{command}</li>")
     return '<ol class="steps">' + "".join(rows) + "</ol>"
+
+
+def _command(text: str) -> str:
+    copy = '<button type="button" class="copy needs-script" aria-label="Copy the command">Copy</button>'
+    return f'<div class="command"><code tabindex="0">{escape(text)}</code>{copy}</div>'
 
 
 def _picture(picture: Picture, key: str) -> str:
@@ -231,7 +248,7 @@ def _table(table: Table) -> str:
     lines = []
     for rank, (row, cells) in enumerate(zip(table.rows, rows, strict=True)):
         style = table.row_style(row) if table.row_style else ""
-        marks = [name for name in ("bold", "red", "dim") if name in style]
+        marks = [name for name in ("bold", "red", "dim", "shaped") if name in style]
         marks += ["parted"] if rank in table.sections and rank else []
         body = "".join(
             f"<td {kind}>{_linked(escape(cell.replace(NO_BREAK, ' ')), column, row)}</td>"
@@ -253,3 +270,97 @@ def _linked(text: str, column: Column, row: object) -> str:
 def _scrolled(table: str) -> str:
     """Wide tables scroll by themselves, also by keys."""
     return f'<div class="scrolled" tabindex="0" role="group" aria-label="Table">{table}</div>'
+
+
+def _number_of(row: CutRow, name: str) -> float | None:
+    """What a column of numbers is sorted by, and summed."""
+    if name == "first":
+        return row.lines[0]
+    if name == "bytes_added":
+        shaped, original = row.bytes.emitted, row.bytes.original
+        return None if shaped is None or original is None else shaped - original
+    value: float | None = attrgetter(name)(row)
+    return None if value is None else float(f"{value:.9g}")
+
+
+_CUT_COLUMNS: Mapping[str, Column] = {
+    "first": Column("lines", value=lambda row: "{}-{}".format(*row.lines), left=True),
+    "tool": Column("tool", left=True),
+    "gain_um": Column("gain", "µm", "gain_um", digits=1),
+    "residual_um.original": Column("residual original", "µm", "residual_um.original", digits=1),
+    "residual_um.emitted": Column("residual shaped", "µm", "residual_um.emitted", digits=1),
+    "contour_um.original": Column("contour original", "µm", "contour_um.original", digits=1),
+    "contour_um.emitted": Column("contour shaped", "µm", "contour_um.emitted", digits=1),
+    "time_s.original": Column("time original", "s", "time_s.original", digits=2),
+    "time_s.emitted": Column("time shaped", "s", "time_s.emitted", digits=2),
+    "bytes_added": Column("bytes added", value=partial(_number_of, name="bytes_added")),
+    "outcome": Column("shaped, or why not", value="outcome", text=True),
+}
+"""Columns of the cuts, by what they are sorted by."""
+
+_CUT_SUMS = (
+    ("count", "cuts to shape"),
+    ("time", "cycle time"),
+    ("residual", "maximum residual vibration"),
+    ("contour", "maximum contour error"),
+    ("bytes", "size of the program"),
+)
+
+
+def _cut_picker(picker: CutPicker, key: str) -> str:
+    """The table, which is read without a script; sums, boxes to tick and the command, which a script fills."""
+    columns = tuple(_CUT_COLUMNS.values())
+    table = Table("", columns, picker.rows, row_style=lambda row: "shaped" if row.is_shaped else "")
+    shown = table.shown()
+    values = {
+        name: [getattr(row, name) if name in ("tool", "outcome") else _number_of(row, name) for row in picker.rows]
+        for name in _CUT_COLUMNS
+    }
+    data = {
+        "columns": [name for name, column in _CUT_COLUMNS.items() if column in shown],
+        "values": values | {"last": [row.lines[1] for row in picker.rows]},
+        "ticked": [rank for rank, row in enumerate(picker.rows) if row.selected and row.can_be_shaped],
+        "fixed": [rank for rank, row in enumerate(picker.rows) if not row.can_be_shaped],
+        "command": picker.command,
+        "totals": plain(picker.totals),
+    }
+    cards = "".join(
+        f'<div class="card" data-sum="{name}"><h3 class="name">{title}</h3><p class="value"></p><p class="change"></p>'
+        '<p class="limit"></p></div>'
+        for name, title in _CUT_SUMS
+    )
+    buttons = "".join(
+        f'<button type="button" data-tick="{name}">{text}</button> '
+        for name, text in (("all", "Tick all"), ("none", "Tick none"), ("first", "Reset"))
+    )
+    # On paper are the shaped ones.
+    kind = "cut-picker" if any(row.is_shaped for row in picker.rows) else "cut-picker unprinted"
+    return (
+        f'<div class="{kind}" data-of="{escape(key)}-cuts"><div class="needs-script on-screen">'
+        f'<div class="cards" role="status" aria-label="With the ticked cuts shaped">{cards}</div>'
+        f'<p class="note" role="status"></p>{_command("")}<p class="ticks">{buttons}</p></div>{_table(table)}'
+        '<p class="caption more needs-script on-screen"><span></span> <button type="button">Show all</button></p>'
+        f"{json_script(f'{key}-cuts', data)}</div>"
+    )
+
+
+def json_script(key: str, value: Any) -> str:
+    """JSON inside of HTML: what could end the element or start another one is written by its number.
+
+    Args:
+        key: id of the element.
+        value: that JSON can hold.
+
+    Returns:
+        A script element that does not run.
+    """
+    encoder = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    if isinstance(value, Mapping) and any(isinstance(each, Streamed) for each in value.values()):
+        stream = io.StringIO()
+        stream.writelines(encoder.iterencode(value))
+        text = stream.getvalue()
+    else:
+        text = encoder.encode(value)
+    for sign in "<>&\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return f'<script type="application/json" id="{key}">{text}</script>'

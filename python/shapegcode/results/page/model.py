@@ -10,12 +10,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from shapegcode.results.outcome import Plot
+from shapegcode.results.outcome import Pair, Plot
 from shapegcode.results.page.scene import Scene
 from shapegcode.results.table import Table
 
 __all__ = [
     "Bars",
+    "CutPicker",
+    "CutRow",
+    "CutTotals",
     "Figure",
     "Figures",
     "HeatMap",
@@ -35,8 +38,8 @@ __all__ = [
 Script = Literal["inline", "beside"]
 """Where the script of a page is: in its file, or in one beside it."""
 
-Light = Literal["green", "amber", "red"]
-"""Run it; heed something first; do not."""
+Light = Literal["green", "calm", "amber", "red"]
+"""Run it; leave it as it is, there is nothing to do; do something first; do not run it."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +186,70 @@ class Text:
     warning: bool = False
 
 
-Part = Figures | HeatMap | Bars | Notes | NextSteps | Picture | Text | Table
+@dataclass(frozen=True)
+class CutRow:
+    """A cut that may be shaped or left unchanged.
+
+    Attributes:
+        lines: of the original program, first and last.
+        tool: that cuts, for example "T3"; empty: not known.
+        gain_um: what shaping gains; None: not tried.
+        residual_um: maximum residual vibration, original and shaped; None: not simulated.
+        contour_um: maximum contour error, likewise.
+        time_s: until the set-points rest, likewise.
+        bytes: of its program text, likewise.
+        outcome: "shaped", or why not.
+        is_shaped: it is shaped in the emitted program: these are printed.
+        selected: it is ticked when the page opens.
+        can_be_shaped: False: it has no box to tick.
+    """
+
+    lines: tuple[int, int]
+    tool: str
+    gain_um: float | None
+    residual_um: Pair[float | None]
+    contour_um: Pair[float | None]
+    time_s: Pair[float | None]
+    bytes: Pair[int | None]
+    outcome: str
+    is_shaped: bool
+    selected: bool
+    can_be_shaped: bool = True
+
+
+@dataclass(frozen=True)
+class CutTotals:
+    """What the sums over the ticked cuts start from, and what they are judged by.
+
+    Attributes:
+        time_s: cycle time of the original program.
+        bytes: size of the original program.
+        residual_limit_um: of the maximum residual vibration; None: not judged.
+        contour_limit_um: of the maximum contour error; None: not judged.
+    """
+
+    time_s: float
+    bytes: int
+    residual_limit_um: float | None = None
+    contour_limit_um: float | None = None
+
+
+@dataclass(frozen=True)
+class CutPicker:
+    """A table of cuts to sort and to tick; what the ticked ones cost and gain, and the command that shapes only them.
+
+    Attributes:
+        rows: of the table, in the order of the program.
+        command: to type, with `{lines}` where the lines of the ticked cuts stand, such as `12-80,95-240`.
+        totals: of the original program.
+    """
+
+    rows: tuple[CutRow, ...]
+    command: str
+    totals: CutTotals
+
+
+Part = Figures | HeatMap | Bars | Notes | NextSteps | Picture | Text | Table | CutPicker
 
 
 @dataclass(frozen=True)

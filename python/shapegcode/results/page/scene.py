@@ -36,7 +36,11 @@ class Channel:
 
 
 CHANNELS: Mapping[str, Channel] = {
-    "deviation": Channel("deviation from the path", "µm", "Distance of the table from the programmed path."),
+    "deviation": Channel(
+        "deviation from the path",
+        "µm",
+        "Distance of the table from the programmed path; the contour error also counts how far a corner is cut.",
+    ),
     "vibration": Channel("vibration", "µm", "Distance of the table from where the control wants it at that instant."),
     "speed": Channel("speed", "mm/min", "Speed of the command; corners and short blocks are slow."),
     "acceleration": Channel("acceleration", "m/s²", "Acceleration of the command: what shakes the machine."),
@@ -61,7 +65,9 @@ class Variant:
         command_mm: set-points, (n, 3).
         deviation_um: of the table from the path, or where that is not known from its command, (n, 3).
         channels: values along the path by the names of `CHANNELS`, each (n,).
-        samples: how many periods were played.
+        samples: how many periods were simulated.
+        cut_lines: first and last line of each cut, (k, 2): there the largest deviation is looked for;
+            empty: everywhere.
     """
 
     key: str
@@ -75,6 +81,7 @@ class Variant:
     deviation_um: FloatArray
     channels: Mapping[str, FloatArray]
     samples: int
+    cut_lines: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -171,6 +178,7 @@ def packed(scene: Scene) -> tuple[dict[str, Any], str]:
             columns |= {name + axis: ranks(table[:, number]) for number, axis in enumerate("xyz")}
         columns |= {name: ranks(values) for name, values in variant.channels.items()}
         said = {"key": variant.key, "label": variant.label, "file": variant.file, "samples": variant.samples}
+        said["cuts"] = variant.cut_lines
         variants.append(said | {"columns": columns, "text": add(text, count=len(text))})
     spectra = [
         {"axis": one.axis, "variant": one.variant}
