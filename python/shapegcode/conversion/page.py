@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeVar
 
 from shapegcode.conversion.curve import curve_table
-from shapegcode.conversion.cuts import cut_table
+from shapegcode.conversion.cuts import CutOutcome
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled_result import ScheduledConversion
 from shapegcode.conversion.tables import before_after_table, rests_table
@@ -16,6 +18,9 @@ from shapegcode.results.made import Made
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
 from shapegcode.results.page.model import (
     Bars,
+    CutPicker,
+    CutRow,
+    CutTotals,
     Figure,
     Figures,
     HeatMap,
@@ -25,12 +30,16 @@ from shapegcode.results.page.model import (
     Notes,
     Section,
 )
+from shapegcode.results.result import Pair
 from shapegcode.results.table import Column, Table
 from shapegcode.verdict.figures import CaseVerdict
 
 __all__ = ["light_of", "sections_of"]
 
+N = TypeVar("N", int, float)
+
 _LONGEST_REGIONS = 8
+_SHOWN_CUTS = 12
 _LEAST_SHOWN_UM = 0.05
 _SHOWN_KEYS = ("axes.", "tolerance.", "verdict.")
 _RUN_FIRST = ("first run",)
@@ -43,15 +52,15 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
         conversion: what was made.
 
     Returns:
-        Red where a tolerance is missed; amber where nothing was shaped, a warning is open, or an unmeasured value
-        could turn the verdict; else green.
+        Red where nobody should run it; amber where a limit is missed, a warning is open, or an unverified parameter
+        could turn the verdict; calm where nothing was shaped; else green.
     """
     if not conversion.is_written_as_output:
         return "red", conversion.reason
     if not conversion.within_tolerance:
         return "amber", next(conversion.misses(), conversion.reason)
     if conversion.nothing_shaped:
-        return "green", conversion.reason
+        return "calm", conversion.reason
     turning = [row.key for row in conversion.rests_on if row.moved_um > row.limit_um]
     if turning:
         return "amber", f"a value that nobody measured on this machine could turn the verdict: {turning[0]}"
@@ -84,7 +93,7 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
         table = rests_table(conversion.rests_on, conversion.unmeasured_tried)
         how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
         yield Section("rests", "What the verdict rests on", (table,), how=how)
-    yield from _price(conversion)
+    yield from _price(conversion, made)
     yield _times(conversion)
     if isinstance(conversion, ScheduledConversion):
         yield Section("feeds", "Feeds and cutting forces", tuple(conversion.feed_schedule.tables()), printed=False)
@@ -98,11 +107,44 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
         yield _sheet(conversion, made)
 
 
-def _price(conversion: Conversion) -> Iterator[Section]:
+def _picker(conversion: Conversion, made: Made | None) -> CutPicker:
+    """The cuts to tick; what a cut left unchanged would be is not known."""
+    rows = []
+    for cut in conversion.cuts:
+        rows.append(
+            CutRow(
+                cut.lines, "" if cut.tool is None else f"T{cut.tool}", cut.gain_um, _tried(cut.residual_um, cut),
+                _tried(cut.contour_um, cut), _tried(cut.time_s, cut), _tried(cut.bytes, cut),
+                "shaped" if cut.is_shaped else cut.reason, cut.is_shaped, cut.is_shaped,
+            )
+        )  # fmt: skip
+    command = "shapegcode convert IN -m MACHINE -o OUT" if made is None or not made.command else made.command
+    command = re.sub(r" --(?:only|leave)[ =]\S+", "", command)
+    totals = CutTotals(
+        conversion.cycle_time_s.original,
+        conversion.bytes_read,
+        min(max(cut.residual_limit_um) for cut in conversion.all_cuts),
+        conversion.limits.contour_um,
+    )
+    return CutPicker(tuple(rows), f"{command} --only {{lines}}", totals)
+
+
+def _tried(pair: Pair[N], cut: CutOutcome) -> Pair[N | None]:
+    return Pair(pair.original, pair.emitted if cut.is_shaped else None)
+
+
+def _price(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     """Cut by cut, and what other tolerances would cost."""
     if len(conversion.cuts) > 1:
-        how = "Red: a limit is missed. A cut left unchanged is as it was, and its figures are the original's."
-        yield Section("cuts", "Cut by cut", (cut_table(conversion.cuts, every=True),), how=how, folded=True)
+        how = "Tick the cuts to shape: the sums follow, and the command below shapes only them."
+        yield Section(
+            "cuts",
+            "Cut by cut",
+            (_picker(conversion, made),),
+            how=how,
+            folded=len(conversion.cuts) > _SHOWN_CUTS,
+            printed=False,
+        )
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
         how = f"{sentence}. " if sentence else ""
@@ -191,7 +233,7 @@ def _times(conversion: Conversion) -> Section:
     whole, cutting = conversion.cycle_time_s, conversion.cutting_time_s
     rows = [
         ("whole program", (whole.original, whole.emitted)),
-        ("shaped cuts together", (cutting.original, cutting.emitted)),
+        ("cuts together", (cutting.original, cutting.emitted)),
         ("everything else", (whole.original - cutting.original, whole.emitted - cutting.emitted)),
     ]
     keys = [("cycle_time_s.original", "cycle_time_s.emitted"), ("cutting_time_s.original", "cutting_time_s.emitted")]
