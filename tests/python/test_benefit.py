@@ -87,7 +87,8 @@ def test_the_command_says_it_first(tmp_path: Path) -> None:
     jsonschema.validate(data, schema(sg.Conversion))
     assert data["recommendation"] == "no benefit: run the original"
     done = run(tmp_path, "convert", "slow.nc", "-m", "vx500", "-o", "all.nc", "--shape-all")
-    assert done.stdout.startswith("worth running")
+    assert done.stdout.startswith("no benefit: run the original")
+    assert "next: run the original program: the shaped one" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,9 @@ def test_plots_are_png_and_svg(folder: Path) -> None:
     done = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--plots", "a/b", "--json", "r.json")
     assert (done.returncode, done.stderr) == (0, "")
     names = files(folder / "a" / "b")
-    assert names == sorted(f"{name}.{kind}" for name in ("path", "feed", "vibration") for kind in ("png", "svg"))
+    assert names == sorted(
+        f"{name}.{kind}" for name in ("path", "feed", "tolerance", "vibration") for kind in ("png", "svg")
+    )
     for name in names:
         begin = (folder / "a" / "b" / name).read_bytes()[:200]
         assert begin.startswith(b"\x89PNG" if name.endswith("png") else b"<?xml")

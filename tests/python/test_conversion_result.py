@@ -37,7 +37,7 @@ def rows(conversion: sg.Conversion) -> dict[str, BeforeAfter]:
 def test_the_answer_is_the_verdict_with_the_figures_of_the_json() -> None:
     conversion = converted()
     report = conversion.to_dict()
-    was, now = (report["residual_vibration_um"][side]["y"] for side in ("original", "emitted"))
+    was, now = (report["residual_vibration_um"][side]["x"] for side in ("original", "emitted"))
     assert conversion.answer.startswith(f"worth running: residual vibration X {was:.1f} → {now:.1f} µm, contour ")
     both = report["contour_error_um"]["response"]
     assert f"contour {both['original']['max']:.1f} → {both['emitted']['max']:.1f} µm" in conversion.answer

@@ -261,7 +261,7 @@ def test_a_missed_limit_of_the_cut_is_no_missed_tolerance_but_no_success_either(
     low = tool("resultant_n = 20\nfeed_per_tooth_min_mm = 0.012")
     scheduled = sg.convert_scheduled(program, machine, low, sg.Stock.from_toml(ALLOWANCE))
     assert (scheduled.within_tolerance, scheduled.feed_schedule.ok, scheduled.ok) == (True, False, False)
-    assert scheduled.answer.startswith("do not run: ")
+    assert scheduled.answer.startswith("do not run, OUT OF TOLERANCE: ")
     assert "NOT within limits: peak resultant" in scheduled.answer
     assert scheduled.next_step.startswith("do not run it: take less material at once")
     assert b"(OUT OF TOLERANCE - DO NOT RUN  )" in scheduled.text

@@ -213,6 +213,8 @@ class Conversion(PlayedFigures, Result):
             if self.recommendation.startswith("already"):
                 return "run the program as it is; --shape-all shapes it all the same."
             return "run the original program: nothing in it was shaped."
+        if self.recommendation.startswith("no benefit"):
+            return "run the original program: the shaped one brings no benefit."
         if not self.is_written_as_output:
             stated = any("; feasible: " in warning for warning in self.warnings)
             remedy = "a warning says which limit is feasible" if stated else "lower the feed there, and convert again"

@@ -17,6 +17,7 @@ import numpy as np
 
 from shapegcode.errors import ArgumentError, DesignError, MachineError
 from shapegcode.machine import Machine
+from shapegcode.machine.output import ANY_PRICE
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
 from shapegcode.studies.choices import Choices, Ranks, checked_choices, search, usual_choices
@@ -135,7 +136,8 @@ class _Choosing:
         self, program: Program | str, machine: Machine, choices: Choices,
         rows: list[tuple[Mapping[str, object], ...]], probability: float, shape_all: bool,
     ) -> None:  # fmt: skip
-        self._program, self._machine, self._choices, self._rows = program, machine, choices, rows
+        # The shortest time is looked for: no price stands in its way.
+        self._program, self._machine, self._choices, self._rows = program, machine.with_values(ANY_PRICE), choices, rows
         self._probability, self._shape_all = probability, shape_all
         self._replays: dict[Ranks, Replay] = {}
         self.candidates: dict[Ranks, Candidate] = {}

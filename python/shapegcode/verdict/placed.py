@@ -18,11 +18,13 @@ class Placed:
         region: of the original program.
         first_line: first emitted line, from 1.
         last_line: last emitted line.
+        path: the shaped blocks; None: those of these lines.
     """
 
     region: _core.Region
     first_line: int
     last_line: int
+    path: _core.Path | None = None
 
     @property
     def original_lines(self) -> tuple[int, int]:
@@ -31,4 +33,6 @@ class Placed:
 
     def blocks(self, emitted: Program) -> _core.Path:
         """The shaped blocks as they were read back."""
+        if self.path is not None:
+            return self.path
         return emitted.core.cutting_path(self.first_line, self.last_line)

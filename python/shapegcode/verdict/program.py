@@ -52,7 +52,7 @@ def judge_program(
     judge = Judge(model, [case for case in stated_cases(machine) if case.counts or case.nominal])
     pairs = list(paired_regions(emitted, original))
     is_shaped = [mine.shaped if shaped is None else shaped for mine, _ in pairs]
-    placed = [Placed(region, mine.first_line, mine.last_line) for mine, region in pairs]
+    placed = [Placed(region, mine.first_line, mine.last_line, mine.path) for mine, region in pairs]
     with ThreadPoolExecutor(max_workers=cores()) as pool:
         originals = [
             pool.submit(model.play_original, place.region.path, offset=model.offset(place.region)) for place in placed
