@@ -122,6 +122,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.cli import runner
     from shapegcode.conversion.benefit import summary
     from shapegcode.program.compensation import read_for_conversion
+    from shapegcode.program.several import alone_with
 
     output = output_file(args.output)
     machine = overridden(load_machine(args), args, MACHINE_KEYS)
@@ -144,7 +145,12 @@ def run(args: argparse.Namespace) -> int:
         notes.append(
             f"the verdict rests on nothing that nobody measured: {result.unmeasured_tried} values moved, none matters"
         )
-    return runner.finish(result, args, notes=notes, output=(target, result.emitted.view()))
+    needed = () if hasattr(args, "several") else program.kept_calls
+    if needed:
+        names = ", ".join(place.address for place in needed)
+        notes.append(f"calls of {names} were kept: as they are in {args.input}, they stand behind the program")
+    content = alone_with(result.emitted.view(), program.text, needed)
+    return runner.finish(result, args, notes=notes, output=(target, content))
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
