@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -209,3 +210,77 @@ def test_each_emitted_program_is_held_against_its_own_header(tmp_path: Path) -> 
     at = text.index("Y", text.index("(SHAPED)", text.index("O0002")))
     (tmp_path / "out.nc").write_text(f"{text[:at]}Y1{text[at + 1 :]}")
     assert [address for address, each in codes().items() if "edited" in each] == ["O0002"]
+
+
+def written_alone(folder: Path, text: str, *options: str) -> tuple[str, dict[str, Any], str]:
+    """What `convert --program O1` writes, its report, and what it says."""
+    punch(folder, text)
+    told = run(
+        folder, "convert", "all.nc", "-m", "vx500", "--program", "O1", "--shape-all", "-o", "out.nc", "--json",
+        "r.json", *options,
+    )  # fmt: skip
+    assert told.returncode == 0, told.stderr
+    return (folder / "out.nc").read_text(), json.loads((folder / "r.json").read_text()), told.stdout
+
+
+def test_the_first_program_alone_is_written_alone_and_its_sizes_are_its_own(tmp_path: Path) -> None:
+    alone = "%\n" + program("O0001", 30) + "%\n"
+    written, report, _ = written_alone(tmp_path, alone)
+    folder = tmp_path / "backup"
+    folder.mkdir()
+    backup = "%\n" + program("O0001", 30) + program("O0002", 60) + SUB + "%\n"
+    of_backup, told, said = written_alone(folder, backup)
+    assert of_backup == written
+    assert [place.address for place in programs_of(of_backup.encode())] == ["O0001"]
+    for key in ("bytes_read", "bytes_emitted", "blocks", "at_the_control"):
+        assert told[key] == report[key], key
+    assert told["bytes_read"] == len(alone) and told["bytes_emitted"] == len(of_backup)
+    assert "calls of" not in said
+
+
+def test_programs_whose_calls_were_kept_stand_behind_the_one_that_was_asked_for(tmp_path: Path) -> None:
+    probe = "O0003(PROBE)\nG65 P0004 (M98 P2)\n#100=#5061\nM99\n"
+    second = "O0004\nM08\nM99\n"
+    back = f"M98 P3\nG90 G00 X0 Y0 Z5.\n{CUT.format(x=20)}"
+    text = "%\n" + program("O0001", 30, back) + program("O0002", 60) + probe + second + "%\n"
+    written, report, said = written_alone(tmp_path, text)
+    assert [place.address for place in programs_of(written.encode())] == ["O0001", "O0003", "O0004"]
+    assert written.endswith(f"M30\n{probe}{second}%\n")
+    assert "calls of O0003, O0004 were kept" in said
+    assert report["bytes_emitted"] == len(written) - len(probe) - len(second)
+    # The header's mark is that of the program alone, and holds for it in the file.
+    checked = run(tmp_path, "check", "out.nc", "-m", "vx500", "--program", "O1", "--json", "c.json")
+    found = json.loads((tmp_path / "c.json").read_text())
+    assert checked.returncode == 0 and "edited" not in found["counts_by_code"]
+    # All of them: the two are done there, and stand as they were.
+    run(tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--shape-all", "-o", "whole.nc")
+    whole = (tmp_path / "whole.nc").read_bytes()
+    assert [place.address for place in programs_of(whole)] == ["O0001", "O0002", "O0003", "O0004"]
+    assert whole.endswith(f"{probe}{second}%\n".encode())
+
+
+def test_check_weighs_the_program_that_was_asked_for_and_not_the_file(tmp_path: Path) -> None:
+    large = program("O0002", 60).replace("M30", "(" + "X" * 50 + ")\nM30")
+    loop = "O0005\nWHILE [#1 LT 3] DO1\n#1=#1+1\nEND1\nM30\n"
+    text = "%\n" + program("O0001", 30) + large + loop + "%\n"
+    room = len(program("O0001", 30))
+    punch(tmp_path, text)
+
+    def found(*words: str) -> dict[str, Any]:
+        run(tmp_path, "check", "all.nc", "-m", "vx500", "--json", "r.json", *words)
+        return json.loads((tmp_path / "r.json").read_text())
+
+    memory = ("--set", f"controller.program_memory_bytes={room}")
+    one, two = found("--program", "O1", *memory), found("--program", "O2", *memory)
+    assert (one["size_bytes"], two["size_bytes"]) == (room, len(large))
+    assert "program_memory" not in one["counts_by_code"]
+    assert two["counts_by_code"]["program_memory"] == 1
+    assert f"the program has {len(large)} bytes" in json.dumps(two["findings"])
+    every = found("--program", "all", *memory)
+    assert [report["size_bytes"] for report in every] == [room, len(large), len(loop)]
+    assert ["program_memory" in report["counts_by_code"] for report in every] == [False, True, False]
+    # What cannot be drip fed is told of the program that holds it, at its line of the file.
+    fed = ("--set", "controller.dnc_baud=9600")
+    assert "macro_in_dnc" not in found("--program", "O1", *fed)["counts_by_code"]
+    lines = [each["line"] for each in found("--program", "O5", *fed)["findings"] if each["code"] == "macro_in_dnc"]
+    assert lines[0] == 1 + text.split("WHILE")[0].count("\n")

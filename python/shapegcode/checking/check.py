@@ -28,6 +28,7 @@ from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
 from shapegcode.program.operating import no_room
 from shapegcode.program.reading import program_bytes
+from shapegcode.program.several import index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN
 
 __all__ = ["MOST_FINDINGS", "check", "check_text"]
@@ -97,7 +98,8 @@ def check_text(
         ProgramError: not to be read at all, without a place to point to.
     """
     data = text.encode() if isinstance(text, str) else text
-    found = list(_whole_file(data, source, machine))
+    own, lines_before = _own_text(data, program_number, source)
+    found = list(_size_and_macros(own, lines_before, source, machine))
     too_long = len(data) > machine.controller.max_program_bytes  # and no more of it may have been read
     short: ShortBlocks | None = None
     dnc: SerialLine | None = None
@@ -132,7 +134,7 @@ def check_text(
         _listed(found, source),
         FindingCounts(*(severities[name] for name in _SEVERITIES)),
         dict(sorted(Counter(finding.code for finding in found).items())),
-        len(data),
+        len(own),
         machine.controller.program_memory_bytes,
         short,
         dnc,
@@ -164,14 +166,28 @@ def _listed(found: Iterable[Finding], source: str) -> tuple[Finding, ...]:
     return tuple(listed)
 
 
-# ---- the file, and what the reader says --------------------------------------------------------------------
+# ---- the text, and what the reader says --------------------------------------------------------------------
 
 
-def _whole_file(data: bytes, source: str, machine: Machine) -> Iterator[Finding]:
+def _own_text(data: bytes, wanted: int | str | None, source: str) -> tuple[bytes, int]:
+    """The program that was asked for, of a file of several, and how many lines stand before it; else the whole file."""
+    try:
+        index = None if wanted is None else index_of(data, wanted, source)
+    except ProgramError as error:
+        if error.line < 1:
+            raise
+        return data, 0  # the reading says it
+    if index is None:
+        return data, 0
+    place = programs_of(data)[index]
+    return data[place.text_begin : place.text_end], place.first_line - 1
+
+
+def _size_and_macros(data: bytes, lines_before: int, source: str, machine: Machine) -> Iterator[Finding]:
     controller = machine.controller
     fed = controller.dnc_baud > 0
     if len(data) > controller.program_memory_bytes:
-        over = f"the file has {len(data)} bytes, the memory for programs {controller.program_memory_bytes}"
+        over = f"the program has {len(data)} bytes, the memory for programs {controller.program_memory_bytes}"
         if fed:
             yield Finding("note", "program_memory", 0, source, 0, 0, f"{over}: it can only be drip fed")
         else:
@@ -181,7 +197,7 @@ def _whole_file(data: bytes, source: str, machine: Machine) -> Iterator[Finding]
             yield Finding("warning", "program_memory", _NO_ROOM, source, 0, 0, message)
     if not fed:
         return
-    for number, raw in enumerate(re.split(rb"\r\n|\n|\r", data), start=1):
+    for number, raw in enumerate(re.split(rb"\r\n|\n|\r", data), start=lines_before + 1):
         line = raw.decode("latin-1").upper()
         match = _MACRO_CONTROL.search(_COMMENT.sub(lambda comment: " " * len(comment[0]), line))
         if match:

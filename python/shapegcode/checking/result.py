@@ -173,7 +173,7 @@ class Check(Result):
         findings: sorted by place, at most `MOST_FINDINGS` of each code.
         counts: of all findings by severity.
         counts_by_code: of all findings by code.
-        size_bytes: of the file.
+        size_bytes: of the program: of the whole file, unless one of several programs was asked for.
         memory_bytes: of the control.
         short_blocks: blocks that last less than the block time; None: the program was not read.
         dnc: the serial line; None: not drip fed, or not read.

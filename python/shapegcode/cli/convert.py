@@ -143,6 +143,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode._core import ArgumentError
     from shapegcode.cli import runner
     from shapegcode.program.compensation import read_for_conversion
+    from shapegcode.program.several import alone_with
 
     output = output_file(args.output)
     machine = overridden(load_machine(args), args, MACHINE_KEYS)
@@ -165,7 +166,12 @@ def run(args: argparse.Namespace) -> int:
         notes.append(
             f"{result.unmeasured_tried} unverified parameters were changed one at a time: none matters for the verdict"
         )
-    return runner.finish(result, args, notes=notes, output=(target, result.emitted.view()))
+    needed = () if hasattr(args, "several") else program.kept_calls
+    if needed:
+        names = ", ".join(place.address for place in needed)
+        notes.append(f"calls of {names} were kept: as they are in {args.input}, they stand behind the program")
+    content = alone_with(result.emitted.view(), program.text, needed)
+    return runner.finish(result, args, notes=notes, output=(target, content))
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:

@@ -78,7 +78,7 @@ def _called(several: Gathered, machine: Machine) -> set[int]:
             )
         except ProgramError:
             continue  # its own run says why
-        called |= set(program.core.called) - {place.index}
+        called |= {*program.core.called, *(each.index for each in program.kept_calls)} - {place.index}
     # Programs that call each other in a ring are done all the same.
     return called if len(called) < len(several.places) else set()
 

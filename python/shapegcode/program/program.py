@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,13 +12,15 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.reading import program_bytes, program_loader, reader_options
-from shapegcode.program.several import place_of, programs_of
+from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 MM_PER_INCH = 25.4
+_ANY_PROGRAM = [0, 99_999_999]
+_KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
 _ARC_OFF_RADIUS = "off its radius"
 
 
@@ -122,7 +125,7 @@ class Program:
 
         machine = machine or Machine.load("vx500")
         data = text.encode() if isinstance(text, str) else text
-        index = None if program_number is None else _index(data, program_number, source)
+        index = None if program_number is None else index_of(data, program_number, source)
         options = reader_options(
             machine,
             # What shapegcode wrote has FANUC's arcs, whatever those of its original were.
@@ -161,6 +164,7 @@ class Program:
             ProgramError: as `from_text` does.
         """
         options = reader_options(machine, emitted=True, probe_lines=probe_lines)
+        options.opaque_programs = _ANY_PROGRAM  # a call that stands in such a text was kept
         _look_in(options, machine, [])
         try:
             core = _core.read_parts(parts, options)
@@ -220,13 +224,19 @@ class Program:
         text = self.text
         try:
             places = programs_of(text)
-            index = 0 if self.number is None else _index(text, self.number, self.source)
-            if index is None:
-                (index,) = (place.index for place in places if place.address == f"O{self.number:04d}")
-        except (ProgramError, ValueError):
-            return text  # in a file of its own
-        place = places[index]
-        return text if len(places) == 1 else text[place.text_begin : place.text_end]
+            index = 0 if self.number is None else index_of(text, self.number, self.source)
+        except ProgramError:
+            return text
+        return text if index is None or len(places) == 1 else text[places[index].text_begin : places[index].text_end]
+
+    @cached_property
+    def kept_calls(self) -> tuple[ProgramPlace, ...]:
+        """Other programs of its file that its plain program still calls; none where it stands in the whole file."""
+        kept = {int(match[1]) for warning in self.core.warnings if (match := _KEPT_CALL.match(warning[3]))}
+        if self.unexpanded is None or not kept:
+            return ()
+        index = 0 if self.number is None else index_of(self.unexpanded, self.number, self.source)
+        return called_from(self.unexpanded, index or 0, kept)
 
     @cached_property
     def regions(self) -> list[_core.Region]:
@@ -299,17 +309,6 @@ def _look_in(options: _core.ReaderOptions, machine: Machine, folders: list[Path]
     folders = [*folders, *(Path(name).expanduser() for name in machine.input.program_folders)]
     if folders:
         options.load_program = program_loader(folders, machine.controller.max_program_bytes)
-
-
-def _index(data: bytes, wanted: int | str, source: str) -> int | None:
-    """Place of a program in its file; None where its number says enough, or is not there."""
-    if isinstance(wanted, str):
-        return place_of(data, wanted, source)
-    try:
-        numbers = [entry.number for entry in _core.list_programs(data)]
-    except ProgramError:
-        return None  # the reading says it, with its place
-    return place_of(data, f"O{wanted}", source) if numbers.count(wanted) > 1 else None
 
 
 def least_increment_mm(machine: Machine, units: int) -> float:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from shapegcode import _core
 
-__all__ = ["ProgramPlace", "is_subprogram", "place_of", "programs_of"]
+__all__ = ["ProgramPlace", "alone_with", "called_from", "index_of", "is_subprogram", "place_of", "programs_of"]
 
 _PLACE = re.compile(r"#([1-9][0-9]{0,8})")
 _NUMBER = re.compile(r"[Oo:]?0*([1-9][0-9]{0,7})")
 _COMMENT = re.compile(rb"\([^()\r\n]*\)")
+_CALLS = re.compile(rb"(?:M *0*1?98|G *6[56](?: *\. *1)?)(?![0-9.])")
+_CALLED = re.compile(rb"P *0*([0-9]+)")
 _RETURNS, _ENDS = re.compile(rb"M *0*99(?!\d)"), re.compile(rb"M *0*(?:2|30)(?!\d)")
 
 
@@ -107,6 +110,79 @@ def place_of(text: bytes, wanted: str, source: str) -> int:
         f"holds several programs {wanted}: say which, {known}" if found else f"holds no program {wanted} (but {known})"
     )
     raise _core.ProgramError(f"{source}:1:1: the file {said}")
+
+
+def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
+    """Place of a program among several of a text, so that it is read alone.
+
+    Args:
+        text: of the file.
+        wanted: its O number, or an address as `place_of` takes it.
+        source: names the text in messages.
+
+    Returns:
+        How many programs stand before it; None: the text is one program, or has none of this O number.
+
+    Raises:
+        ProgramError: there is none of this address, or more than one.
+    """
+    try:
+        entries = _core.list_programs(text)
+    except _core.ProgramError:
+        if isinstance(wanted, str):
+            raise
+        return None  # the reading says it, with its place
+    if isinstance(wanted, int) and wanted not in [entry.number for entry in entries]:
+        return None  # likewise
+    index = place_of(text, wanted if isinstance(wanted, str) else f"O{wanted}", source)
+    return index if len(entries) > 1 else None
+
+
+def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPlace, ...]:
+    """Programs of a text that one of them needs on the control, because calls of them were kept.
+
+    Args:
+        text: of the file.
+        index: how many programs stand before the one that calls.
+        kept: O numbers whose calls were kept in it.
+
+    Returns:
+        Their places, with those that they call in turn by a number that stands in the call, in the order of the text.
+    """
+    entries, places = _core.list_programs(text), programs_of(text)
+    found: set[int] = set()
+    waiting = [(index, number) for number in kept]
+    while waiting:
+        caller, number = waiting.pop()
+        # The reader looks in the folder of the program that calls first.
+        same = [at for at, entry in enumerate(entries) if entry.number == number]
+        same.sort(key=lambda at: entries[at].folder != entries[caller].folder)
+        if not same and number > 9999:
+            waiting.append((caller, number % 10000))  # P0030100: three times O0100
+        elif same and same[0] not in found | {index}:
+            found.add(same[0])
+            lines = _COMMENT.sub(b"", text[places[same[0]].text_begin : places[same[0]].text_end]).upper().splitlines()
+            calls = (_CALLED.search(line) for line in lines if _CALLS.search(line))
+            waiting += [(same[0], int(call[1])) for call in calls if call]
+    return tuple(places[at] for at in sorted(found))
+
+
+def alone_with(program: bytes | memoryview, text: bytes, needed: Sequence[ProgramPlace]) -> bytes | memoryview:
+    """A program that stands alone, and behind it others as they are in the file that it comes from.
+
+    Args:
+        program: with its own lines "%" where the file has them.
+        text: of the file.
+        needed: which of its programs.
+
+    Returns:
+        The text; the program itself where nothing is needed.
+    """
+    if not needed:
+        return program
+    whole = bytes(program)
+    end = whole.rfind(b"%") if whole.rstrip().endswith(b"%") else len(whole)
+    return b"".join([whole[:end], *(text[place.text_begin : place.text_end] for place in needed), whole[end:]])
 
 
 def _carriage_returns(text: bytes, at: int) -> int:
