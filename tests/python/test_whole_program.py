@@ -326,6 +326,16 @@ def test_the_answer_of_a_program(name: str) -> None:
     assert verdict is None or verdict in conversion.text
 
 
+def test_what_is_not_shaped_is_written_as_it_was() -> None:
+    """Calls, macros and coordinate modes too, which are expanded only to be simulated."""
+    alone = "%\nO1\nG21G17G90G94G54\nG0X0Y0Z5.\n#1=2.\nG68X0Y0R30.\nG1X[#1*10.]F30.\nG69\nG0Z5.\nM30\n%\n"
+    conversion = converted(alone, machine_with({}))
+    assert conversion.expanded
+    assert conversion.recommendation == NONE
+    assert conversion.text == alone.encode()
+    assert conversion.bytes_emitted == len(alone)
+
+
 def test_rounding_by_the_control_is_told_apart_from_vibration() -> None:
     """Slow enough not to vibrate: what errs is the control's own filter, and a smaller one does the same."""
     keys = {

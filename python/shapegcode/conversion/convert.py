@@ -255,7 +255,15 @@ class _Run:
             )
             written = replace(settled.written, size=rapids.emitted.size, placed=rapids.placed)
             settled = replace(settled, written=written, emitted=rapids.emitted)
+        if not settled.written.placed and (rapids is None or not rapids.outcome.shaped) and self._is_alone():
+            # Not what it was expanded into: calls and macros stay as they were written.
+            written = replace(settled.written, size=self.program.size)
+            settled = replace(settled, written=written, emitted=self.program)
         return self._result(settled, rapids, original_within=original_within)
+
+    def _is_alone(self) -> bool:
+        """Whether the program has its file for itself."""
+        return len(self.program.own_text) == self.program.size
 
     def _original_is_within(self) -> bool:
         """Whether every cut as programmed keeps its limits in every operating condition that counts for it."""
