@@ -10,8 +10,10 @@ from shapegcode import _core
 from shapegcode.conversion.ahead import Ahead, OnShare, cores
 from shapegcode.conversion.budget import TransferLoad, measure_load
 from shapegcode.conversion.readback import read_back
+from shapegcode.conversion.region_text import EmittedRegion, NoRoomError, RegionText, Room
+from shapegcode.conversion.restart_points import CutRestarts, FreeNumbers
 from shapegcode.conversion.spending import keepable
-from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionText, RegionWriter, Room
+from shapegcode.conversion.write import RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.shaped_program import stamp_of_machine
@@ -57,6 +59,7 @@ class Written:
             kept by a target.
         loads: per index of a shaped region what it asks of memory, line and control.
         no_room: per index of a region that was to be shaped and keeps its text why there is no room for it.
+        restarts: of each shaped region, as in `placed`.
     """
 
     parts: list[bytes]
@@ -68,6 +71,7 @@ class Written:
     planned_um: dict[int, float]
     loads: dict[int, TransferLoad]
     no_room: dict[int, str]
+    restarts: list[CutRestarts]
 
     def read_back(self, machine: Machine) -> Program:
         """Read the text and hold it against the original; from then on it stands in the program that is given.
@@ -105,6 +109,7 @@ class TextWriter:
         self._model = model
         self.grid = grid
         self._regions = RegionWriter(model, grid)
+        self._numbers = FreeNumbers(program)
         self._pool = pool
         # By region: tolerance and feed for which it was shaped, and what it came to.
         self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
@@ -151,7 +156,7 @@ class TextWriter:
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
         position = core.header_offset
-        written = Written([], [], 0, [], 0, [], {}, {}, {})
+        written = Written([], [], 0, [], 0, [], {}, {}, {}, [])
         blocks, size = 0, core.size
         begin = sum(map(len, parts))
         aims = _aims(reasons, room_um, feed_share)
@@ -181,6 +186,7 @@ class TextWriter:
                     size += region.text_end - region.text_begin
                     kept_moves += len(region.path)
             else:
+                written.restarts.append(self._numbered(shaped, written.restarts))
                 texts = shaped.text.parts()
                 size += shaped.text.size
                 blocks += shaped.blocks
@@ -194,6 +200,17 @@ class TextWriter:
             parts += [between, *texts]
         parts.append(core.slice(position, core.size))
         return replace(written, parts=parts, size=sum(map(len, parts)), blocks=blocks)
+
+    def _numbered(self, shaped: EmittedRegion, before: Sequence[CutRestarts]) -> CutRestarts:
+        """The restart points of a region with N words that stand nowhere else in the program."""
+        marks = shaped.restarts.marks
+        if not marks:
+            return shaped.restarts
+        taken = sum(len(each.marks) for each in before)
+        numbers = self._numbers.first(taken + len(marks))[taken:]
+        shaped.text.number(marks, numbers)
+        numbered = (replace(mark, number=number) for mark, number in zip(marks, numbers, strict=True))
+        return replace(shaped.restarts, marks=tuple(numbered))
 
     def _load(self, index: int, region: _core.Region, shaped: EmittedRegion) -> TransferLoad:
         if index not in self._loads:
