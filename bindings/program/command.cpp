@@ -38,6 +38,8 @@ void register_shaped_command(py::module_& module) {
                      "How far a side of a corner may lean from Z and still count as plunge, rad.")
       .def_readwrite("plunge_corner_angle_rad", &ShapingOptions::plunge_corner_angle_rad,
                      "Least change of direction of such a corner, rad.")
+      .def_readwrite("further_stops", &ShapingOptions::further_stops,
+                     "Ascending indices of segments before which the command comes to rest too.")
       .def_readwrite("rest_at_stop_s", &ShapingOptions::rest_at_stop_s, "Pause at a forced stop, s.")
       .def_readwrite("target", &ShapingOptions::target,
                      "What is brought back to the path; with a target, `tolerance` is its own.")

@@ -3015,6 +3015,14 @@ class ShapingOptions:
     def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def further_stops(self) -> list[int]:
+        """
+        Ascending indices of segments before which the command comes to rest too.
+        """
+    @further_stops.setter
+    def further_stops(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
+    @property
     def least_feed_mm_per_s(self) -> float:
         """
         What the controller can run: no run is slowed below it, mm/s.

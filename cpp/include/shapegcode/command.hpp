@@ -81,6 +81,8 @@ struct ShapingOptions {
   double interpolation_period_s = 0.001;
   double plunge_axis_angle_rad = 0.26;  ///< see forced_stops
   double plunge_corner_angle_rad = 0.78;
+  /// Ascending indices of segments, above 0, before which the command comes to rest too, as at a forced stop.
+  std::vector<std::uint32_t> further_stops;
   double rest_at_stop_s = 0.0;  ///< pause at a forced stop, so that a filter behind the program runs out
   /// What is brought back to the path behind the shaper. With a target, `tolerance.contour_tolerance_mm` is kept by the
   /// highest feed that does; without one, `tolerance` bounds the speed at corners and on arcs.

@@ -173,6 +173,12 @@ RegionShaper::State::State(std::shared_ptr<const Path> path, const Fir& shaper,
   const FilterTolerance filter = options_.target == ContourTarget::none ? options_.tolerance : FilterTolerance{};
   std::vector<std::size_t> borders = forced_stops(path_->segments(), options_.plunge_axis_angle_rad,
                                                   options_.plunge_corner_angle_rad, options_.limits, filter);
+  const std::size_t forced = borders.size();
+  for (const std::uint32_t segment : options_.further_stops) {
+    if (segment > 0 && segment < path_->size()) borders.push_back(segment);
+  }
+  std::inplace_merge(borders.begin(), borders.begin() + static_cast<std::ptrdiff_t>(forced), borders.end());
+  borders.erase(std::unique(borders.begin(), borders.end()), borders.end());
   borders.push_back(path_->size());
   std::size_t first = 0;
   for (const std::size_t border : borders) {

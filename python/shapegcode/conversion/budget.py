@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.conversion.write import EmittedRegion
+from shapegcode.conversion.region_text import EmittedRegion
 from shapegcode.results.result import Xyz
 from shapegcode.shaping.grid import Grid
 

@@ -19,6 +19,7 @@ from shapegcode.conversion.cuts import CutOutcome, chosen_cuts, outcome_of, tool
 from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids
 from shapegcode.conversion.recommendation import Situation, benefits, recommend
+from shapegcode.conversion.restart_points import restart_points
 from shapegcode.conversion.rests import Begun, RestsOn, begin_rests, rests_on
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.spending import Spending, keepable
@@ -511,8 +512,15 @@ class _Run:
             rests_on=rests,
             unmeasured_tried=tried,
             at_the_control=at_the_control(
-                settled.emitted, written.placed, written.loads, figures, machine, self.grid.block_period_s
+                settled.emitted,
+                written.placed,
+                written.loads,
+                figures,
+                self.model,
+                self.grid.block_period_s,
+                written.restarts,
             ),
+            restart_points=restart_points(program, zip(written.placed, written.restarts, strict=True)),
             emitted=emitted,
             placed=tuple(written.placed),
             model=self.model,

@@ -7,17 +7,27 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
+import numpy as np
+
+from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad
+from shapegcode.conversion.restart_points import CutRestarts, RestartPoint
 from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import slowest_mode
 from shapegcode.program import Program
 from shapegcode.program.operating import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK, no_room
 from shapegcode.results.table import Column, Table
 from shapegcode.verdict.figures import PlayedFigures
 from shapegcode.verdict.placed import Placed
 
-__all__ = ["ControlNote", "at_the_control", "control_table"]
+__all__ = ["ControlNote", "at_the_control", "control_table", "restart_table"]
 
 _NAMED_LINES = 4
+_SHOWN_POINTS = 12
+_SINGLE_BLOCKS = 200  # simulated: the fastest ones
+_PRESSES_PER_S = 2.0
+_SWEEP_RAD = 3.0
 _CHUNK = 1 << 16  # bytes
 _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
@@ -40,8 +50,9 @@ def at_the_control(
     placed: Sequence[Placed],
     loads: Mapping[int, TransferLoad],
     figures: PlayedFigures,
-    machine: Machine,
+    model: MachineModel,
     block_period_s: float,
+    restarts: Sequence[CutRestarts],
 ) -> tuple[ControlNote, ...]:
     """What to heed with an emitted program.
 
@@ -50,14 +61,16 @@ def at_the_control(
         placed: its shaped regions; none: nothing to heed.
         loads: what regions ask of line and control.
         figures: as played.
-        machine: that shall run it.
+        model: of the machine that shall run it.
         block_period_s: of the shaped blocks.
+        restarts: restart points of each shaped region.
 
     Returns:
         The notes, in the order in which one meets them.
     """
     if not placed:
         return ()
+    machine = model.machine
     override = OVERRIDES[machine.emission.override]
     elsewhere = [] if machine.emission.override == "lock" else _at_other_overrides(figures)
     return (
@@ -65,8 +78,9 @@ def at_the_control(
         ControlNote("drip feed (DNC)", _line(loads, machine)),
         ControlNote("look-ahead", _look_ahead(loads, machine, block_period_s)),
         ControlNote(override.topic, "; ".join([override.sentence, *elsewhere])),
-        *(ControlNote(habit.topic, habit.sentence) for habit in (FEED_HOLD, SINGLE_BLOCK)),
-        ControlNote(RESTART.topic, f"{RESTART.sentence}; {_restart_lines(emitted, placed)}"),
+        ControlNote(FEED_HOLD.topic, FEED_HOLD.sentence),
+        ControlNote(SINGLE_BLOCK.topic, f"{SINGLE_BLOCK.sentence}; {_single_block(emitted, placed, figures, model)}"),
+        ControlNote(RESTART.topic, "; ".join([RESTART.sentence, *_restarts(emitted, placed, restarts, machine)])),
         ControlNote(FIRST_RUN.topic, FIRST_RUN.sentence),
     )
 
@@ -82,6 +96,33 @@ def control_table(notes: Sequence[ControlNote]) -> Table:
     """
     columns = (Column("at the control", value="topic", text=True), Column("what to heed", value="text", text=True))
     return Table("", columns, notes)
+
+
+def restart_table(points: Sequence[RestartPoint]) -> Table:
+    """Restart points inside of cuts, with what must be in force before the start.
+
+    Args:
+        points: of the program.
+
+    Returns:
+        One row for each; of many those that come first.
+    """
+    columns = (
+        Column("restart", value=lambda point: f"N{point.number}", left=True, priority=0),
+        Column("line", value="line", priority=0),
+        Column("of cut", value=lambda point: "{} to {}".format(*point.lines), left=True, priority=2),
+        Column("T", value="tool"),
+        Column("H", value="length_offset"),
+        Column("system", value="coordinate_system", left=True),
+        Column("S", value="spindle_rev_per_min", digits=0),
+        Column("X", "mm", lambda point: point.position_mm[0], 3),
+        Column("Y", "mm", lambda point: point.position_mm[1], 3),
+        Column("Z", "mm", lambda point: point.position_mm[2], 3),
+        Column("vibration", "µm", "vibration_um", 1, priority=3),
+    )
+    more = len(points) - _SHOWN_POINTS
+    caption = f"and {more} more: restart_points of --json" if more > 0 else ""
+    return Table("restart points inside of cuts", columns, points[:_SHOWN_POINTS], caption)
 
 
 def _memory(size: int, machine: Machine) -> str:
@@ -118,6 +159,75 @@ def _at_other_overrides(figures: PlayedFigures) -> Iterator[str]:
         yield f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of vibration stay"
     if any(not case.counts for case in turned):
         yield "the contour at other settings is measured where verdict.override_percent states them"
+
+
+def _single_block(emitted: Program, placed: Sequence[Placed], figures: PlayedFigures, model: MachineModel) -> str:
+    """What single block does to the cut that vibrates most: its blocks simulated one by one, each from rest to rest."""
+    index = max(range(len(placed)), key=lambda each: max(figures.regions[each].residual_vibration_um.original))
+    place, region = placed[index], figures.regions[index]
+    blocks = place.blocks(emitted)
+    chords = np.diff(blocks.polyline(_SWEEP_RAD), axis=0)  # no arc is longer
+    lengths = np.linalg.norm(chords, axis=1)
+    velocity = chords / np.maximum(lengths, 1e-9)[:, None] * blocks.segment_feeds_mm_per_s[:, None]
+    axes = model.machine.axes.as_tuple()
+    slowest = [min((slowest_mode(mode)[0] for mode in axis.modes), default=np.inf) for axis in axes]
+    fastest = np.argsort(-np.linalg.norm(velocity / np.array(slowest), axis=1), kind="stable")[:_SINGLE_BLOCKS]
+    offset = model.offset(place.region)
+    mark_um = 0.0
+    for one in sorted(int(each) for each in fastest):
+        block = _core.Path([blocks[one]])
+        played = model.play_emitted(block, block, contour=False, offset=offset)
+        mark_um = max(mark_um, float(np.max([played.peak_mm, played.residual_mm])) * 1e3)
+    time_s = region.time_s.emitted + len(blocks) * (1.0 / _PRESSES_PER_S + model.shaped_filter.duration_s)
+    lines = "{} to {}".format(*region.emitted_lines)
+    return (
+        f"single block in lines {lines}: {_duration(time_s)} instead of {_duration(region.time_s.emitted)} "
+        f"({len(blocks)} stops, two presses of cycle start a second), marks of up to {mark_um:.0f} µm"
+    )
+
+
+def _duration(time_s: float) -> str:
+    for unit, seconds in (("h", 3600.0), ("min", 60.0)):
+        if time_s >= 1.5 * seconds:
+            return f"{time_s / seconds:.1f} {unit}" if time_s < 9.5 * seconds else f"{time_s / seconds:.0f} {unit}"
+    return f"{time_s:.1f} s" if time_s < 10.0 else f"{time_s:.0f} s"
+
+
+def _restarts(
+    emitted: Program, placed: Sequence[Placed], restarts: Sequence[CutRestarts], machine: Machine
+) -> Iterator[str]:
+    """Where to restart, what to do before it, and where there is no restart point, and why."""
+    yield _restart_lines(emitted, placed)
+    emission = machine.emission
+    count = sum(len(each.marks) for each in restarts)
+    if count:
+        before = [line for line in (*emission.prologue, *(emission.lock_lines if emission.override == "lock" else ()))]
+        shakes_um = max(mark.vibration_um for each in restarts for mark in each.marks)
+        switched = f", by MDI {' '.join(before)}" if before else ""
+        yield (
+            f"{count} restart point{'' if count == 1 else 's'} inside of long cuts, where the command is nearly at "
+            f"rest: spindle on, tool, H and coordinate system of the list in force{switched}, go to its position from "
+            f"above, then search the N number; a start there shakes the table once, by up to {shakes_um:.0f} µm"
+        )
+    if stops := sum(each.stops for each in restarts):
+        cost_s = sum(each.stops_s for each in restarts)
+        yield (
+            f"{stops} of them {'is a stop that was' if stops == 1 else 'are stops that were'} put in "
+            f"(emission.restart_stops): {cost_s:.1f} s more, and a dwell mark where the tool stands in the cut"
+        )
+    long = [
+        (place.original_lines, each)
+        for place, each in zip(placed, restarts, strict=True)
+        if each.longest_s > emission.restart_interval_s
+    ]
+    for (first, last), each in sorted(long, key=lambda pair: -pair[1].longest_s)[:1]:
+        more = f" (and {len(long) - 1} more cuts)" if len(long) > 1 else ""
+        why = each.reason or "no place where it is nearly at rest"
+        remedy = "" if each.reason or emission.restart_stops else "; emission.restart_stops = true stops there"
+        yield (
+            f"no restart point for {_duration(each.longest_s)} in the cut of lines {first} to {last}{more}: "
+            f"{why}{remedy}"
+        )
 
 
 def _restart_lines(emitted: Program, placed: Sequence[Placed]) -> str:

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from shapegcode.conversion.curve import curve_table
 from shapegcode.conversion.cuts import CutOutcome
+from shapegcode.conversion.operating import restart_table
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled_result import ScheduledConversion
 from shapegcode.conversion.tables import before_after_table, rests_table
@@ -279,4 +280,5 @@ def _sheet(conversion: Conversion, made: Made | None) -> Section:
     strong = frozenset(topic for topic, _ in rows if topic in _RUN_FIRST or "override" in topic)
     title = f"Run sheet: {conversion.recommendation}"
     how = "For the operator. Go through it from top to bottom before cycle start."
-    return Section("sheet", title, (Notes(tuple(rows), strong),), how=how, sheet=True)
+    points = (restart_table(conversion.restart_points),) if conversion.restart_points else ()
+    return Section("sheet", title, (Notes(tuple(rows), strong), *points), how=how, sheet=True)

@@ -10,9 +10,10 @@ from shapegcode.conversion.advice import FilterAdvice
 from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.curve import ToleranceCurve, curve_table
 from shapegcode.conversion.cuts import CutOutcome, cut_table
-from shapegcode.conversion.operating import ControlNote, control_table
+from shapegcode.conversion.operating import ControlNote, control_table, restart_table
 from shapegcode.conversion.rapids.result import RapidsOutcome
 from shapegcode.conversion.recommendation import Grade
+from shapegcode.conversion.restart_points import RestartPoint
 from shapegcode.conversion.rests import RestsOn
 from shapegcode.conversion.tables import (
     BeforeAfter,
@@ -70,6 +71,7 @@ class Conversion(PlayedFigures, Result):
         rests_on: values that nobody measured on this machine, by how far each moves the deciding figure to its limit.
         unmeasured_tried: how many such values were moved.
         at_the_control: what to heed when it is loaded and run; empty where nothing was shaped.
+        restart_points: blocks inside of shaped cuts at which the control can begin.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
         model: the machine that it was played on.
@@ -102,6 +104,7 @@ class Conversion(PlayedFigures, Result):
     rests_on: tuple[RestsOn, ...] = ()
     unmeasured_tried: int = 0
     at_the_control: tuple[ControlNote, ...] = ()
+    restart_points: tuple[RestartPoint, ...] = ()
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
     model: MachineModel = field(metadata=hidden())
@@ -242,8 +245,9 @@ class Conversion(PlayedFigures, Result):
             return [*cuts, *curve] if any(cut.misses for cut in self.cuts) else cuts
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
         rests = [rests_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []
+        points = [restart_table(self.restart_points)] if self.restart_points else []
         before_after = before_after_table(self.before_after())
-        return [before_after, *cuts, *curve, *cases, *rests, control_table(self.at_the_control)]
+        return [before_after, *cuts, *curve, *cases, *rests, control_table(self.at_the_control), *points]
 
     def before_after(self) -> list[list[BeforeAfter]]:
         """Every figure of original and emitted, in groups."""

@@ -9,8 +9,10 @@ from dataclasses import dataclass, replace
 from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad, measure_load
 from shapegcode.conversion.readback import read_back
+from shapegcode.conversion.region_text import EmittedRegion, NoRoomError, RegionText, Room
+from shapegcode.conversion.restart_points import CutRestarts, FreeNumbers
 from shapegcode.conversion.spending import keepable
-from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionText, RegionWriter, Room
+from shapegcode.conversion.write import RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.shaped_program import stamp_of_machine
@@ -59,6 +61,7 @@ class Written:
         no_room: per index of a region that was to be shaped and keeps its text why there is no room for it.
         unslowed: indices of shaped cuts that their contour tolerance does not slow.
         durations_s: per index of a shaped cut the time of its blocks.
+        restarts: of each shaped region, as in `placed`.
     """
 
     parts: list[bytes]
@@ -72,6 +75,7 @@ class Written:
     no_room: dict[int, str]
     unslowed: set[int]
     durations_s: dict[int, float]
+    restarts: list[CutRestarts]
 
     def read_back(self, machine: Machine) -> Program:
         """Read the text and hold it against the original; from then on it stands in the program that is given.
@@ -109,6 +113,7 @@ class TextWriter:
         self._model = model
         self.grid = grid
         self._regions = RegionWriter(model, grid)
+        self._numbers = FreeNumbers(program)
         self._pool = pool
         # By region: tolerance and feed for which it was shaped, and what it came to.
         self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
@@ -170,7 +175,7 @@ class TextWriter:
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
         position = core.header_offset
-        written = Written([], [], 0, [], 0, [], {}, {}, {}, set(), {})
+        written = Written([], [], 0, [], 0, [], {}, {}, {}, set(), {}, [])
         blocks, size = 0, core.size
         begin = sum(map(len, parts))
         aims = _aims(reasons, room_um, feed_share)
@@ -200,6 +205,7 @@ class TextWriter:
                     size += region.text_end - region.text_begin
                     kept_moves += len(region.path)
             else:
+                written.restarts.append(self._numbered(shaped, written.restarts))
                 texts = shaped.text.parts()
                 size += shaped.text.size
                 blocks += shaped.blocks
@@ -216,6 +222,17 @@ class TextWriter:
             parts += [between, *texts]
         parts.append(core.slice(position, core.size))
         return replace(written, parts=parts, size=sum(map(len, parts)), blocks=blocks)
+
+    def _numbered(self, shaped: EmittedRegion, before: Sequence[CutRestarts]) -> CutRestarts:
+        """The restart points of a region with N words that stand nowhere else in the program."""
+        marks = shaped.restarts.marks
+        if not marks:
+            return shaped.restarts
+        taken = sum(len(each.marks) for each in before)
+        numbers = self._numbers.first(taken + len(marks))[taken:]
+        shaped.text.number(marks, numbers)
+        numbered = (replace(mark, number=number) for mark, number in zip(marks, numbers, strict=True))
+        return replace(shaped.restarts, marks=tuple(numbered))
 
     def _load(self, index: int, region: _core.Region, shaped: EmittedRegion) -> TransferLoad:
         if index not in self._loads:

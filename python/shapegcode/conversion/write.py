@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.machine import Machine
+from shapegcode.conversion.region_text import EmittedRegion, RegionText, Room
+from shapegcode.conversion.restart import RegionRestarts, RestartPlaces, block_lines, decimal
 from shapegcode.model.machine_model import MachineModel, OwnFilter
 from shapegcode.model.modes import NO_OFFSET, Offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
@@ -32,70 +32,6 @@ _TARGETS = {
     "command": _core.ContourTarget.command,
     "off": _core.ContourTarget.none,
 }
-
-
-class RegionText:
-    """The lines of a region: in parts as they were written, then in the program that was made of them.
-
-    So a text of a million lines stands in memory once.
-
-    Args:
-        parts: whole lines each.
-    """
-
-    def __init__(self, parts: Sequence[bytes]) -> None:
-        self._parts: Sequence[bytes] | None = parts
-        self._inside: tuple[Program, int] | None = None
-        self.size = sum(map(len, parts))
-        """Bytes."""
-
-    def parts(self) -> Sequence[bytes]:
-        """The text, in as many parts as it has."""
-        if self._inside is not None:
-            program, begin = self._inside
-            return [program.text_slice(begin, begin + self.size)]
-        assert self._parts is not None  # handed over, and not read back
-        return self._parts
-
-    def hand_over(self) -> None:
-        """Somebody else has the parts now."""
-        self._parts = self._inside = None
-
-    def stands_in(self, program: Program, begin: int) -> None:
-        """The text is part of that of a program.
-
-        Args:
-            program: which was read.
-            begin: byte at which it stands there.
-        """
-        self._parts, self._inside = None, (program, begin)
-
-    def joined(self) -> bytes:
-        """The text in one."""
-        return b"".join(self.parts())
-
-
-@dataclass(frozen=True)
-class EmittedRegion:
-    """The text that replaces a region.
-
-    Attributes:
-        text: whole lines.
-        blocks: shaped blocks in it, without the lines around them.
-        block_periods: whole block periods that each of them lasts, of each part that holds blocks.
-        block_bytes: likewise the characters of each of them.
-        planned_um: deviation of what shall follow the path for which the feed was planned, µm; 0 without a target.
-        is_slowed: it is slower than without a contour tolerance.
-        duration_s: of its blocks.
-    """
-
-    text: RegionText
-    blocks: int
-    block_periods: list[npt.NDArray[np.uint32]]
-    block_bytes: list[npt.NDArray[np.uint32]]
-    planned_um: float
-    is_slowed: bool = True
-    duration_s: float = 0.0
 
 
 def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
@@ -119,44 +55,6 @@ def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = m
 
 class _WithdrawnError(Exception):
     """What was written of a region rests on a feed that does not keep its tolerance."""
-
-
-class NoRoomError(Exception):
-    """The shaped text of a region is more than the written program may have."""
-
-
-@dataclass(frozen=True)
-class Room:
-    """What the text of a region may have at most.
-
-    Attributes:
-        bytes: of text.
-        blocks: shaped ones.
-        machine: whose keys say so.
-    """
-
-    bytes: int
-    blocks: int
-    machine: Machine
-
-    def require(self, text_bytes: int, blocks: int) -> None:
-        """Refuse what is more; called piece by piece, so that no more than a piece is written in vain.
-
-        Args:
-            text_bytes: written so far.
-            blocks: written so far.
-
-        Raises:
-            NoRoomError: it is more; the message says of what.
-        """
-        controller = self.machine.controller
-        if text_bytes > self.bytes:
-            limit = f"{controller.max_program_bytes} bytes (controller.max_program_bytes)"
-        elif blocks > self.blocks:
-            limit = f"{controller.max_program_moves} moves (controller.max_program_moves)"
-        else:
-            return
-        raise NoRoomError(f"its shaped text would take the program over {limit}")
 
 
 class _Marks:
@@ -198,12 +96,9 @@ class _BlockBytes:
 
     def add(self, part: bytes, blocks: int) -> None:
         """The next part of a text, and how many blocks it holds."""
-        text = np.frombuffer(part, dtype=np.uint8)
-        ends = np.flatnonzero(text == ord("\n")) + 1
-        begins = np.concatenate([[0], ends[:-1]])
-        last = ends[text[begins] != ord("(")][:blocks] if blocks else ends[:0]
+        last = block_lines(part, blocks)[1]
         self.parts.append(np.diff(last, prepend=-self._open).astype(np.uint32))
-        self._open = len(text) - int(last[-1]) if len(last) else self._open + len(text)
+        self._open = len(part) - int(last[-1]) if len(last) else self._open + len(part)
 
     def end(self) -> list[npt.NDArray[np.uint32]]:
         """Of each part; comments and N words behind the last block count with it."""
@@ -228,6 +123,12 @@ class RegionWriter:
         self._model = model
         self._grid = grid
         self._mark = mark
+        interval_s = self._machine.emission.restart_interval_s
+        if interval_s < grid.block_period_s * (1.0 - 1e-9):
+            raise _core.ArgumentError(
+                f"emission.restart_interval_s = {interval_s:g} s: must be at least a block period, which is "
+                f"{grid.block_period_s:g} s here"
+            )
 
     def tolerance(self, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
         """See `filter_tolerance`."""
@@ -295,14 +196,40 @@ class RegionWriter:
             NoRoomError: its text is more than there is room for.
         """
         options = self.options(limits, tolerance, self._model.offset(region))
+        # Periods without the stops for restart points, and how many stops there are.
+        stopped = self._stop_for_restarts(region, options) if self._machine.emission.restart_stops else (0, 0)
         marked = [note.segment for note in region.notes]
         shaper = _core.RegionShaper(region.path, self._grid.fir, marked, options)
         shaper.begin_early()
         try:
-            return self._write(program, region, shaper, options, room, on_progress)
+            return self._write(program, region, shaper, options, room, on_progress, stopped)
         except _WithdrawnError:
             shaper.begin_anew()
-        return self._write(program, region, shaper, options, room, on_progress)
+        return self._write(program, region, shaper, options, room, on_progress, stopped)
+
+    def _places(self, region: _core.Region) -> RestartPlaces:
+        places = RestartPlaces(region, self._machine, self._grid.block_period_s)
+        if self._mark != REGION_MARK:
+            places.reason = "it takes the place of a rapid"
+        return places
+
+    def _stop_for_restarts(self, region: _core.Region, options: _core.ShapingOptions) -> tuple[int, int]:
+        """Let the command come to rest where it is nowhere near that for too long; gives its periods without that."""
+        places = self._places(region)
+        segments = range(1, len(region.path))
+        shaper = _core.RegionShaper(region.path, self._grid.fir, segments, options)
+        points: list[int] = []
+        end, reached = 0, []
+        with closing(_pieces(shaper)) as pieces:
+            for piece, _, is_last in pieces:
+                at, left, _ = places.low(piece, np.arange(len(piece.middle_mm)))
+                at, end = at + piece.first_period, piece.first_period + len(piece.middle_mm)
+                chosen = places.choose(at, left, end, last=is_last, usable=lambda _: True)
+                points += [int(at[index]) for index in chosen]
+                reached = piece.segment_periods
+        stops = [] if places.reason else places.further_stops(points, reached, end)
+        options.further_stops = stops
+        return end, len(stops)
 
     def _write(
         self,
@@ -312,10 +239,12 @@ class RegionWriter:
         options: _core.ShapingOptions,
         room: Room | None,
         on_progress: Callable[[float], None],
+        stopped: tuple[int, int],
     ) -> EmittedRegion:
         fit = self._fit(region, options)
         state = self._writer(program, region, fit)
         marks = _Marks(program, region.notes)
+        restarts = RegionRestarts(self._places(region), region, self._machine, fit, state.position_decimals)
         texts: list[bytes] = []
         periods: list[npt.NDArray[np.uint32]] = []
         sizes = _BlockBytes()
@@ -331,7 +260,10 @@ class RegionWriter:
                 fitted = _core.fit_blocks(piece, sorted({*piece.run_ends, *breaks}), fit)
                 fit.lent_periods = fitted.left_periods
                 starts.append([round(float(x) / fit.increment_mm) for x in piece.grid_mm[0]])
+                modal = state.motion, state.plane
                 text, state.motion, state.plane = _core.write_blocks(fitted, starts[-1], here, state)
+                text = restarts.add(text, piece, fitted, modal, last=is_last)
+                end = piece.first_period + len(piece.middle_mm)
                 texts.append(text)
                 periods.append(fitted.periods)
                 sizes.add(text, len(fitted.periods))
@@ -345,11 +277,13 @@ class RegionWriter:
         unlock = emission.unlock_lines if emission.override == "lock" else ()
         after = _lines([_restore_line(region, state.motion, state.plane), *unlock, *emission.epilogue], state)
         emitted = RegionText([before, *texts, after])
+        unstopped, stops = stopped
+        found = restarts.result(before, stops, (end - unstopped) * fit.block_period_s if stops else 0.0)
+        planned_um = shaper.largest_deviation_mm * 1e3
         duration_s = float(sum(int(part.sum()) for part in periods)) * self._grid.block_period_s
         return EmittedRegion(
-            emitted, sum(map(len, periods)), periods, sizes.end(), shaper.largest_deviation_mm * 1e3, shaper.is_slowed,
-            duration_s,
-        )  # fmt: skip
+            emitted, sum(map(len, periods)), periods, sizes.end(), planned_um, found, shaper.is_slowed, duration_s
+        )
 
     def _fit(self, region: _core.Region, options: _core.ShapingOptions) -> _core.FitOptions:
         """How shaped motion becomes blocks in the units of a region."""
@@ -433,12 +367,6 @@ def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, 
 
 def _lines(lines: Sequence[str], writer: _core.WriterOptions) -> bytes:
     return b"".join((line + writer.line_end).encode("latin-1") for line in lines)
-
-
-def decimal(value: float, decimals: int) -> str:
-    """A number in FANUC's decimal notation: always with a point, no trailing zeros."""
-    text = f"{value:.{decimals}f}".rstrip("0") if decimals else f"{value:.0f}."
-    return "0." if text in {"-0.", "0."} else text
 
 
 def feed_word(feed: float) -> str:

@@ -51,6 +51,17 @@ class Emission(TomlTable):
     prefill_dwell_s: Annotated[NonNegative, Field(le=60)] = key(
         "dwell before each shaped stretch, in which the block buffer fills; 0: none", unit="s", default=0.0
     )
+    restart_interval_s: Positive = key(
+        "cutting time between restart points of a shaped cut, at most, where its command comes nearly to rest anyway; "
+        "a block period or more; longer than the cuts: none",
+        unit="s",
+        default=60.0,
+    )
+    restart_stops: Bool = key(
+        "let a shaped cut stop for a restart point where it comes nowhere near rest for restart_interval_s: costs "
+        "time, and the tool stands in the cut",
+        default=False,
+    )
     compensation_guard: Literal["alarm", "stop"] = key(
         'where cutter compensation was expanded: "alarm" compares the offset in the control with the expanded radius '
         'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always so where '

@@ -56,8 +56,9 @@ OVERRIDES = {"ask": OVERRIDE, "lock": OVERRIDE_LOCKED, "any": OVERRIDE_ANY}
 SINGLE_BLOCK = Habit(
     "single block",
     "NO SINGLE BLOCK IN SHAPED CUTS",
-    "no single block inside of shaped cuts: the control would stop at every line, some milliseconds apart; to look at "
-    "the way use the graphic display, or single block between the cuts",
+    "no single block inside of shaped cuts: the control would stop at every block, some milliseconds apart; to look "
+    "through the program use the graphic display, machine lock, or dry run above the part, and single block between "
+    "the cuts; then the first run above the part",
 )
 FEED_HOLD = Habit(
     "feed hold",
@@ -66,8 +67,8 @@ FEED_HOLD = Habit(
 )
 RESTART = Habit(
     "restart",
-    "RESTART ONLY AT THE LINE BEHIND A SHAPED COMMENT",
-    "restart only where a cut begins; never in the middle of one: its blocks are sums of the moves before them",
+    "RESTART ONLY BEHIND A SHAPED COMMENT OR AT A LISTED N",
+    "restart only where a cut begins, or at a restart point: other blocks of a shaped cut are not valid restart points",
 )
 FIRST_RUN = Habit(
     "first run",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from shapegcode import _core
 from shapegcode.conversion.rapids.candidates import Gap, Rapid
 from shapegcode.conversion.rapids.plant import RapidPlant, Timing
-from shapegcode.conversion.write import EmittedRegion
+from shapegcode.conversion.region_text import EmittedRegion
 from shapegcode.verdict.figures import RegionVerdict
 
 __all__ = ["NO_GAIN", "Choice", "OpenGap"]

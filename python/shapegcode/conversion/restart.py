@@ -1,0 +1,328 @@
+"""Restart points inside of long cuts: where the shaped command is nearly at rest, and how the block there is written.
+
+A control that begins at a block begins with the table at rest. What it lacks is the table's motion at that block: its
+speed and deflection, which remain as a free vibration of the slowest mode. Where both are small, the rest of the cut is
+as it would have been; more than `tolerance.contour_um` of it is nowhere accepted.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.conversion.restart_points import PLACEHOLDER, CutRestarts, RestartMark, system_of
+from shapegcode.machine import Machine
+from shapegcode.model.modes import slowest_mode
+
+__all__ = ["RegionRestarts", "RestartPlaces", "block_lines", "decimal"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+_SLOW_RATIO = 0.2  # of the programmed feed
+_APART = 0.1  # of the interval: nearer to another point, or to an end of the cut, a point is of no use
+_MOTION, _PLANE, _FEED = (
+    re.compile(rb"G0([123])(?![0-9])"),
+    re.compile(rb"G(1[789])(?![0-9])"),
+    re.compile(rb"F[0-9.]+"),
+)
+
+
+class RestartPlaces:
+    """Chooses restart points of one region while its shaped command is given out.
+
+    Args:
+        region: of the original.
+        machine: whose `emission` says how far apart they may be, and whose slowest modes are looked at.
+        period_s: block period.
+    """
+
+    def __init__(self, region: _core.Region, machine: Machine, period_s: float) -> None:
+        self._period_s = period_s
+        self._interval = machine.emission.restart_interval_s / period_s
+        self._fastest_mm_per_s = _SLOW_RATIO * region.path.fastest_feed_mm_per_s
+        self._floor_mm = machine.tolerance.residual_floor_um * 1e-3
+        self._tolerance_mm = machine.tolerance.contour_um * 1e-3
+        axes = machine.axes.as_tuple()
+        slowest = [min((slowest_mode(mode)[0] for mode in axis.modes), default=math.inf) for axis in axes]
+        self._omega = 2.0 * math.pi * np.array(slowest)
+        self.last = 0
+        """Period of the last point."""
+        self.longest = 0
+        """Most periods between two of them."""
+        self.reason = _why_none(region)
+        """Why there can be none; empty: there can."""
+
+    def low(self, piece: _core.ShapedCommand, at: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Where the command of a piece is slow, and a start from rest leaves the contour within its tolerance.
+
+        Args:
+            piece: of the region.
+            at: periods of it that may be chosen, ascending.
+
+        Returns:
+            Those of them; the amplitude that a start from rest leaves there, mm; the speed there, mm/s.
+        """
+        grid = np.asarray(piece.grid_mm)
+        at = at[(at > 0) & (at < len(grid) - 1)]
+        before, behind = (grid[at] - grid[at - 1]) / self._period_s, (grid[at + 1] - grid[at]) / self._period_s
+        speed = np.maximum(np.linalg.norm(before, axis=1), np.linalg.norm(behind, axis=1))
+        deflection = (behind - before) / self._period_s / self._omega**2
+        left = np.linalg.norm(np.hypot(0.5 * (before + behind) / self._omega, deflection), axis=1)
+        rests = (speed <= self._fastest_mm_per_s) & (left <= self._tolerance_mm)
+        return at[rests], left[rests], speed[rests]
+
+    def choose(
+        self, at: IntArray, left: FloatArray, end: int, *, last: bool, usable: Callable[[int], bool]
+    ) -> Iterator[int]:
+        """Points of a piece, such that no more than the interval lies between two of them where there are places.
+
+        Args:
+            at: periods of the region that are low, ascending.
+            left: amplitude that a start there leaves: what leaves little is taken in the second half of the interval,
+                else the smallest of all.
+            end: period at which the piece ends.
+            last: whether the region ends with it.
+            usable: whether a block can be written as a restart point, by its index in `at`.
+
+        Returns:
+            Indices of `at`.
+        """
+        near = self._interval * _APART
+        if last:
+            at = at[: np.searchsorted(at, end - near)]
+        if self.reason:
+            at = at[:0]
+        while not (last and end - self.last <= self._interval):
+            borders = self.last + np.array([near, 0.5 * self._interval, self._interval])
+            low, middle, high = (int(each) for each in np.searchsorted(at, borders, side="right"))
+            if middle == high or left[middle:high].min() > self._floor_mm:
+                middle = low
+            order = middle + np.argsort(left[middle:high], kind="stable")
+            # Where there is none in time: the slow place that comes first behind it.
+            group = int(np.searchsorted(at, at[high] + near, side="right")) if high < len(at) else high
+            later = high + np.argsort(left[high:group], kind="stable")
+            found = next((int(each) for each in chain(order, later, range(group, len(at))) if usable(int(each))), None)
+            if found is None:
+                break
+            self._reach(int(at[found]))
+            yield found
+        if last:
+            self._reach(end)
+
+    def _reach(self, period: int) -> None:
+        self.longest = max(self.longest, period - self.last)
+        self.last = period
+
+    def further_stops(self, points: Sequence[int], reached: Sequence[int], end: int) -> list[int]:
+        """Segments before which the command shall come to rest, where it is nowhere near that for too long.
+
+        Args:
+            points: periods of the points that there are.
+            reached: period at which each segment begins, from the second one on.
+            end: of the region.
+
+        Returns:
+            Indices of the segments, ascending.
+        """
+        stops: list[int] = []
+        begins = np.asarray(reached)
+        near = self._interval * _APART
+        aim = self._interval - near  # to slow down takes time too
+        for begin, until in zip([0, *points], [*points, end], strict=True):
+            at: float = begin
+            while until - at > self._interval:
+                index = int(np.searchsorted(begins, at + aim, side="right")) - 1
+                if index < 0 or begins[index] <= at + near:
+                    index += 1  # a long segment: behind it
+                if index >= len(begins) or begins[index] >= until - near:
+                    break
+                at = float(begins[index])
+                stops.append(index + 1)
+        return stops
+
+
+def decimal(value: float, decimals: int) -> str:
+    """A number in FANUC's decimal notation: always with a point, no trailing zeros.
+
+    Args:
+        value: of a word.
+        decimals: behind the point, at most.
+
+    Returns:
+        The number.
+    """
+    text = f"{value:.{decimals}f}".rstrip("0") if decimals else f"{value:.0f}."
+    return "0." if text in {"-0.", "0."} else text
+
+
+def _why_none(region: _core.Region) -> str:
+    entry = region.entry
+    unknown = [axis for axis, known in zip("XYZ", entry.known, strict=True) if not known]
+    if region.incremental or unknown:
+        return f"the position of {', '.join(unknown) or 'an axis'} is not known, so no absolute one can be written"
+    if entry.uncertain:
+        return "its modal state is not known"
+    return ""
+
+
+def block_lines(text: bytes, blocks: int) -> tuple[IntArray, IntArray]:
+    """Where the lines of blocks stand in a text; comment lines between them are none.
+
+    Args:
+        text: of a piece of a region.
+        blocks: how many there are.
+
+    Returns:
+        Bytes at which each begins, and behind its line feed.
+    """
+    letters = np.frombuffer(text + b"(", dtype=np.uint8)  # so that there is one behind the last line end
+    ends = np.flatnonzero(letters == ord("\n")) + 1
+    begins = np.concatenate([[0], ends[:-1]]).astype(np.int64)[: len(ends)]
+    for _ in range(2):  # a line may end with LF CR CR
+        begins += letters[begins] == ord("\r")
+    is_block = letters[begins] != ord("(")
+    return begins[is_block][:blocks], ends[is_block][:blocks]
+
+
+class RegionRestarts:
+    """Writes blocks of a region as restart points while it is written, piece by piece.
+
+    Args:
+        places: where they may be.
+        region: of the original.
+        machine: whose `emission` says how long a line may be.
+        fit: how its motion became blocks.
+        decimals: behind the point of a position.
+    """
+
+    def __init__(
+        self, places: RestartPlaces, region: _core.Region, machine: Machine, fit: _core.FitOptions, decimals: int
+    ) -> None:
+        self._places, self._region, self._fit, self._decimals = places, region, fit, decimals
+        self._max = machine.emission.max_line_length
+        self._marks: list[RestartMark] = []
+        self._bytes = self._lines = 0  # of the pieces so far
+
+    def add(
+        self, text: bytes, piece: _core.ShapedCommand, fitted: _core.FittedBlocks, state: tuple[int, int], *, last: bool
+    ) -> bytes:
+        """The next piece with its restart points.
+
+        Args:
+            text: of it.
+            piece: its command.
+            fitted: its blocks.
+            state: G codes of motion and plane before it.
+            last: whether it is the last one.
+
+        Returns:
+            The text: other words in the lines of the points, else the same.
+        """
+        firsts, ends = fitted.first_periods.astype(np.int64), fitted.ends
+        at, left, speed = self._places.low(piece, firsts)
+        # The last block of a region may have to stop exactly.
+        lines = _PointLines(text, len(firsts) - last if len(at) else 0, state, self._region, self._max)
+        blocks = np.searchsorted(firsts, at)
+
+        def point(index: int) -> bytes | None:
+            block = int(blocks[index])
+            values = zip("XYZ", ends[block] * 10.0**-self._decimals, strict=True)
+            position = "".join(f"{axis}{decimal(value, self._decimals)}" for axis, value in values)
+            return lines.write(block, position) if block > 0 else None
+
+        parts, done, size = [], 0, self._bytes
+        periods, end = at + piece.first_period, piece.first_period + len(piece.middle_mm)
+        chosen = self._places.choose(periods, left, end, last=last, usable=lambda index: point(index) is not None)
+        for index in chosen:
+            block = int(blocks[index])
+            begin, behind = lines.extent(block)
+            parts += [text[done:begin], point(index) or b""]
+            mark = RestartMark(
+                byte=size + begin - done,
+                line=self._lines + text.count(b"\n", 0, begin),
+                time_s=float(periods[index]) * self._fit.block_period_s,
+                position_mm=_millimetres(ends[block - 1] * self._fit.increment_mm),
+                speed_mm_per_s=float(speed[index]),
+                vibration_um=float(left[index]) * 1e3,
+            )
+            self._marks.append(mark)
+            size += len(parts[-1]) + len(parts[-2])
+            done = behind
+        written = b"".join([*parts, text[done:]])
+        self._bytes += len(written)
+        self._lines += text.count(b"\n")
+        return written
+
+    def result(self, head: bytes, stops: int, stops_s: float) -> CutRestarts:
+        """What the region has of them.
+
+        Args:
+            head: what stands before its blocks.
+            stops: that were put in.
+            stops_s: what they cost.
+
+        Returns:
+            The points, counted from the begin of the region's text.
+        """
+        lines = head.count(b"\n")
+        marks = tuple(replace(each, byte=each.byte + len(head), line=each.line + lines) for each in self._marks)
+        longest_s = self._places.longest * self._fit.block_period_s
+        return CutRestarts(marks, longest_s, self._places.reason, stops, stops_s)
+
+
+class _PointLines:
+    """The lines of a piece, of which some become restart points."""
+
+    def __init__(
+        self, text: bytes, blocks: int, state: tuple[int, int], region: _core.Region, max_line_length: int
+    ) -> None:
+        self._text, self._region, self._max = text, region, max_line_length
+        self._motion, self._plane = (str(code).encode() for code in state)
+        self._begins, self._ends = block_lines(text, blocks)
+
+    def extent(self, block: int) -> tuple[int, int]:
+        """Bytes of a block's words."""
+        begin, end = int(self._begins[block]), int(self._ends[block])
+        return begin, begin + len(self._text[begin:end].rstrip(b"\r\n"))
+
+    def write(self, block: int, position: str) -> bytes | None:
+        """A block with all that it rests on and its end; None where it cannot be a restart point.
+
+        Where the line would be too long, G64 and G40, which a reset leaves too, are left out.
+        """
+        if block >= len(self._begins):
+            return None
+        begin, end = self.extent(block)
+        if self._text.startswith((b"N", b"G09"), begin) or self._in_force(_MOTION, end, self._motion) != b"1":
+            return None
+        feed = self._in_force(_FEED, end, b"").decode()
+        plane = self._in_force(_PLANE, end, self._plane).decode()
+        codes = f"{PLACEHOLDER}G{plane}G{self._region.entry.units}G90{system_of(self._region.entry)}G94"
+        for further in ("G40G64", "G40", ""):
+            line = f"{codes}{further}G01{position}{feed}"
+            if feed and len(line) <= self._max:
+                return line.encode()
+        return None
+
+    def _in_force(self, pattern: re.Pattern[bytes], end: int, before: bytes) -> bytes:
+        """The last word of a kind up to a byte; `before`: where the piece has none."""
+        while end > 0:
+            begin = self._text.rfind(b"\n", 0, end) + 1
+            line = self._text[begin:end].lstrip(b"\r")
+            if not line.startswith(b"(") and (found := pattern.findall(line)):
+                return bytes(found[-1])
+            end = begin - 1
+        return before
+
+
+def _millimetres(position: FloatArray) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 6) for value in position)
+    return x, y, z
