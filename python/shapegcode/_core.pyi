@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_planned', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_planned', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -3586,6 +3586,14 @@ class PlaybackOptions:
     def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
         ...
     @property
+    def other_overrides(self) -> list[float]:
+        """
+        Blocks only: the largest deviations at these feed overrides too.
+        """
+    @other_overrides.setter
+    def other_overrides(self, arg0: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
     def period_s(self) -> float:
         """
         Interpolation period, s.
@@ -3697,6 +3705,25 @@ class StarvedFigures:
         """
         Deviation of the response from the path.
         """
+class OverrideFigures:
+    """
+    The largest deviations of a run at another feed override.
+    """
+    @property
+    def command_mm(self) -> float:
+        """
+        Of the command from the path, mm.
+        """
+    @property
+    def override_ratio(self) -> float:
+        """
+        1 = 100 %.
+        """
+    @property
+    def response_mm(self) -> float:
+        """
+        Of the response from the path, mm.
+        """
 class PlaybackFigures:
     """
     Figures of one run from rest to rest.
@@ -3725,6 +3752,11 @@ class PlaybackFigures:
     def orbit_error_percent(self) -> list[float]:
         """
         Per arc of the path.
+        """
+    @property
+    def other_overrides(self) -> list[OverrideFigures]:
+        """
+        One per PlaybackOptions.other_overrides.
         """
     @property
     def peak_acceleration_mm_per_s2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
