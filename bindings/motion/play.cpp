@@ -74,6 +74,8 @@ void register_simulation(py::module_& module) {
       .def_readwrite("starved_s", &PlaybackOptions::starved_s, "How long the set-points then wait, s.")
       .def_readwrite("starved_memory_s", &PlaybackOptions::starved_memory_s,
                      "How much of the run behind such a wait is looked at, s; 0: all.")
+      .def_readwrite("other_overrides", &PlaybackOptions::other_overrides,
+                     "Blocks only: the largest deviations at these feed overrides too.")
       .def_readwrite("record_samples", &PlaybackOptions::record_samples, "Samples kept for pictures; 0: none.");
 
   py::class_<FeedExcess>(module, "FeedExcess",
@@ -89,6 +91,11 @@ void register_simulation(py::module_& module) {
                     "Largest |response - command| while the set-points rest, in the wait and at the end, (3,), mm.")
       .def_readonly("command", &StarvedFigures::command, "Deviation of the command from the path.")
       .def_readonly("response", &StarvedFigures::response, "Deviation of the response from the path.");
+
+  py::class_<OverrideFigures>(module, "OverrideFigures", "The largest deviations of a run at another feed override.")
+      .def_readonly("override_ratio", &OverrideFigures::override_ratio, "1 = 100 %.")
+      .def_readonly("command_mm", &OverrideFigures::command_mm, "Of the command from the path, mm.")
+      .def_readonly("response_mm", &OverrideFigures::response_mm, "Of the response from the path, mm.");
 
   py::class_<PlaybackFigures, std::shared_ptr<PlaybackFigures>>(module, "PlaybackFigures",
                                                                 "Figures of one run from rest to rest.")
@@ -109,6 +116,7 @@ void register_simulation(py::module_& module) {
       .def_readonly("feed_excess", &PlaybackFigures::feed_excess, "Of the command, where asked for.")
       .def_readonly("end_mm", &PlaybackFigures::end_mm, "Last set-point, (3,), mm.")
       .def_readonly("starved", &PlaybackFigures::starved, "One per PlaybackOptions.starved_blocks.")
+      .def_readonly("other_overrides", &PlaybackFigures::other_overrides, "One per PlaybackOptions.other_overrides.")
       .def_property_readonly(
           "recorded_command", [](const PlaybackFigures& self) { return recorded(self.recorded_command); },
           "(n, 3), mm.")

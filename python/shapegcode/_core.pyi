@@ -3603,6 +3603,14 @@ class PlaybackOptions:
     def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
         ...
     @property
+    def other_overrides(self) -> list[float]:
+        """
+        Blocks only: the largest deviations at these feed overrides too.
+        """
+    @other_overrides.setter
+    def other_overrides(self, arg0: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
     def period_s(self) -> float:
         """
         Interpolation period, s.
@@ -3714,6 +3722,25 @@ class StarvedFigures:
         """
         Deviation of the response from the path.
         """
+class OverrideFigures:
+    """
+    The largest deviations of a run at another feed override.
+    """
+    @property
+    def command_mm(self) -> float:
+        """
+        Of the command from the path, mm.
+        """
+    @property
+    def override_ratio(self) -> float:
+        """
+        1 = 100 %.
+        """
+    @property
+    def response_mm(self) -> float:
+        """
+        Of the response from the path, mm.
+        """
 class PlaybackFigures:
     """
     Figures of one run from rest to rest.
@@ -3742,6 +3769,11 @@ class PlaybackFigures:
     def orbit_error_percent(self) -> list[float]:
         """
         Per arc of the path.
+        """
+    @property
+    def other_overrides(self) -> list[OverrideFigures]:
+        """
+        One per PlaybackOptions.other_overrides.
         """
     @property
     def peak_acceleration_mm_per_s2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:

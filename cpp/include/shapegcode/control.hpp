@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -52,8 +53,19 @@ class BlockPlayer {
     position = along_mm >= open_.length_mm ? open_.end_mm : open_.start_mm + along_mm / open_.length_mm * way_mm_;
     return true;
   }
+  /// Passes over the set-points that follow on the same line: their number, and the last of them.
+  std::size_t pass_line(Vector3& position) noexcept;
+  /// As if the set-point so long behind the beginning of a block were the one last given; gives it.
+  Vector3 begin_on(std::size_t block, double elapsed_s) noexcept;
   /// Block on which the set-point last given lies.
   [[nodiscard]] std::size_t block() const noexcept { return block_; }
+  [[nodiscard]] const Segment& on() const noexcept { return open_; }
+  /// Its distance from the start of that block.
+  [[nodiscard]] double along_mm() const noexcept {
+    return finished_ ? open_.length_mm : std::min(open_.length_mm, speed_mm_per_s_ * elapsed_s_);
+  }
+  /// How long before the set-point last given its block began.
+  [[nodiscard]] double elapsed_s() const noexcept { return elapsed_s_; }
   /// Whether the set-point last given is one of a pause.
   [[nodiscard]] bool pausing() const noexcept;
   /// Duration of one block: a whole number of periods under `ceil`.
@@ -62,6 +74,7 @@ class BlockPlayer {
  private:
   void open_block() noexcept;
   bool step_on(Vector3& position) noexcept;
+  [[nodiscard]] Vector3 stand_on_block() noexcept;
   /// Sums of durations where many blocks may end within a period.
   void find_crowds();
   /// Passes over a group of blocks that ends within the time elapsed; false if none begins here that does.

@@ -44,6 +44,8 @@ struct PlaybackOptions {
   double starved_s = 0.0;  ///< how long the set-points then wait
   /// So much of the run behind such a wait is looked at (0: all): enough where older vibration has decayed.
   double starved_memory_s = 0.0;
+  /// Blocks only: the largest deviations at these feed overrides too, beside the run at its own.
+  std::vector<double> other_overrides;
   double settling_band_mm = 0.0;  ///< of the settling time; 0: not measured
   /// How long behind the stop the settling time is looked for; with drives the residual too.
   double settling_limit_s = 1.0;
@@ -75,6 +77,13 @@ struct StarvedFigures {
   DeviationStats response;
 };
 
+/// The largest deviations of a run at another feed override.
+struct OverrideFigures {
+  double override_ratio = 1.0;
+  double command_mm = 0.0;   ///< as DeviationStats::max_abs_mm of a run of its own, to 1e-9 of it
+  double response_mm = 0.0;  ///< likewise
+};
+
 /// Figures of one run from rest to rest. Deviations in mm against the programmed path.
 struct PlaybackFigures {
   double duration_s = 0.0;                ///< until the set-points rest, after every filter
@@ -91,6 +100,7 @@ struct PlaybackFigures {
   FeedExcess feed_excess;                            ///< of the command, where asked for
   Vector3 end_mm = Vector3::Zero();
   std::vector<StarvedFigures> starved;  ///< one per PlaybackOptions::starved_blocks
+  std::vector<OverrideFigures> other_overrides;  ///< one per PlaybackOptions::other_overrides
   Samples recorded_command;
   Samples recorded_response;
 };
@@ -111,7 +121,8 @@ struct PlaybackFigures {
                                            const Path& programmed, const PlaybackOptions& options);
 
 /// Plays blocks at their feed (a controller without look-ahead), measured against the programmed `path`. Throws
-/// Error(argument) on starved blocks that do not ascend or do not exist, and together with `last_seconds`.
+/// Error(argument) on starved blocks that do not ascend or do not exist, and together with `last_seconds`. Other
+/// overrides cost little where blocks are lines, modes do not vary and nothing filters the set-points, else a run each.
 [[nodiscard]] PlaybackFigures play_blocks(const Segments& blocks, const Path& path, BlockEnd block_end,
                                           double override_ratio, const PlaybackOptions& options);
 

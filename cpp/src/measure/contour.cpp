@@ -123,6 +123,16 @@ ContourTracker::Piece ContourTracker::bare_piece_of(std::size_t i) const noexcep
 
 ContourTracker::ContourTracker(const Path& path) : geometry_(geometry_of(path)) { last_ = path.start_mm(0); }
 
+void ContourTracker::begin_at(double s_mm, const Vector3& p) noexcept {
+  const Vector3 foot = geometry_->path.point(s_mm, cursor_);
+  s_ = furthest_ = s_mm;
+  last_ = p;
+  deviation_ = (p - foot).norm();
+  growing_ = 0;
+  straight_ = {};
+  near_ = {std::numeric_limits<double>::infinity(), 0.0};
+}
+
 Vector3 ContourTracker::start_tangent(std::size_t piece) const noexcept { return at(piece).direction; }
 
 Vector3 ContourTracker::end_tangent(std::size_t piece) const noexcept {

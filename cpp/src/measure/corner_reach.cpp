@@ -7,13 +7,6 @@
 namespace shapegcode {
 namespace {
 
-// Along the path on both sides of a corner: further away its nearest track point does not lie.
-constexpr double window_mm = 1.0;
-// On a reversal, or where the path runs over itself, the foot may be on a later pass while the point is still before
-// the corner. One that seems missed by more than this waits for the point so much longer.
-constexpr double missed_mm = 0.02;
-constexpr double patience_mm = 20.0;
-
 double distance2(const Vector3& p, const Vector3& from, const Vector3& to) noexcept {
   const Vector3 along = to - from;
   const double length2 = along.squaredNorm();
@@ -38,16 +31,30 @@ CornerReach::CornerReach(const Path& path, double least_angle_rad) {
   }
 }
 
-void CornerReach::step_corners(const Vector3& p, double foot_mm) noexcept {
+void CornerReach::begin_at(double foot_mm, bool from_start) noexcept {
+  const double before_mm = from_start ? -1.0 : foot_mm + 1.5 * window_mm;
+  const auto first = std::upper_bound(corners_.begin(), corners_.end(), before_mm,
+                                      [](double s_mm, const Corner& corner) { return s_mm < corner.s; });
+  first_ = next_ = static_cast<std::size_t>(first - corners_.begin());
+  idle_until_mm_ = 0.0;
+  largest2_ = 0.0;
+  started_ = false;
+}
+
+void CornerReach::step_corners(const Vector3& p, double foot_mm, std::uint32_t tag) noexcept {
   if (!started_) {
     last_ = p;
     started_ = true;
   }
   while (next_ < corners_.size() && corners_[next_].s <= foot_mm + window_mm) {
-    ++next_;
+    corners_[next_++].best2 = std::numeric_limits<double>::infinity();
   }
   for (std::size_t i = first_; i < next_; ++i) {
-    corners_[i].best2 = std::min(corners_[i].best2, distance2(corners_[i].point, last_, p));
+    const double now2 = distance2(corners_[i].point, last_, p);
+    if (now2 < corners_[i].best2) {
+      corners_[i].best2 = now2;
+      corners_[i].tag = tag;
+    }
   }
   const auto passed = [foot_mm](const Corner& corner) {
     const bool met = corner.best2 <= missed_mm * missed_mm;

@@ -168,9 +168,39 @@ bool BlockPlayer::step_on(Vector3& position) noexcept {
     }
     open_block();
   }
-  if (open_.kind != SegmentKind::arc && open_.length_mm > 0.0) on_line_until_s_ = duration_s_ - slack;
-  position = point_at(open_, std::min(open_.length_mm, speed_mm_per_s_ * elapsed_s_));
+  position = stand_on_block();
   return true;
+}
+
+Vector3 BlockPlayer::stand_on_block() noexcept {
+  if (open_.kind != SegmentKind::arc && open_.length_mm > 0.0) {
+    on_line_until_s_ = duration_s_ - tick_tolerance * period_s_;
+  }
+  return point_at(open_, std::min(open_.length_mm, speed_mm_per_s_ * elapsed_s_));
+}
+
+std::size_t BlockPlayer::pass_line(Vector3& position) noexcept {
+  std::size_t passed = 0;
+  double elapsed_s = elapsed_s_;
+  while (elapsed_s_ + period_s_ < on_line_until_s_) {
+    elapsed_s = elapsed_s_;
+    elapsed_s_ += period_s_;
+    ++passed;
+  }
+  if (passed > 0) {
+    elapsed_s_ = elapsed_s;
+    step(position);
+  }
+  return passed;
+}
+
+Vector3 BlockPlayer::begin_on(std::size_t block, double elapsed_s) noexcept {
+  block_ = block;
+  open_block();
+  elapsed_s_ = elapsed_s;
+  started_ = true;
+  finished_ = false;
+  return stand_on_block();
 }
 
 double play_duration_s(const Segments& blocks, double period_s, BlockEnd block_end, double override_ratio) {

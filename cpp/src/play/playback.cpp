@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,8 +11,10 @@
 #include "base/checks.hpp"
 #include "motion/planned_motion.hpp"
 #include "play/axis_plant.hpp"
+#include "play/deviation_bounds.hpp"
 #include "play/feed_meter.hpp"
 #include "play/filter_chain.hpp"
+#include "play/override_maxima.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/measure/contour.hpp"
 #include "shapegcode/motion.hpp"
@@ -88,6 +91,7 @@ class Recorder {
     last_ = command;
     if (tracks_command_) {
       const double deviation = command_tracker_.step(command);
+      command_deviation_mm_ = deviation;
       figures_.command.add(deviation);
       if (feed_.measures()) {
         feed_.step(command, command_tracker_, deviation);
@@ -142,6 +146,10 @@ class Recorder {
     figures_.recorded_response = pack(responses_);
     return std::move(figures_);
   }
+
+  /// Of the set-point last added, where its deviation is measured.
+  [[nodiscard]] const ContourTracker& command_tracker() const noexcept { return command_tracker_; }
+  [[nodiscard]] double command_deviation_mm() const noexcept { return command_deviation_mm_; }
 
   // The wait is over and what it excited has decayed: the rest of the run is that without a wait.
   StarvedFigures finish_wait() {
@@ -237,6 +245,7 @@ class Recorder {
   CornerReach command_reach_;
   CornerReach response_reach_;
   PlaybackFigures figures_;
+  double command_deviation_mm_ = 0.0;
   Vector3 last_ = Vector3::Zero();
   Vector3 before_last_ = Vector3::Zero();
   Vector3 acceleration_ = Vector3::Zero();
@@ -297,6 +306,40 @@ void check_starved(const Segments& blocks, const PlaybackOptions& options) {
   }
 }
 
+void check_other_overrides(const PlaybackOptions& options) {
+  if (options.other_overrides.empty()) {
+    return;
+  }
+  if (options.last_seconds > 0.0) {
+    throw Error(ErrorKind::argument, "other overrides need the whole run: last_seconds must be 0");
+  }
+  for (const double ratio : options.other_overrides) {
+    require_above_zero(ratio, "override", "");
+  }
+}
+
+// Whether the bounds of DeviationBounds hold and the modes move in closed form.
+bool has_bounds(const Path& path, const PlaybackOptions& options) {
+  const bool varies = std::any_of(options.mode_tables.begin(), options.mode_tables.end(),
+                                  [](const std::vector<ModeTable>& tables) {
+                                    return std::any_of(tables.begin(), tables.end(),
+                                                       [](const ModeTable& table) { return !table.empty(); });
+                                  });
+  const bool measures = options.measure_contour && options.measure_command && options.measure_response;
+  return measures && !varies && options.drives.empty() && options.axis_filters.empty() && path.length_mm() > 0.0;
+}
+
+OverrideFigures play_in_full(const Segments& blocks, const Path& path, BlockEnd block_end, double override_ratio,
+                             const PlaybackOptions& options) {
+  PlaybackOptions alone = options;
+  alone.other_overrides.clear();
+  alone.starved_blocks.clear();
+  alone.record_samples = 0;
+  alone.feed_window_s = 0.0;
+  const PlaybackFigures figures = play_blocks(blocks, path, block_end, override_ratio, alone);
+  return {override_ratio, figures.command.max_abs_mm, figures.response.max_abs_mm};
+}
+
 Segments last_blocks(const Segments& blocks, double seconds) {
   std::size_t first = blocks.size();
   while (first > 0 && seconds > 0.0) {
@@ -334,19 +377,40 @@ PlaybackFigures play_planned(const std::shared_ptr<const Path>& path, const Moti
 PlaybackFigures play_blocks(const Segments& blocks, const Path& path, BlockEnd block_end, double override_ratio,
                             const PlaybackOptions& options) {
   check_starved(blocks, options);
+  check_other_overrides(options);
   const double last_s = options.last_seconds * override_ratio;
+  const bool is_bounded = !options.other_overrides.empty() && override_ratio == 1.0 && has_bounds(path, options);
   BlockPlayer player(last_s > 0.0 ? last_blocks(blocks, last_s) : blocks, options.period_s, block_end, override_ratio);
   Recorder recorder(path, options, false);
   std::vector<StarvedFigures> starved;
+  std::optional<detail::DeviationBounds> bounds;
+  if (is_bounded) {
+    bounds.emplace(path, blocks, block_end,
+                   *std::max_element(options.other_overrides.begin(), options.other_overrides.end()));
+  }
   Vector3 position = Vector3::Zero();
   while (player.step(position)) {
     recorder.add(position);
+    if (bounds) {
+      bounds->add(player, position, recorder.command_deviation_mm(), recorder.command_tracker());
+    }
     while (starved.size() < options.starved_blocks.size() && player.block() >= options.starved_blocks[starved.size()]) {
       starved.push_back(starve(recorder, player, options));
     }
   }
   PlaybackFigures figures = recorder.finish(position);
   figures.starved = std::move(starved);
+  if (bounds) {
+    const std::vector<detail::BlockGroup>& groups = bounds->finish();
+    detail::OverrideMaxima maxima(path, blocks, groups, bounds->corners(), tracker_of(path, options), block_end, options);
+    for (const double ratio : options.other_overrides) {
+      figures.other_overrides.push_back(maxima.at(ratio));
+    }
+  } else {
+    for (const double ratio : options.other_overrides) {
+      figures.other_overrides.push_back(play_in_full(blocks, path, block_end, ratio, options));
+    }
+  }
   return figures;
 }
 

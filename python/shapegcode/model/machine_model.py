@@ -18,7 +18,15 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model, motion_limits
 from shapegcode.model.drives import drive_parameters
-from shapegcode.model.modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset, slowest_mode
+from shapegcode.model.modes import (
+    NO_OFFSET,
+    Offset,
+    axis_modes,
+    mode_tables,
+    moving_axis,
+    region_offset,
+    slowest_mode,
+)
 
 __all__ = ["PLANTS", "MachineModel", "OwnFilter", "PlayingController"]
 
@@ -201,6 +209,16 @@ class MachineModel:
         slowest = self.slowest_decay_per_s
         return math.log(1e6) / slowest if _LEAST_DECAY_PER_S < slowest < math.inf else 0.0
 
+    @cached_property
+    def bounds_deviations(self) -> bool:
+        """Whether the largest deviations at other feed overrides cost little beside a run.
+
+        Not behind feed drives, a filter or modes that vary with position, nor where both sides of the path count.
+        """
+        machine = self.machine
+        plain = machine.verdict.plant == "modal" and not self.shaped.filters and moving_axis(machine) is None
+        return plain and machine.input.material_side is None
+
     def limits(self, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
         """Look-ahead limits, a copy of one's own.
 
@@ -331,6 +349,7 @@ class MachineModel:
         offset: Offset = NO_OFFSET,
         starved_blocks: Sequence[int] = (),
         memory_s: float = 0.0,
+        other_overrides: Sequence[float] = (),
         tracker: _core.ContourTracker | None = None,
         increment_mm: float | None = None,
     ) -> _core.PlaybackFigures:
@@ -351,6 +370,7 @@ class MachineModel:
             offset: see `options`.
             starved_blocks: behind each of these, tried one by one, the buffer is empty for `verdict.starved_s`.
             memory_s: how long after that its vibration is looked at; 0: to the end.
+            other_overrides: feed overrides at which the largest deviations are measured beside this run.
             tracker: of the programmed path, shared by several runs; None: one of its own.
             increment_mm: least increment of the text: the speed is held against the programmed feed, less the two
                 increments by which rounding may lengthen a way; None: it is not.
@@ -368,6 +388,7 @@ class MachineModel:
             options.feed_window_s = max(self.machine.controller.block_time_s, self.period_s)
             options.feed_slack_mm = 2.0 * increment_mm
         options.last_seconds = last_seconds
+        options.other_overrides = list(other_overrides)
         options.record_samples = record_samples
         if starved_blocks:
             options.starved_blocks = list(starved_blocks)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -63,6 +64,7 @@ class CasePlayer:
         own = rule == self.model.own_rule
         return self.model.play_emitted(
             self.blocks, self.path, rule, offset=self.offset,
+            other_overrides=[case.override for case in self.cases if self._beside(case)] if own else (),
             starved_blocks=_core.fastest_block_ends(self.blocks) if own else (),
             memory_s=self.model.vibration_memory_s, tracker=self.tracker, increment_mm=self.increment_mm,
         )  # fmt: skip
@@ -74,17 +76,25 @@ class CasePlayer:
             return None
         return self.model.play_planned(self.blocks, self.path, offset=self.offset, tracker=self.tracker)
 
+    def _beside(self, case: Case) -> bool:
+        """Whether the contour of a case is measured beside the nominal run."""
+        return case.override != 1.0 and case.mode is None and self.model.bounds_deviations
+
+    def _whole(self, case: Case) -> bool:
+        """Whether the whole region is simulated for a case alone."""
+        return case.needs_contour(self.target) and not self._beside(case)
+
     def groups(self) -> list[list[Case]]:
-        """Overrides and shifted modes: those played in full each by itself, the short ones in one task."""
+        """Overrides and shifted modes: those simulated in full each by itself, the short ones in one task."""
         others = [case for case in self.cases if case.override != 1.0 or case.mode is not None]
-        whole = [[case] for case in others if case.needs_contour(self.target)]
-        return [*whole, [case for case in others if not case.needs_contour(self.target)]]
+        whole = [[case] for case in others if self._whole(case)]
+        return [*whole, [case for case in others if not self._whole(case)]]
 
     def others(self, cases: Sequence[Case]) -> dict[str, Played]:
         """A group of them by the name of their case."""
         played = {}
         for case in cases:
-            whole = case.needs_contour(self.target)
+            whole = self._whole(case)
             run = self.model.play_emitted(
                 self.blocks, self.path, override=case.override, shift=case.shift,
                 only=None if case.mode == ALL_MODES else case.mode, offset=self.offset, contour=whole,
@@ -127,13 +137,18 @@ class CasePlayer:
         return tuple(figures)
 
     def _other(self, case: Case, played: Played, own: _core.PlaybackFigures) -> CaseFigures:
-        run, whole = played.run, case.needs_contour(self.target)
+        run, whole = played.run, self._whole(case)
         if case.override == 1.0:  # the set-points are those of the nominal case, only the table is another
             response = Deviation.of([run.response]) if whole else None
             return CaseFigures(run.residual_mm, Deviation.of([own.command]), response, own.duration_s)
         if whole:
             return case_figures(run)
-        return CaseFigures(run.residual_mm, None, None, own.duration_s + played.cut_s)
+        time_s = own.duration_s + played.cut_s
+        if not self._beside(case):
+            return CaseFigures(run.residual_mm, None, None, time_s)
+        largest = next(each for each in own.other_overrides if each.override_ratio == case.override)
+        command, response = (Deviation(mm, math.nan, math.nan) for mm in (largest.command_mm, largest.response_mm))
+        return CaseFigures(run.residual_mm, command, response, time_s)
 
 
 def case_figures(run: _core.PlaybackFigures, *, contour: bool = True, response: bool = True) -> CaseFigures:

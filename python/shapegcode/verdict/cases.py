@@ -67,11 +67,11 @@ class Case:
         return self.override == 1.0 and self.mode is None and not self.look_ahead and self.starved_s == 0.0
 
     def needs_contour(self, target: Target) -> bool:
-        """Whether the contour has to be measured by playing the whole region in this very case.
+        """Whether the contour has to be measured in this very case.
 
-        A mode that is off changes nothing of the command; what is only shown makes do with the residual.
+        A mode that is off changes nothing of the command, and where it is only shown the residual is enough.
         """
-        if self.nominal or self.look_ahead or self.starved_s > 0.0:
+        if self.mode is None:
             return True
         return self.counts and (self.override != 1.0 or target == "response")
 

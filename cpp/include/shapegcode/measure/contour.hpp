@@ -59,6 +59,8 @@ class ContourTracker {
  public:
   /// The point is expected at the path's start. Throws Error(argument) on a path without segments.
   explicit ContourTracker(const Path& path);
+  /// The point is expected at `p`, and its foot so far from the path's start: as if it had moved there.
+  void begin_at(double s_mm, const Vector3& p) noexcept;
   /// Signed deviation in mm of the next sample; NaN, and no change of state, if `p` is not finite.
   double step(const Vector3& p) noexcept;
   /// The same of a point that is driven by the last one of another tracker of the path, and whose foot cannot lie much
@@ -229,28 +231,47 @@ class OrbitError {
 /// that is cut short along the path itself (a reversal, a narrow V); the distance from corner to track does.
 class CornerReach {
  public:
+  /// Along the path on both sides of a corner: further away its nearest track point does not lie.
+  static constexpr double window_mm = 1.0;
+  /// On a reversal, or where the path runs over itself, the foot may be on a later pass while the point is still before
+  /// the corner. One that seems missed by more than this waits for the point so much longer.
+  static constexpr double missed_mm = 0.02;
+  static constexpr double patience_mm = 20.0;
+
+  struct Corner {
+    Vector3 point;
+    double s = 0.0;         // from the path's start
+    double best2 = 0.0;     // squared distance to the track; infinite before the point was near
+    std::uint32_t tag = 0;  // of the sample at the end of the nearest piece of track
+  };
+
   /// Corners are junctions at which the direction changes by `least_angle_rad` or more, and the path's end.
   explicit CornerReach(const Path& path, double least_angle_rad = 0.1745);
+  /// Forgets the track; the next sample has its foot near `foot_mm`. Corners whose window lies before it, or about it
+  /// unless it is the path's start, no longer count.
+  void begin_at(double foot_mm, bool from_start) noexcept;
   /// Next sample, and the distance of its foot point along the path (ContourTracker::s_mm()). No allocation.
-  void step(const Vector3& p, double foot_mm) noexcept {
+  void step(const Vector3& p, double foot_mm, std::uint32_t tag = 0) noexcept {
     if (foot_mm < idle_until_mm_) {
       last_ = p;
     } else {
-      step_corners(p, foot_mm);
+      step_corners(p, foot_mm, tag);
     }
   }
+  /// Whether every corner up to `s_mm` from the path's start lies well behind the point.
+  [[nodiscard]] bool has_passed(double s_mm) const noexcept {
+    return first_ >= corners_.size() || corners_[first_].s > s_mm;
+  }
+  /// Whether the last sample is near enough to a corner to be held against it.
+  [[nodiscard]] bool is_near() const noexcept { return first_ < next_; }
+  [[nodiscard]] const std::vector<Corner>& corners() const noexcept { return corners_; }
   /// Largest distance of a corner from the track so far, mm.
   [[nodiscard]] double largest_mm() const noexcept;
   /// The same of the corners that lie well behind the point: for a track that ends before the path does.
   [[nodiscard]] double largest_passed_mm() const noexcept;
 
  private:
-  struct Corner {
-    Vector3 point;
-    double s = 0.0;      // from the path's start
-    double best2 = 0.0;  // squared distance to the track
-  };
-  void step_corners(const Vector3& p, double foot_mm) noexcept;
+  void step_corners(const Vector3& p, double foot_mm, std::uint32_t tag) noexcept;
 
   std::vector<Corner> corners_;
   double idle_until_mm_ = 0.0;  // no corner is near before a foot so far from the path's start

@@ -1,0 +1,53 @@
+// Modes of three axes over many periods at once, while their command runs at steady speed.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "shapegcode/mode.hpp"
+#include "shapegcode/plant/modal.hpp"
+
+namespace shapegcode::detail {
+
+/// The motion of a ModalPlant with constant modes.
+class FreeModes {
+ public:
+  FreeModes(const AxisModes& modes, double period_s);
+  /// At rest, the command too.
+  void reset() noexcept;
+  /// The command moves on at a velocity for a period.
+  void step(const Vector3& velocity_mm_per_s) noexcept;
+  /// The same for so many periods. Returns the largest square of |response - command| that can follow from their
+  /// beginning on at this velocity.
+  double step(const Vector3& velocity_mm_per_s, std::size_t periods) noexcept;
+  /// Response less command.
+  [[nodiscard]] Vector3 deflection() const noexcept;
+  [[nodiscard]] const Vector3& velocity_mm_per_s() const noexcept { return velocity_; }
+  /// Numbers of a state; what save() writes and load() reads beside the velocity.
+  [[nodiscard]] std::size_t size() const noexcept { return 2 * states_.size(); }
+  void save(std::span<double> state) const noexcept;
+  void load(std::span<const double> state, const Vector3& velocity_mm_per_s) noexcept;
+
+ private:
+  static constexpr std::size_t tabulated = 64;  // periods
+
+  struct State {
+    ModeTransition over_period;
+    Eigen::Index axis = 0;
+    double participation = 1.0;
+    double decay_rate = 0.0;       // 1/s
+    double damped_period_s = 0.0;  // over 2 pi
+    double deflection = 0.0;       // mm
+    double velocity = 0.0;         // mm/s
+  };
+
+  double period_s_;
+  std::vector<Mode> modes_;
+  std::vector<State> states_;  // one for each
+  std::vector<ModeTransition> over_;  // of each mode over 1, 2 ... periods
+  Vector3 velocity_ = Vector3::Zero();
+};
+
+}  // namespace shapegcode::detail
