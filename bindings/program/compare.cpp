@@ -9,8 +9,9 @@
 namespace py = pybind11;
 
 namespace shapegcode::bindings {
+namespace {
 
-void register_compare(py::module_& module) {
+void define_kinds(py::module_& module) {
   py::enum_<ComparedKind>(module, "ComparedKind", "What is compared of two programs, and what a difference is of.")
       .value("cuts", ComparedKind::cuts)
       .value("rapids", ComparedKind::rapids)
@@ -32,7 +33,12 @@ void register_compare(py::module_& module) {
       .value("emission", ComparedKind::emission)
       .value("units", ComparedKind::units)
       .value("end", ComparedKind::end);
+}
 
+}  // namespace
+
+void register_compare(py::module_& module) {
+  define_kinds(module);
   py::class_<ProgramComparison>(module, "ProgramComparison", "What differs between two programs.")
       .def_property_readonly(
           "counts",

@@ -14,8 +14,10 @@ import shapegcode as sg
 from acceptance import SAMPLE_KEYS, SAMPLES, machine_with, read_sample
 from command import run
 from judge import interpret
+from judge.draws import draw
 from judge.generate import programs
 from judge.samples import PROGRAMS
+from random_verdict import convert
 from rs274_tool import canonical_moves, run_rs274
 from test_rapids import PROGRAM as RAPIDS
 from test_second_opinion import TOOLS, for_rs274
@@ -141,7 +143,9 @@ def test_a_cut_that_is_gone_and_cuts_that_change_places() -> None:
     # A closed cut the other way round has the same ends and the same length.
     square = "G01 X10. F500.\nY10.\nX0\nY0\n"
     turned = "G01 Y10. F500.\nX10.\nY0\nX0\n"
-    assert compared(PART.replace(first, square), PART.replace(first, turned)).path_um > 5000.0
+    assert compared(PART.replace(first, square), PART.replace(first, turned)).path_um > 9000.0
+    small, other_way = "G01 X0 F500.\nG03 I0.05 J0 F100.\n", "G01 X0 F500.\nG02 I0.05 J0 F100.\n"
+    assert compared(PART.replace(first, small), PART.replace(first, other_way)).path_um > 90.0
 
 
 def nearest_mm(points: np.ndarray, line: np.ndarray) -> float:
@@ -213,6 +217,17 @@ def test_counts_are_those_of_linuxcnc(text: str, tmp_path_factory: pytest.TempPa
         assert result.count(kind).original == sum(f"{call}(" in line for line in lines), (kind, text)
     cuts = [move for move in canonical_moves(lines) if move.kind in ("line", "arc") and move.length_mm > 1e-3]
     assert bool(cuts) == (result.count("cuts").original > 0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_of_a_random_program_shaping_changes_nothing_else(seed: int) -> None:
+    """Macros, coordinate modes, cycles, offsets and inches: all but feeds, blocks and path stays."""
+    case = convert(draw(seed), shape_all=True)
+    original = sg.Program.from_text(case.drawn.text, case.machine)
+    emitted = sg.Program.from_text(case.conversion.text, case.machine, emitted=True)
+    result = sg.compare(original, emitted, case.machine, allow="feeds,blocks,calls,path=0.1mm")
+    assert result.ok, list(result.refused)
+    assert result.count("cuts").original > 0
 
 
 def test_shaped_rapids_are_a_difference_of_their_own() -> None:

@@ -9,7 +9,7 @@ namespace shapegcode::detail {
 namespace {
 
 constexpr double same_place_mm = 1e-9;
-constexpr double looked_at_mm = 1.0;
+constexpr double looked_at_mm = 0.2;
 constexpr double looked_at_rad = 0.035;
 constexpr double same_feed = 1e-6;
 constexpr double same_stretch_mm = 0.05;  // shaping and rounding move the place of a change of feed
@@ -104,27 +104,37 @@ bool same_moves(const Cut& one, const Cut& other) {
 }
 
 PathDistance path_distance(const Cut& moving, const Cut& still) {
-  ContourTracker tracker(whole_path(still));
+  const Path path = whole_path(still);
+  ContourTracker tracker(path);
   PathDistance found;
-  const auto look = [&](const Vector3& point, std::uint32_t line) {
-    const double distance = std::abs(tracker.step(point));
+  const double share = moving.length_mm > 0.0 ? path.length_mm() / moving.length_mm : 0.0;
+  const double slack_mm = std::min(1.0, 0.3 * path.length_mm()) + 0.1 * path.length_mm();
+  std::size_t cursor = 0;
+  const auto look = [&](const Vector3& point, double from_start_mm, std::uint32_t line) {
+    double distance = std::abs(tracker.step(point));
+    // Near another part of the path, as of a contour the other way round: that part is not meant.
+    const double meant_mm = std::min(from_start_mm * share, path.length_mm());
+    if (std::abs(tracker.s_mm() - meant_mm) > slack_mm) {
+      distance = std::max(distance, (point - path.point(meant_mm, cursor)).norm());
+    }
     if (distance > found.distance_mm) {
       found = {distance, line};
     }
   };
   Segment move;
-  bool first = true;
+  double from_start_mm = 0.0;
   for (Moves moves(moving); moves.next(move);) {
-    if (first) {
-      look(move.start_mm, move.line);
-      first = false;
+    if (from_start_mm == 0.0) {
+      look(move.start_mm, 0.0, move.line);
     }
     const double turn = move.kind == SegmentKind::arc ? std::abs(move.sweep_rad) / looked_at_rad : 2.0;
     const auto parts = static_cast<int>(std::ceil(std::max({2.0, turn, move.length_mm / looked_at_mm})));
     for (int k = 1; k < parts; ++k) {
-      look(point_at(move, move.length_mm * k / parts), move.line);
+      const double along_mm = move.length_mm * k / parts;
+      look(point_at(move, along_mm), from_start_mm + along_mm, move.line);
     }
-    look(move.end_mm, move.line);
+    from_start_mm += move.length_mm;
+    look(move.end_mm, from_start_mm, move.line);
   }
   return found;
 }

@@ -17,8 +17,9 @@ struct PathDistance {
 /// Whether both have the same moves, whatever their feeds.
 [[nodiscard]] bool same_moves(const Cut& one, const Cut& other);
 
-/// Follows a path along another one. Looked at are the ends of its moves, lines at least every millimetre and arcs
-/// every two degrees; between them neither can leave the other unseen by its own points, as both are looked at.
+/// Follows a path along another one. Looked at are the ends of its moves, lines at least every 0.2 mm and arcs
+/// every two degrees; between them neither can leave the other unseen by its own points, as both are looked at. Where
+/// it is near another part of the path only, that far from the start where it should be, the part that is meant counts.
 [[nodiscard]] PathDistance path_distance(const Cut& moving, const Cut& still);
 
 /// The first stretch whose programmed feed differs, as moves of either cut.

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "base/text.hpp"
-#include "compare/cut_moves.hpp"
+#include "compare/cut_collector.hpp"
 #include "compare/events.hpp"
 #include "program/interpret/input_rules.hpp"
 #include "program/read/program_store.hpp"
@@ -17,7 +17,6 @@ namespace {
 constexpr std::uint32_t xyz_letters = letter_mask("XYZ");
 constexpr std::uint32_t arc_letters = letter_mask("IJK");
 constexpr std::uint32_t further_axes = letter_mask("ABCUVW");
-constexpr double joined_mm = 1e-6;
 constexpr double stop_before_rapid_s = 0.01;  // what a shaped rapid has before it
 
 // Capitals without blanks, N word and comments.
@@ -42,7 +41,7 @@ std::string plain_text(std::string_view text) {
 class EventReader {
  public:
   EventReader(const Program& program, const ComparisonOptions& options)
-      : program_(program), options_(options), moves_(program) {
+      : program_(program), options_(options), cuts_(program, events_) {
     const ModalState& on = options.reader.power_on;
     modes_ = {on.plane, on.distance, on.feed_mode, on.exact_stop, on.cycle_return};
     motion_ = on.motion;
@@ -106,8 +105,8 @@ class EventReader {
   }
 
   void close() {
-    finish_piece();
-    open_ = in_rapid_ = has_entry_ = false;
+    cuts_.close();
+    in_rapid_ = has_entry_ = false;
   }
 
   void marks() {
@@ -234,8 +233,32 @@ class EventReader {
     put(ComparedKind::functions, other);
   }
 
+  // Where the state of a group is kept that changes nothing but how further blocks are read.
+  [[nodiscard]] int* mode(Group group) noexcept {
+    switch (group) {
+      case Group::plane:
+        return &modes_.plane;
+      case Group::distance:
+        return &modes_.distance;
+      case Group::feed_mode:
+        return &modes_.feed_mode;
+      case Group::exact_stop:
+        return &modes_.exact_stop;
+      case Group::cycle_return:
+        return &modes_.cycle_return;
+      case Group::cycle:
+        return &cycle_;
+      default:
+        return nullptr;
+    }
+  }
+
   void code(int tenths, Group group) {
     const int whole = tenths / 10;
+    if (int* const changed = mode(group)) {
+      *changed = whole;
+      return;
+    }
     switch (group) {
       case Group::motion:
         motion_ = whole;
@@ -243,24 +266,6 @@ class EventReader {
         if (whole == 0 && in_rapid_) {
           close();  // the last line of a shaped rapid
         }
-        return;
-      case Group::plane:
-        modes_.plane = whole;
-        return;
-      case Group::distance:
-        modes_.distance = whole;
-        return;
-      case Group::feed_mode:
-        modes_.feed_mode = whole;
-        return;
-      case Group::exact_stop:
-        modes_.exact_stop = whole;
-        return;
-      case Group::cycle_return:
-        modes_.cycle_return = whole;
-        return;
-      case Group::cycle:
-        cycle_ = whole;
         return;
       case Group::units:
         if (whole != units_ && events_.units_line > 0) {
@@ -438,62 +443,21 @@ class EventReader {
       add(ComparedKind::cuts, plain_text(block_.text()));  // nobody knows its path
       return;
     }
-    while (moves_.next(line_)) {
-      const Segment move = moves_.move();
-      if (open_ && (move.start_mm - current().end_mm).norm() > joined_mm) {
-        finish_piece();
-        open_ = false;
-      }
-      if (!open_) {
-        begin_cut(move);
-      }
-      if (count_ == 0 || step_ != moves_.step() || moves_.index() != first_ + count_) {
-        finish_piece();
-        step_ = moves_.step();
-        first_ = moves_.index();
-        current().pieces.push_back(moves_.run());
-      }
-      ++count_;
-      Cut& cut = current();
-      cut.end_mm = move.end_mm;
-      cut.length_mm += move.length_mm;
-      cut.exact_stops += move.stop_at_end ? 1U : 0U;
-      ++cut.moves;
-    }
-    if (in_rapid_ && open_) {
-      for (std::size_t i = 0; i < axis_count; ++i) {
-        events_.all[opened_].place_mm[i] = current().end_mm[static_cast<Eigen::Index>(i)];
-      }
-    }
-  }
-
-  Cut& current() noexcept { return events_.cuts.back(); }
-
-  void begin_cut(const Segment& first) {
-    opened_ = events_.all.size();
-    Event begun = event(in_rapid_ ? ComparedKind::rapids : ComparedKind::cuts, in_rapid_ ? "G00" : "");
-    begun.known = in_rapid_ ? 7 : 0;
-    begun.cut = events_.cuts.size();
-    events_.all.push_back(std::move(begun));
-    events_.cuts.emplace_back();
-    current().modes = entry_;
-    current().start_mm = first.start_mm;
-    open_ = true;
-  }
-
-  // The moves of the open piece are all that it has.
-  void finish_piece() {
-    if (count_ > 0) {
-      Segments& piece = current().pieces.back();
-      piece = piece.part(first_, count_);
-      count_ = 0;
+    cuts_.add(line_, entry_, [this] {
+      Event begun = event(in_rapid_ ? ComparedKind::rapids : ComparedKind::cuts, in_rapid_ ? "G00" : "");
+      begun.known = in_rapid_ ? 7 : 0;
+      return begun;
+    });
+    if (in_rapid_ && cuts_.is_open()) {
+      const Vector3& end = events_.cuts.back().end_mm;
+      std::copy(end.begin(), end.end(), cuts_.event().place_mm.begin());
     }
   }
 
   const Program& program_;
   const ComparisonOptions& options_;
   Events events_;
-  CutMoves moves_;
+  CutCollector cuts_;
   ParsedBlock block_;
   CutModes modes_;
   CutModes entry_;                         // before the block that sets a cutting mode, or cuts first
@@ -505,18 +469,12 @@ class EventReader {
   int compensation_ = 40;
   double feed_ = 0.0;
   bool one_shot_ = false;  // the axis words belong to a code of their own
-  bool open_ = false;      // a cut, or a shaped rapid
   bool in_rapid_ = false;
   bool has_entry_ = false;
   bool emitted_ = false;
   bool ended_ = false;
   std::size_t call_ = 0;
   std::size_t end_ = 0;
-  std::size_t opened_ = 0;  // the event of the open cut
-  // Of its open piece: the step of the program, and moves of that.
-  std::size_t step_ = 0;
-  std::size_t first_ = 0;
-  std::size_t count_ = 0;
 };
 
 }  // namespace

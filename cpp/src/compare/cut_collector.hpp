@@ -1,9 +1,10 @@
-// Private: the canonical moves of a program, line by line.
+// Private: the canonical moves of a program, line by line, gathered into cuts.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
+#include "compare/events.hpp"
 #include "shapegcode/program.hpp"
 
 namespace shapegcode::detail {
@@ -61,6 +62,72 @@ class CutMoves {
   const Program& program_;
   std::size_t step_ = 0;
   std::size_t inside_ = 0;  // moves of the step that were given
+};
+
+/// Puts the cutting moves of a program together as cuts, each with its event.
+class CutCollector {
+ public:
+  CutCollector(const Program& program, Events& events) : moves_(program), events_(events) {}
+
+  /// The moves of a line: of the open cut, or of a new one with these modes, whose event `begun()` gives.
+  template <typename Begun>
+  void add(std::uint32_t line, const CutModes& modes, const Begun& begun) {
+    while (moves_.next(line)) {
+      const Segment move = moves_.move();
+      if (open_ && (move.start_mm - events_.cuts.back().end_mm).norm() > joined_mm) {
+        close();
+      }
+      if (!open_) {
+        opened_ = events_.all.size();
+        events_.all.push_back(begun());
+        events_.all.back().cut = events_.cuts.size();
+        events_.cuts.emplace_back();
+        events_.cuts.back().modes = modes;
+        events_.cuts.back().start_mm = move.start_mm;
+        open_ = true;
+      }
+      Cut& cut = events_.cuts.back();
+      if (count_ == 0 || step_ != moves_.step() || moves_.index() != first_ + count_) {
+        finish_piece();
+        step_ = moves_.step();
+        first_ = moves_.index();
+        cut.pieces.push_back(moves_.run());
+      }
+      ++count_;
+      cut.end_mm = move.end_mm;
+      cut.length_mm += move.length_mm;
+      cut.exact_stops += move.stop_at_end ? 1U : 0U;
+      ++cut.moves;
+    }
+  }
+  void close() {
+    finish_piece();
+    open_ = false;
+  }
+  [[nodiscard]] bool is_open() const noexcept { return open_; }
+  /// Of the open cut.
+  [[nodiscard]] Event& event() noexcept { return events_.all[opened_]; }
+
+ private:
+  static constexpr double joined_mm = 1e-6;
+
+  // The open piece has the moves that were given, and no more.
+  void finish_piece() {
+    if (count_ > 0) {
+      Segments& piece = events_.cuts.back().pieces.back();
+      piece = piece.part(first_, count_);
+      count_ = 0;
+    }
+  }
+
+  CutMoves moves_;
+  Events& events_;
+  bool open_ = false;
+  std::size_t opened_ = 0;  // the event of the open cut
+  // Of its open piece: the step of the program, and moves of that.
+  std::size_t step_ = 0;
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
 };
 
 }  // namespace shapegcode::detail
