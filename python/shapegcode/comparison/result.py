@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -124,8 +125,8 @@ class Comparison(Result):
         refused = list(self.refused)
         if not refused:
             return said
-        first = refused[0]
-        many = f"{len(refused)} differences, the first" if len(refused) > 1 else "1 difference,"
+        first = next((each for each in refused if each.kind == "end"), refused[0])
+        many = f"{len(refused)} differences, one" if len(refused) > 1 else "1 difference,"
         return f"{said}; {many} at {first.place}: {first.kind}"
 
     @property
@@ -138,8 +139,15 @@ class Comparison(Result):
                 if self.differences
                 else ("nothing: the programs do the same.")
             )
-        wanted = f"path={first.distance_um:.0f}um or more" if first.kind == "path" else first.kind
-        return f"look at {first.place}; if that is meant, allow it: --allow {','.join((*self.allow, wanted))}."
+        if first.kind == "emission" and first.original_line is not None:
+            return f"look at {first.place}: the other program has lost what keeps a shaped cut as it was judged."
+        words = [word for word in self.allow if not word.startswith("path=")] if first.kind == "path" else [*self.allow]
+        words.append(
+            f"path={math.ceil(first.distance_um)}um"
+            if first.kind == "path"
+            else first.kind.replace("emission", "blocks")
+        )
+        return f"look at {first.place}; if that is meant, allow it: --allow {','.join(words)}."
 
     def key_figures(self) -> tuple[Figure, ...]:
         """The distance of the paths, and how many differences there are."""
