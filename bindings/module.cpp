@@ -28,4 +28,5 @@ PYBIND11_MODULE(_core, module) {
   register_engagement(module);
   register_milling(module);
   register_feed_schedule(module);
+  register_compare(module);
 }

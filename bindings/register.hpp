@@ -29,5 +29,6 @@ void register_played_stream(pybind11::module_& module);
 void register_engagement(pybind11::module_& module);
 void register_milling(pybind11::module_& module);
 void register_feed_schedule(pybind11::module_& module);
+void register_compare(pybind11::module_& module);
 
 }  // namespace shapegcode::bindings

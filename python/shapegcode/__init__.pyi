@@ -92,6 +92,13 @@ from shapegcode.checking.result import (
     Check as Check,
     Finding as Finding,
 )
+from shapegcode.comparison.allowed import Allowed as Allowed
+from shapegcode.comparison.compare import compare as compare
+from shapegcode.comparison.result import (
+    Comparison as Comparison,
+    KindCount as KindCount,
+    ProgramDifference as ProgramDifference,
+)
 from shapegcode.conversion.budget import Budget as Budget
 from shapegcode.conversion.convert import convert as convert
 from shapegcode.conversion.plots import plot_tolerance as plot_tolerance

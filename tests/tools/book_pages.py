@@ -26,6 +26,7 @@ PARTS = {
     "simulation": "Simulation",
     "timing": "Cycle time",
     "checking": "Checking",
+    "comparison": "Two programs compared",
     "metrology": "Virtual metrology",
     "shaping": "Shapers",
     "identification": "Modes from taps",

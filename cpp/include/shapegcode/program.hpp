@@ -119,6 +119,8 @@ struct Finding {
 struct LineOrigin {
   std::uint32_t line = 0;  ///< from 1
   std::uint32_t file = 0;  ///< into Program::files
+
+  friend bool operator==(const LineOrigin&, const LineOrigin&) = default;
 };
 
 /// A block's N word or comment inside a region, and the segment before which it stood.
@@ -164,6 +166,20 @@ struct MachineFunction {
   std::array<bool, axis_count> unknown_way = {false, false, false};
 };
 
+/// Where a rapid ends, or a cutting move whose path is not known.
+struct MoveEnd {
+  std::uint32_t line = 0;
+  Vector3 position_mm = Vector3::Zero();
+  std::array<bool, axis_count> known = {false, false, false};
+};
+
+/// A call that was executed: the plain program has the called blocks in its place.
+struct ProgramCall {
+  std::uint32_t line = 0;  ///< of the plain program before which the called blocks stand
+  LineOrigin origin;
+  std::int64_t number = -1;  ///< O number that was called
+};
+
 enum class StepKind : std::uint8_t { region, move, function };
 
 /// What the machine does, in order: a region, another move or dwell, or machine functions.
@@ -199,6 +215,8 @@ struct Program {
   std::vector<OtherMove> other_moves;
   std::vector<MachineFunction> functions;
   std::vector<ProgramStep> steps;  ///< all of the three in the order in which they happen
+  std::vector<MoveEnd> move_ends;  ///< in order
+  std::vector<ProgramCall> calls;    ///< in order, each as often as it was executed in a row of different ones
   std::vector<Finding> warnings;
   ModalState final_state;
   std::vector<ModalState> probed;  ///< state behind each of ReaderOptions::probe_lines

@@ -13,6 +13,7 @@
 
 #include "shapegcode/columns.hpp"
 #include "shapegcode/command.hpp"
+#include "shapegcode/compare.hpp"
 #include "shapegcode/control.hpp"
 #include "shapegcode/controller.hpp"
 #include "shapegcode/error.hpp"

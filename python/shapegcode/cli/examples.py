@@ -37,6 +37,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "shapegcode check part.nc -m vx500",
         "shapegcode check memory.nc -m mine.toml --program all --json check.json",
     ),
+    "compare": (
+        "shapegcode compare part.nc shaped.nc --allow feeds,blocks,path=20um",
+        "shapegcode compare part.nc shaped.nc -m mine.toml --allow feeds,blocks,path=0.02mm,calls --json compare.json",
+    ),
     "batch": (
         "shapegcode batch parts -m mine.toml -o shaped --html pages",
         "shapegcode batch 'parts/**/*.nc' -m a.toml -m b.toml -o times --command time --resume",

@@ -331,9 +331,7 @@ class RegionWriter:
         lines[0] = number + lines[0]
         if emission.header:
             lines.insert(0, self._mark)
-        if emission.prefill_dwell_s > 0.0:
-            lines.append(f"G04P{round(emission.prefill_dwell_s * 1e3)}")
-        return _lines(lines, writer)
+        return _lines([*lines, *emission.prefill_lines], writer)
 
 
 def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, float, bool]]:

@@ -118,6 +118,11 @@ class Emission(TomlTable):
         return self
 
     @property
+    def prefill_lines(self) -> tuple[str, ...]:
+        """The dwell before each shaped stretch, as a line; none where there is none."""
+        return (f"G04P{round(self.prefill_dwell_s * 1e3)}",) if self.prefill_dwell_s > 0.0 else ()
+
+    @property
     def leaves_look_ahead(self) -> bool:
         """Whether the prologue switches a look-ahead mode off: G05.1 Q0 or G08 P0."""
         last = [found for line in self.prologue for found in _LOOK_AHEAD.findall(line)]

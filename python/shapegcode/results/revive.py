@@ -35,6 +35,7 @@ MODULES: Mapping[str, str] = {
     "CharacterisationTests": "characterization.result",
     "Check": "checking.result",
     "Conversion": "conversion.result",
+    "Comparison": "comparison.result",
     "CornerDemo": "demos.corner",
     "CornerResult": "testcut.result",
     "CutDesign": "testcut.design_result",

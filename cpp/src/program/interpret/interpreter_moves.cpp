@@ -116,6 +116,7 @@ void Interpreter::rapid() {
     OtherMove rapid{make_line(measurable ? state_.position_mm : to, to, 0.0, line_number_), 0.0};
     rapid.segment.kind = SegmentKind::rapid;
     add_move(rapid);
+    program_.move_ends.push_back({line_number_, to, known_after});
     state_.position_mm = to;
     state_.known = known_after;
   }
@@ -190,6 +191,8 @@ void Interpreter::keep_cut(const char* why, const Vector3& end, const std::array
         !plain && measurable ? cutting_segment(end) : make_line(state_.position_mm, end, rate, line_number_);
     if (measurable && segment.feed_mm_per_s > 0.0 && segment.length_mm > 0.0) {
       add_move({segment, 0.0});
+    } else {
+      program_.move_ends.push_back({line_number_, end, known_after});
     }
     state_.position_mm = end;
     state_.known = known_after;

@@ -314,6 +314,9 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
   }
   called_.insert(number);
   unit->called = true;
+  if (program_.calls.empty() || program_.calls.back().origin != origin_ || program_.calls.back().number != number) {
+    program_.calls.push_back({static_cast<std::uint32_t>(program_.origins.size() + 1), origin_, number});
+  }
   if (macro) {
     variables_.push_level(arguments.locals, here_.line, column);
   }

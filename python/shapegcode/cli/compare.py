@@ -1,0 +1,53 @@
+"""``shapegcode compare``: proof that nothing else changed between two programs."""
+
+from __future__ import annotations
+
+import argparse
+
+from shapegcode.cli.options import add_machine_argument, add_result_arguments, load_machine
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.description = (
+        "Compares two programs by what they do: distance of the paths of each cut, order of cuts, rapids, tool calls, "
+        "spindle, coolant, offsets, modal state, calls, feeds, other functions, dwells and stops. Every difference is "
+        "listed with its lines. Exit code 1 if there is one that --allow does not cover."
+    )
+    parser.add_argument("input", metavar="A", help="the one program, for example the original")
+    parser.add_argument("against", metavar="B", help="the other one, for example what convert made of it")
+    add_machine_argument(parser, required=False)
+    parser.add_argument(
+        "--allow",
+        metavar="WORDS",
+        default="",
+        help="differences that are allowed, for example feeds,blocks,path=20um,calls; a wrong word lists them all",
+    )
+    add_result_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare two programs.
+
+    Args:
+        args: of the command.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        ProgramError, MachineError, ArgumentError: bad input.
+        OSError: a file cannot be read or written.
+    """
+    from shapegcode.cli import runner
+    from shapegcode.comparison.compare import compare
+
+    notes = [] if args.machine else ["read as the built-in machine vx500 reads programs: -m MACHINE names another one"]
+    args.machine = args.machine or "vx500"
+    machine = load_machine(args)
+    runner.check_files(args)
+    with runner.progress(f"comparing {args.input} with {args.against}", args):
+        result = compare(args.input, args.against, machine, allow=args.allow)
+    return runner.finish(result, args, notes=notes)

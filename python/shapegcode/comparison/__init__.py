@@ -1,0 +1,1 @@
+"""Two programs side by side: what one does and the other does not."""

@@ -1,0 +1,189 @@
+"""What differs between two programs: counts of each kind, the list of differences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from shapegcode.results.page.model import Figure
+from shapegcode.results.result import Result
+from shapegcode.results.table import Column, Table
+
+__all__ = ["Comparison", "KindCount", "ProgramDifference"]
+
+_NOUNS = {"tools": "tool calls", "functions": "other functions", "cycles": "drilling blocks", "modal": "modal states"}
+_ALWAYS = ("rapids", "tools", "offsets")
+_SHOWN = 20
+
+
+@dataclass(frozen=True)
+class KindCount:
+    """How many there are of one kind.
+
+    Attributes:
+        kind: of them, as `shapegcode.comparison.allowed.KINDS` names it.
+        original: in the original.
+        emitted: in the other program.
+        unchanged: the same in both, at the same place in their order.
+    """
+
+    kind: str
+    original: int
+    emitted: int
+    unchanged: int
+
+    @property
+    def differs(self) -> bool:
+        """Whether one has some that the other has not."""
+        return not self.original == self.emitted == self.unchanged
+
+
+@dataclass(frozen=True)
+class ProgramDifference:
+    """One thing in which two programs differ.
+
+    Attributes:
+        kind: of `shapegcode.comparison.allowed.KINDS`, "path", or "emission" for a line of emission.* around a cut.
+        original_line: from 1; None: the original has nothing there.
+        emitted_line: likewise of the other program.
+        original: what the original has; empty: nothing.
+        emitted: what the other program has.
+        allowed: whether it was allowed.
+        distance_um: largest distance of the two paths of a cut, µm; 0 for other kinds.
+    """
+
+    kind: str
+    original_line: int | None
+    emitted_line: int | None
+    original: str
+    emitted: str
+    allowed: bool
+    distance_um: float = 0.0
+
+    @property
+    def place(self) -> str:
+        """The line of the original, else that of the other program."""
+        if self.original_line is not None:
+            return f"line {self.original_line}"
+        return f"line {self.emitted_line} of the other program"
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(Result):
+    """What differs between two programs.
+
+    Attributes:
+        original: name of the one program.
+        emitted: name of the other.
+        machine: name of the machine whose controller read them.
+        counts: of each kind of which one of them has some.
+        path_um: largest distance of the paths of a cut that both have, seen from either, µm.
+        differences: all, in the order of the original.
+        allow: what was allowed, as `shapegcode.comparison.allowed.Allowed.of` takes it.
+        warnings: none.
+    """
+
+    original: str
+    emitted: str
+    machine: str
+    counts: tuple[KindCount, ...]
+    path_um: float
+    differences: tuple[ProgramDifference, ...]
+    allow: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing differs but what was allowed."""
+        return not any(True for _ in self.refused)
+
+    @property
+    def refused(self) -> Iterator[ProgramDifference]:
+        """The differences that were not allowed."""
+        return (each for each in self.differences if not each.allowed)
+
+    def count(self, kind: str) -> KindCount:
+        """How many there are of a kind.
+
+        Args:
+            kind: its name.
+
+        Returns:
+            The counts; zeros where neither program has one.
+        """
+        return next((each for each in self.counts if each.kind == kind), KindCount(kind, 0, 0, 0))
+
+    @property
+    def answer(self) -> str:
+        """What is unchanged, and how near the paths are; the first difference that was not allowed."""
+        told = [self.count(kind) for kind in _ALWAYS]
+        told += [each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission")]
+        counts = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in told)
+        said = f"{counts} unchanged; path within {self.path_um:.1f} um"
+        refused = list(self.refused)
+        if not refused:
+            return said
+        first = next((each for each in refused if each.kind == "end"), refused[0])
+        many = f"{len(refused)} differences, one" if len(refused) > 1 else "1 difference,"
+        return f"{said}; {many} at {first.place}: {first.kind}"
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        first = next(self.refused, None)
+        if first is None:
+            return (
+                "nothing: the programs do the same, but for what was allowed."
+                if self.differences
+                else ("nothing: the programs do the same.")
+            )
+        if first.kind == "emission" and first.original_line is not None:
+            return f"look at {first.place}: the other program has lost what keeps a shaped cut as it was judged."
+        words = [word for word in self.allow if not word.startswith("path=")] if first.kind == "path" else [*self.allow]
+        words.append(
+            f"path={math.ceil(first.distance_um)}um"
+            if first.kind == "path"
+            else first.kind.replace("emission", "blocks")
+        )
+        return f"look at {first.place}; if that is meant, allow it: --allow {','.join(words)}."
+
+    def key_figures(self) -> tuple[Figure, ...]:
+        """The distance of the paths, and how many differences there are."""
+        return (
+            Figure("path within", "µm", None, self.path_um, 1, key_after="path_um"),
+            Figure("differences not allowed", "", None, len(list(self.refused)), 0),
+        )
+
+    def tables(self) -> list[Table]:
+        """Counts of each kind, then the differences: those that were not allowed first."""
+        counts = Table(
+            "",
+            (
+                Column("what", value=lambda row: _noun(row.kind), left=True),
+                Column("original", value="original"),
+                Column("other", value="emitted"),
+                Column("unchanged", value="unchanged"),
+            ),
+            self.counts,
+        )
+        if not self.differences:
+            return [counts]
+        refused = list(self.refused)
+        shown = [*refused, *(each for each in self.differences if each.allowed)][:_SHOWN]
+        more = len(self.differences) - len(shown)
+        columns = (
+            Column("kind", value="kind", left=True),
+            Column("line", value="original_line"),
+            Column("other line", value="emitted_line"),
+            Column(Path(self.original).name, value="original", text=True),
+            Column(Path(self.emitted).name, value="emitted", text=True),
+            Column("allowed", value=lambda row: "yes" if row.allowed else "no"),
+        )
+        caption = f"{more} more: --json FILE has all" if more else ""
+        return [counts, Table("differences", columns, shown, caption=caption, sections=(min(len(refused), _SHOWN),))]
+
+
+def _noun(kind: str) -> str:
+    return _NOUNS.get(kind, kind)

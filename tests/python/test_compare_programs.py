@@ -1,0 +1,364 @@
+"""Two programs compared: against LinuxCNC's interpreter, the judge's, and programs with one thing changed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from scipy.spatial import cKDTree
+
+import shapegcode as sg
+from acceptance import SAMPLE_KEYS, SAMPLES, machine_with, read_sample
+from command import run
+from judge import interpret
+from judge.draws import draw
+from judge.generate import programs
+from judge.samples import PROGRAMS
+from random_verdict import convert
+from rs274_tool import canonical_moves, run_rs274
+from test_rapids import PROGRAM as RAPIDS
+from test_second_opinion import TOOLS, for_rs274
+
+MACHINE = sg.Machine.load("vx500")
+PART = """%
+O0001(PART)
+G21 G17 G90 G94 G40 G49 G80
+T1 M06
+G54
+S3000 M03
+G00 X0 Y0
+G43 H1 Z20. M08
+Z2.
+G01 Z-1. F200.
+X30. F600.
+Y20.
+G00 Z20.
+X50. Y0.
+Z2.
+G01 Z-1. F200.
+G03 X50. Y20. R10. F500.
+G04 P500
+G00 Z20.
+M09
+T2 M06
+S4000 M03
+G55
+G00 X80. Y5.
+G43 H2 Z20.
+G99 G81 X80. Y5. Z-5. R2. F100.
+X90.
+G80
+M10
+G52 X1. Y0. Z0.
+G92.1
+M05
+M30
+%
+""".replace("G92.1\n", "")
+SHAPED = ["PROGRAM2.NC", "CONTOUR_R.NC", "G17_18_19.NC", "VINT_360arc.NC", "helical_bore.nc", "BOTTLE.NC"]
+RANDOM = settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+
+
+def compared(original: str, emitted: str, allow: str = "") -> sg.Comparison:
+    read = [sg.Program.from_text(text, MACHINE, source=name) for text, name in ((original, "a.nc"), (emitted, "b.nc"))]
+    return sg.compare(read[0], read[1], MACHINE, allow=allow)
+
+
+def line_of(text: str, line: str) -> int:
+    return text.splitlines().index(line) + 1
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_a_program_is_the_same_as_itself(name: str) -> None:
+    machine = machine_with(SAMPLE_KEYS.get(name))
+    program = sg.Program.read(PROGRAMS / name, machine)
+    result = sg.compare(program, program, machine)
+    assert result.ok and not result.differences and result.path_um == 0.0
+    assert all(not each.differs for each in result.counts)
+
+
+MUTATIONS = {
+    # What is changed, into what, kind, line of the original, line of the other program.
+    "a rapid moved": ("X50. Y0.\nZ2.", "X50. Y0.5\nZ2.", "rapids", 14, 14),
+    "a tool swapped": ("T2 M06", "T3 M06", "tools", 21, 21),
+    "another speed": ("S4000", "S4100", "spindle", 22, 22),
+    "the spindle the other way": ("S3000 M03", "S3000 M04", "spindle", 6, 6),
+    "H dropped": ("G43 H2 Z20.", "Z20.", "offsets", 25, None),
+    "another H": ("H2", "H3", "offsets", 25, 25),
+    "another work offset": ("G55", "G56", "offsets", 23, 23),
+    "a local offset": ("G52 X1.", "G52 X1.1", "offsets", 30, 30),
+    "coolant off dropped": ("M09\n", "", "coolant", 20, None),
+    "coolant on dropped": (" M08", "", "coolant", 8, None),
+    "a dwell changed": ("G04 P500", "G04 P600", "dwells", 18, 18),
+    "a clamp dropped": ("M10\n", "", "functions", 29, None),
+    "a stop added": ("M10\n", "M10\nM01\n", "stops", None, 30),
+    "a hole dropped": ("X90.\n", "", "cycles", 27, None),
+    "a hole deeper": ("Z-5. R2.", "Z-5.5 R2.", "cycles", 26, 26),
+    "another feed": ("X30. F600.", "X30. F700.", "feeds", 11, 11),
+    "another feed of holes": ("R2. F100.", "R2. F120.", "feeds", 26, 26),
+    "a block divided": ("X30. F600.", "X10. F600.\nX30.", "blocks", 10, 10),
+    "the path moved": ("Y20.\nG00 Z20.\nX50. Y0.", "Y20.01\nG00 Z20.\nX50. Y0.", "path", 10, 12),
+    "another radius": ("R10. F500.", "R10.5 F500.", "path", 17, 16),
+    "exact stops in a cut": ("X50. Y0.\nZ2.\n", "X50. Y0.\nZ2.\nG61\n", "modal", 16, 17),
+    "a part of a cut dropped": ("X30. F600.\nY20.\n", "", "cuts", 10, 10),
+}
+
+
+@pytest.mark.parametrize("name", MUTATIONS)
+def test_one_change_is_found_where_it_stands(name: str) -> None:
+    old, new, kind, line, other_line = MUTATIONS[name]
+    assert PART.count(old) == 1
+    result = compared(PART, PART.replace(old, new))
+    found = [each for each in result.differences if each.kind == kind]
+    assert (found[0].original_line, found[0].emitted_line) == (line, other_line), result.differences
+    assert not result.ok and result.exit_code == 1
+    # And nothing that has nothing to do with it.
+    follows = {"cuts": {"feeds", "blocks", "path"}, "rapids": {"path", "cuts"}}
+    if name == "another radius":
+        follows["path"] = {"cuts"}  # a third of a circle less
+    assert {each.kind for each in result.differences} <= {kind} | follows.get(kind, set()), result.differences
+    words = {"path=50mm", *({kind} | follows.get(kind, set())) - {"path"}}
+    assert sg.compare(
+        sg.Program.from_text(PART, MACHINE), sg.Program.from_text(PART.replace(old, new), MACHINE), MACHINE, allow=words
+    ).ok
+
+
+def test_a_cut_that_is_gone_and_cuts_that_change_places() -> None:
+    first = "G01 Z-1. F200.\nX30. F600.\nY20.\n"
+    second = "G01 Z-1. F200.\nG03 X50. Y20. R10. F500.\n"
+    gone = compared(PART, PART.replace(first, "")).differences
+    assert [(each.kind, each.original_line, each.emitted_line) for each in gone] == [("cuts", 10, None)]
+    # Approach and cut of both contours the other way round.
+    head, tail = PART[: PART.index("G00 X0 Y0")] + "G43 H1 Z20. M08\n", "M30\n%\n"
+    one, other = f"G00 X0 Y0\nZ2.\n{first}G00 Z20.\n", f"G00 X50. Y0.\nZ2.\n{second}G00 Z20.\n"
+    base, swapped = head + one + other + tail, head + other + one + tail
+    result = compared(base, swapped)
+    moved = [each for each in result.differences if each.kind == "order" and each.original.startswith("cut")]
+    begins = {line_of(base, "G00 X50. Y0.") + 2, line_of(base, "X30. F600.") - 1}
+    assert len(moved) == 1 and moved[0].original_line in begins
+    assert result.count("cuts").unchanged == 1 and result.path_um == 0.0
+    # A closed cut the other way round has the same ends and the same length.
+    square = "G01 X10. F500.\nY10.\nX0\nY0\n"
+    turned = "G01 Y10. F500.\nX10.\nY0\nX0\n"
+    assert compared(PART.replace(first, square), PART.replace(first, turned)).path_um > 9000.0
+    small, other_way = "G01 X0 F500.\nG03 I0.05 J0 F100.\n", "G01 X0 F500.\nG02 I0.05 J0 F100.\n"
+    assert compared(PART.replace(first, small), PART.replace(first, other_way)).path_um > 90.0
+
+
+def nearest_mm(points: np.ndarray, line: np.ndarray) -> float:
+    """Largest distance of points from a polyline, by the pieces at the nearest of its corners."""
+    _, near = cKDTree(line).query(points, k=min(4, len(line)))
+    best = np.full(len(points), np.inf)
+    for corner in near.T:
+        for first, last in ((corner - 1, corner), (corner, corner + 1)):
+            a, b = line[np.clip(first, 0, len(line) - 1)], line[np.clip(last, 0, len(line) - 1)]
+            along = b - a
+            share = np.einsum("ij,ij->i", points - a, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
+            foot = a + np.clip(share, 0.0, 1.0)[:, None] * along
+            best = np.minimum(best, np.linalg.norm(points - foot, axis=1))
+    return float(best.max())
+
+
+def judged_cuts(text: str, machine: sg.Machine, centre: str) -> tuple[int, list[np.ndarray]]:
+    """Rapids outside of cycles, and points of each run of cuts between them, as the judge reads them."""
+    rapids, runs, open_run = 0, [], False
+    for record in interpret(text, arc_centre=centre, calculator_decimal_point=True).lines:  # type: ignore[arg-type]
+        for move in record.moves:
+            if move.kind == "rapid":
+                rapids, open_run = rapids + (not move.cycle), False
+            elif move.is_cut and not np.isnan(move.start).any() and move.length > 0.0:
+                points = move.points(np.linspace(0.0, 1.0, max(2, int(np.ceil(move.length / 0.02)) + 1)))
+                if open_run:
+                    runs[-1] = np.vstack([runs[-1], points])
+                else:
+                    runs.append(points)
+                open_run = True
+    return rapids, runs
+
+
+@pytest.mark.parametrize("name", SHAPED)
+def test_a_shaped_program_is_as_near_as_the_judge_finds_it(name: str, tmp_path: Path) -> None:
+    machine = machine_with(
+        {**SAMPLE_KEYS.get(name, {}), "emission.prologue": ["G05.1Q0"], "shaping.least_gain_um": 0.0}
+    )
+    conversion = sg.convert(sg.Program.read(PROGRAMS / name, machine), machine)
+    emitted = tmp_path / "shaped.nc"
+    emitted.write_bytes(conversion.text)
+    limit_um = machine.tolerance.contour_um * 3.0
+    result = sg.compare(PROGRAMS / name, emitted, machine, allow=f"feeds,blocks,path={limit_um}um")
+    assert result.ok, list(result.refused)
+    for kind in ("rapids", "tools", "spindle", "coolant", "offsets", "functions", "stops", "cuts", "cycles", "modal"):
+        assert not result.count(kind).differs, result.counts
+    assert re.fullmatch(
+        r"(\d+) of \1 rapids, (\d+) of \2 tool calls, (\d+) of \3 offsets unchanged; path within \d+\.\d um",
+        result.answer,
+    )
+    centre = machine.input.arc_centre
+    _, ours = judged_cuts(read_sample(name), machine, centre)
+    _, theirs = judged_cuts(conversion.text.decode("ascii"), machine, "incremental")
+    ours = [run for run in ours if len(run) > 1]
+    worst_um = max(1e3 * max(nearest_mm(a, b), nearest_mm(b, a)) for a, b in zip(ours, theirs, strict=True))
+    # The judge takes the nearest place of the whole cut, also where that is another pass.
+    assert worst_um - 0.05 <= result.path_um <= worst_um * 1.2 + 0.2
+
+
+@RANDOM
+@given(text=programs(cycles=False, inch=False))
+def test_counts_are_those_of_linuxcnc(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    text = re.sub(r"(?m)^.*G28.*\n", "", text)
+    theirs = "\n".join(line for line in for_rs274(text, MACHINE).splitlines() if not line.startswith("G28"))
+    lines = run_rs274(theirs, tmp_path_factory.mktemp("rs274"), tools=TOOLS)
+    result = compared(text, text)
+    assert not result.differences
+    for kind, call in (("rapids", "STRAIGHT_TRAVERSE"), ("tools", "CHANGE_TOOL"), ("dwells", "DWELL")):
+        assert result.count(kind).original == sum(f"{call}(" in line for line in lines), (kind, text)
+    cuts = [move for move in canonical_moves(lines) if move.kind in ("line", "arc") and move.length_mm > 1e-3]
+    assert bool(cuts) == (result.count("cuts").original > 0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_of_a_random_program_shaping_changes_nothing_else(seed: int) -> None:
+    """Macros, coordinate modes, cycles, offsets and inches: all but feeds, blocks and path stays."""
+    case = convert(draw(seed), shape_all=True)
+    original = sg.Program.from_text(case.drawn.text, case.machine)
+    emitted = sg.Program.from_text(case.conversion.text, case.machine, emitted=True)
+    result = sg.compare(original, emitted, case.machine, allow="feeds,blocks,calls,path=0.1mm")
+    assert result.ok, list(result.refused)
+    assert result.count("cuts").original > 0
+
+
+def test_shaped_rapids_are_a_difference_of_their_own() -> None:
+    machine = machine_with({"shaping.rapids": True})
+    program = sg.Program.from_text(RAPIDS, machine)
+    conversion = sg.convert(program, machine, shape_all=True)
+    emitted = sg.Program.from_text(conversion.text, machine, emitted=True)
+    shaped = sum(region.was_rapid for region in emitted.regions)
+    result = sg.compare(program, emitted, machine, allow="feeds,blocks,path=60um,shaped-rapids")
+    found = [each for each in result.differences if each.kind == "shaped-rapids"]
+    assert len(found) == shaped > 0
+    assert result.ok, list(result.refused)
+    assert result.count("rapids").unchanged == result.count("rapids").original - shaped
+    assert not sg.compare(program, emitted, machine, allow="feeds,blocks,path=60um").ok
+
+
+@pytest.mark.parametrize("lock", [("#33=#3004", "#3004=[#33OR2]"), ("M49",)])
+def test_lines_around_cuts_are_allowed_with_blocks(lock: tuple[str, ...]) -> None:
+    unlock = ("G53", "#3004=#33") if len(lock) > 1 else ("M48",)
+    machine = machine_with(
+        {
+            "emission.override": "lock",
+            "emission.lock_lines": list(lock),
+            "emission.unlock_lines": list(unlock),
+            "emission.prefill_dwell_s": 0.5,
+            "emission.epilogue": ["G05.1Q1"],
+            "shaping.least_gain_um": 0.0,
+        }
+    )
+    program = sg.Program.read(PROGRAMS / "CONTOUR_R.NC", machine)
+    emitted = sg.Program.from_text(sg.convert(program, machine).text, machine, emitted=True)
+    result = sg.compare(program, emitted, machine, allow="feeds,blocks,path=60um")
+    assert result.ok, list(result.refused)
+    assert any(each.kind == "emission" for each in result.differences)
+    # Taken away they are not covered.
+    assert not sg.compare(emitted, program, machine, allow="feeds,blocks,path=60um").ok
+    assert not sg.compare(program, emitted, machine, allow="feeds,path=60um").ok
+
+
+def test_programs_with_little_in_common_are_aligned() -> None:
+    """Far more differences than one pass of the alignment follows."""
+    places = np.random.default_rng(5).integers(0, 100_000, (6000, 2))
+    ours = [f"G00 X{x / 1000:.3f} Y{y / 1000:.3f}" for x, y in places[:4000]]
+    theirs = [line for rank, line in enumerate(ours) if rank % 3]
+    for rank, (x, y) in enumerate(places[4000:]):
+        theirs.insert(2 * rank, f"G00 X{x / 1000:.3f} Y{y / 1000:.3f}")
+    head, tail = "%\nO1\nG21 G90\n", "M30\n%\n"
+    result = compared("\n".join([head, *ours, tail]), "\n".join([head, *theirs, tail]))
+    common = sum(rank % 3 > 0 for rank in range(4000))
+    count = result.count("rapids")
+    assert (count.original, count.emitted) == (4000, len(theirs))
+    assert 0.98 * common <= count.unchanged <= common
+    assert result.count("stops").unchanged == 1
+
+
+CALLING = """%
+O0001
+G21 G17 G90 G94 G40 G49 G80
+T1 M06
+G54 S3000 M03
+G00 X0 Y0
+G43 H1 Z2.
+G01 Z-1. F200.
+M98 P100
+G65 P200 A5.
+G00 Z20.
+M30
+O0100
+X10.
+M99
+O0200
+G01 Y#1
+M99
+%
+"""
+
+
+def test_an_expanded_macro_differs_in_calls() -> None:
+    program = sg.Program.from_text(CALLING, MACHINE, source="a.nc")
+    plain = sg.Program.from_text(program.expanded_text, MACHINE, source="b.nc")
+    result = sg.compare(program, plain, MACHINE)
+    assert [(each.kind, each.original_line, each.emitted_line) for each in result.differences] == [
+        ("calls", 9, None),
+        ("calls", 10, None),
+    ]
+    assert sg.compare(program, plain, MACHINE, allow="calls").ok
+    assert sg.compare(program, program, MACHINE).ok
+
+
+def test_inch_and_mm_are_compared_in_mm() -> None:
+    def inch(match: re.Match[str]) -> str:
+        return f"{match[1]}{float(match[2]) / 25.4:.4f}"
+
+    words = re.sub(r"([XYZRF])(-?\d+\.?\d*)(?![\d.])", inch, PART).replace("G21", "G20")
+    result = compared(PART, words, "feeds,path=3um")
+    assert [each.kind for each in result.refused] == ["units"]
+    assert result.path_um < 3.0
+
+
+def test_a_program_that_is_cut_off(tmp_path: Path) -> None:
+    (tmp_path / "a.nc").write_text(PART)
+    for text, line in ((PART[: PART.index("G03 X50.")], 16), (PART[: PART.index("Y20. R10.")], 16)):
+        (tmp_path / "b.nc").write_text(text)
+        for names in (("a.nc", "b.nc"), ("b.nc", "a.nc")):
+            done = run(tmp_path, "compare", *names, "--json", "-")
+            assert done.returncode == 1
+            ends = f"ends early at line {line}"
+            assert ends in done.stdout or "end" in done.stdout, done.stdout
+        result = sg.compare(tmp_path / "a.nc", tmp_path / "b.nc")
+        (end,) = [each for each in result.differences if each.kind == "end"]
+        assert end.emitted.startswith(f"ends early at line {line}") and end.emitted_line == line
+
+
+def test_the_command(tmp_path: Path) -> None:
+    (tmp_path / "a.nc").write_text(PART)
+    (tmp_path / "b.nc").write_text(PART.replace("X30. F600.", "X30. F700."))
+    (tmp_path / "none.nc").write_text("%\nO1\nG1 X1Y\nM30\n%\n")
+    same = run(tmp_path, "compare", "a.nc", "a.nc")
+    assert same.returncode == 0 and "built-in machine vx500" in same.stdout
+    assert same.stdout.startswith("9 of 9 rapids, 2 of 2 tool calls, 6 of 6 offsets unchanged; path within 0.0 um")
+    assert run(tmp_path, "compare", "a.nc", "b.nc").returncode == 1
+    allowed = run(tmp_path, "compare", "a.nc", "b.nc", "-m", "vx500", "--allow", "feeds")
+    assert allowed.returncode == 0 and "built-in machine" not in allowed.stdout
+    for words, said in (
+        (("--allow", "feed"), "no difference of this name; there are cuts, rapids, tools"),
+        (("--allow", "path=20"), "path needs a length with its unit"),
+        (("--allow", "path=0um"), "must be above 0"),
+        (("--allow", "path=-1um"), "must be above 0"),
+        (("--allow", "path"), "path needs a length with its unit"),
+    ):
+        refused = run(tmp_path, "compare", "a.nc", "b.nc", *words)
+        assert refused.returncode == 2 and said in refused.stderr, refused.stderr
+    assert run(tmp_path, "compare", "a.nc", "none.nc").returncode == 2
+    assert run(tmp_path, "compare", "a.nc", "missing.nc").returncode == 2
