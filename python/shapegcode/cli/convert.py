@@ -160,6 +160,8 @@ def run(args: argparse.Namespace) -> int:
     notes = ["original: the program with these feeds, not yet shaped"] if args.feed_schedule else []
     if result.tolerance_curve is not None and (price := result.tolerance_curve.sentence):
         notes.append(f"tolerance against time: {price}")
+    if result.proof is not None:
+        notes.append(f"{'nothing else changed' if not result.proof.refused else 'CHANGED'}: {result.proof.answer}")
     if target == failed and output.exists():
         notes.append(f"{output} is of an earlier run and was left alone")
     if result.unmeasured_tried and not result.rests_on:

@@ -121,7 +121,7 @@ class Comparison(Result):
         told = [self.count(kind) for kind in _ALWAYS]
         told += [each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission")]
         counts = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in told)
-        said = f"{counts} unchanged; path within {self.path_um:.1f} um"
+        said = f"{counts} unchanged; path within {self.path_um:.1f} µm"
         refused = list(self.refused)
         if not refused:
             return said

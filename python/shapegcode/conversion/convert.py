@@ -17,6 +17,7 @@ from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.curve import CutCurves, ToleranceCurve
 from shapegcode.conversion.cuts import CutOutcome, chosen_cuts, outcome_of, tools_of_cuts
 from shapegcode.conversion.operating import at_the_control
+from shapegcode.conversion.proof import prove
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids
 from shapegcode.conversion.recommendation import Situation, benefits, recommend
 from shapegcode.conversion.restart_points import restart_points
@@ -452,6 +453,11 @@ class _Run:
         between = self.rapid_vibration
         if rapids is not None and rapids.outcome.shaped:
             between = self.pool.submit(rapid_vibration_um, settled.emitted, self.model)
+        rapids_shaped = rapids is not None and rapids.outcome.shaped > 0
+        proving = None
+        # Without header comments nothing tells shaped rapids from cuts.
+        if written.placed and (machine.emission.header or not rapids_shaped):
+            proving = self.pool.submit(prove, program, settled.emitted, machine, rapids_shaped=rapids_shaped)
         every = sorted(
             [*zip(written.placed, settled.figures, strict=True), *self._unchanged(settled, rapids)],
             key=lambda pair: pair[0].original_lines,
@@ -463,11 +469,12 @@ class _Run:
         cutting = figures.region_time_s()
         cuts = self._cuts(settled, figures)
         times = self._cycle_time_s(settled, emitted_s.result(), cutting, rapids)
+        proof = None if proving is None else proving.result()
         grade, reason = recommend(
             Situation(
                 figures.all_cuts, len(written.placed), original_within=original_within,
                 could_gain=any(cut.gain_um >= machine.shaping.least_gain_um for cut in cuts),
-                benefit=self._is_benefit(settled),
+                benefit=self._is_benefit(settled), other_changes=proof.refused if proof is not None else (),
             )
         )  # fmt: skip
         warnings = self._warnings(written, figures)
@@ -484,6 +491,7 @@ class _Run:
             reason=reason,
             cuts=cuts,
             tolerance_curve=self._curve(times) if self.choice.tolerance_curve else None,
+            proof=proof,
             advice=filter_advice(program, machine, self.model, self.judge, [run.result() for run in self.originals]),
             cycle_time_s=times,
             cutting_time_s=cutting,

@@ -30,6 +30,7 @@ from shapegcode.results.page.model import (
     NextStep,
     Notes,
     Section,
+    Text,
 )
 from shapegcode.results.result import Pair
 from shapegcode.results.table import Column, Table
@@ -86,6 +87,9 @@ def sections_of(conversion: Conversion, made: Made | None = None) -> tuple[Secti
 def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     how = "Each card: original → emitted. The limit is what the emitted figure is judged by."
     yield Section("gain", "What it gains", (Figures(tuple(_figures(conversion))),), how=how)
+    if conversion.proof is not None:
+        how = "The emitted program was read once more and compared with the original; shapegcode compare does the same."
+        yield Section("proof", "What did not change", (Text((conversion.proof.answer,)),), how=how)
     yield from warnings_of(conversion)
     yield next_steps(conversion, *_further(conversion))
     if conversion.cases:

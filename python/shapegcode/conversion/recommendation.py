@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from shapegcode.comparison.result import ProgramDifference
 from shapegcode.verdict.figures import RegionVerdict
 
 __all__ = ["GRADES", "Grade", "Situation", "benefits", "recommend"]
@@ -40,6 +41,7 @@ class Situation:
         original_within: every cut of the original keeps its limits.
         could_gain: there is a cut in which shaping gains, or as far as is known would gain, the least gain.
         benefit: a shaped cut gains enough, see `benefits`.
+        other_changes: what else differs from the original; none, unless shapegcode has a defect.
     """
 
     cuts: Sequence[RegionVerdict]
@@ -47,6 +49,7 @@ class Situation:
     original_within: bool
     could_gain: bool
     benefit: bool
+    other_changes: Sequence[ProgramDifference] = ()
 
 
 def recommend(situation: Situation) -> tuple[Grade, str]:
@@ -61,6 +64,9 @@ def recommend(situation: Situation) -> tuple[Grade, str]:
     worse = next((_at(cut, why) for cut in situation.cuts for why in cut.worse), "")
     if worse:
         return "do not run", worse
+    for change in situation.other_changes:
+        had, has = change.original or "nothing", change.emitted or "nothing"
+        return "do not run", f"{change.place}: {change.kind} changed: {had} became {has}: please report this defect"
     if not situation.cuts:
         return "no benefit: run the original", "there is nothing to shape"
     if not situation.could_gain or (not situation.benefit and not situation.original_within):

@@ -11,6 +11,7 @@ from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.curve import ToleranceCurve, curve_table
 from shapegcode.conversion.cuts import CutOutcome, cut_table
 from shapegcode.conversion.operating import ControlNote, control_table, restart_table
+from shapegcode.conversion.proof import ChangeProof
 from shapegcode.conversion.rapids.result import RapidsOutcome
 from shapegcode.conversion.recommendation import Grade
 from shapegcode.conversion.restart_points import RestartPoint
@@ -53,6 +54,7 @@ class Conversion(PlayedFigures, Result):
         reason: of the recommendation, in words.
         cuts: every cut, shaped or left unchanged, with its gain and its price.
         tolerance_curve: what other contour tolerances cost in time; null: not worked out, or nothing can be shaped.
+        proof: that nothing but the shaped cuts changed; null: nothing was shaped.
         advice: a smaller filter of the control that would do without shaping; null: there is none.
         cycle_time_s: whole program: cuts, rapids with in-position wait, dwells, drilling cycles.
         cutting_time_s: the cuts alone, until the set-points rest.
@@ -86,6 +88,7 @@ class Conversion(PlayedFigures, Result):
     reason: str
     cuts: tuple[CutOutcome, ...]
     tolerance_curve: ToleranceCurve | None
+    proof: ChangeProof | None
     advice: FilterAdvice | None
     cycle_time_s: Pair[float]
     cutting_time_s: Pair[float]
