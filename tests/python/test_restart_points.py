@@ -163,6 +163,26 @@ def test_a_cut_of_unknown_position_has_none_and_says_why() -> None:
     assert interpret(known.text.decode()).lines[known.placed[0].last_line - 1].modal["distance"] == "G91"
 
 
+def test_a_further_coordinate_system_stands_in_the_list_and_not_in_the_cut() -> None:
+    conversion = converted(zigzag(8).replace("G17 G54\n", "G17\nG54.1 P3\n"), restart_interval_s=5.0)
+    assert {point.coordinate_system for point in conversion.restart_points} == {"G54.1P3"}
+    assert all("G90G94" in line for line in point_lines(conversion))
+
+
+@pytest.mark.parametrize("system", ["G55", "G59"])
+@pytest.mark.parametrize("end", ["\r\n", "\n\r\r"], ids=["CR LF", "LF CR CR"])
+def test_points_of_a_program_in_inch_with_other_line_ends(system: str, end: str) -> None:
+    text = zigzag(8).replace("G21", "G20").replace("G54", system)
+    text = re.sub(r"([XYZ])(-?[\d.]+)", lambda word: f"{word[1]}{float(word[2]) / 25.4:.4f}", text)
+    text = text.replace("F2400.", "F94.5").replace("F600.", "F23.6").replace("\n", end)
+    conversion = converted(text, restart_interval_s=5.0)
+    lines = conversion.text.decode().split(end)
+    assert len(conversion.restart_points) >= 3
+    for point in conversion.restart_points:
+        line = lines[point.line - 1]
+        assert re.fullmatch(rf"N{point.number}G17G20G90{system}G94G40G64G01X[-.\d]+Y[-.\d]+Z[-.\d]+F[\d.]+", line), line
+
+
 def test_without_a_place_of_rest_there_are_points_only_where_stops_are_asked_for() -> None:
     text = circles(3)
     none = converted(text, restart_interval_s=5.0)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.conversion.restart_points import PLACEHOLDER, CutRestarts, RestartMark, system_of
+from shapegcode.conversion.restart_points import EXTRA_SYSTEM, PLACEHOLDER, CutRestarts, RestartMark, system_of
 from shapegcode.machine import Machine
 from shapegcode.model.modes import slowest_mode
 
@@ -305,7 +305,10 @@ class _PointLines:
             return None
         feed = self._in_force(_FEED, end, b"").decode()
         plane = self._in_force(_PLANE, end, self._plane).decode()
-        codes = f"{PLACEHOLDER}G{plane}G{self._region.entry.units}G90{system_of(self._region.entry)}G94"
+        entry = self._region.entry
+        # G54.1 takes P, which a block of a cut shall not have: the list names it, and it is in force before the start.
+        system = "" if entry.coordinate_system == EXTRA_SYSTEM else system_of(entry)
+        codes = f"{PLACEHOLDER}G{plane}G{entry.units}G90{system}G94"
         for further in ("G40G64", "G40", ""):
             line = f"{codes}{further}G01{position}{feed}"
             if feed and len(line) <= self._max:

@@ -13,7 +13,19 @@ from shapegcode import _core
 from shapegcode.program import Program
 from shapegcode.verdict.placed import Placed
 
-__all__ = ["PLACEHOLDER", "CutRestarts", "FreeNumbers", "RestartMark", "RestartPoint", "restart_points", "system_of"]
+__all__ = [
+    "EXTRA_SYSTEM",
+    "PLACEHOLDER",
+    "CutRestarts",
+    "FreeNumbers",
+    "RestartMark",
+    "RestartPoint",
+    "restart_points",
+    "system_of",
+]
+
+EXTRA_SYSTEM = 541
+"""G54.1 as the core counts it."""
 
 PLACEHOLDER = "N00000"
 """N word of a restart point before the program that it stands in is put together."""
@@ -154,7 +166,7 @@ def system_of(state: _core.ModalState) -> str:
     Returns:
         Such as "G54" or "G54.1P3".
     """
-    extra = state.coordinate_system == 541
+    extra = state.coordinate_system == EXTRA_SYSTEM
     return f"G54.1P{state.coordinate_number}" if extra else f"G{state.coordinate_system}"
 
 
