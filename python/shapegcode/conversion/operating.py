@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
+import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad
@@ -27,7 +29,7 @@ _NAMED_LINES = 4
 _SHOWN_POINTS = 12
 _SINGLE_BLOCKS = 200  # simulated: the fastest ones
 _PRESSES_PER_S = 2.0
-_SWEEP_RAD = 3.0
+_FAST_RATIO, _FAST_BLOCKS = 0.5, 4000  # of the highest feed; of those so many, evenly spread, are looked at
 _CHUNK = 1 << 16  # bytes
 _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
@@ -164,12 +166,14 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: PlayedFig
     index = max(range(len(placed)), key=lambda each: max(figures.regions[each].residual_vibration_um.original))
     place, region = placed[index], figures.regions[index]
     blocks = place.blocks(emitted)
-    chords = np.diff(blocks.polyline(_SWEEP_RAD), axis=0)  # no arc is longer
-    lengths = np.linalg.norm(chords, axis=1)
-    velocity = chords / np.maximum(lengths, 1e-9)[:, None] * blocks.segment_feeds_mm_per_s[:, None]
+    feeds = blocks.segment_feeds_mm_per_s
+    fast = np.flatnonzero(feeds >= _FAST_RATIO * feeds.max())
+    fast = fast[:: math.ceil(len(fast) / _FAST_BLOCKS)]
     axes = model.machine.axes.as_tuple()
-    slowest = [min((slowest_mode(mode)[0] for mode in axis.modes), default=np.inf) for axis in axes]
-    fastest = np.argsort(-np.linalg.norm(velocity / np.array(slowest), axis=1), kind="stable")[:_SINGLE_BLOCKS]
+    slowest = np.array([min((slowest_mode(mode)[0] for mode in axis.modes), default=np.inf) for axis in axes])
+    # The speed that each puts into the modes, all at once; the softest axis counts most.
+    steps = np.array([_direction(blocks[int(one)]) for one in fast]) * feeds[fast, None]
+    fastest = fast[np.argsort(-np.linalg.norm(steps / slowest, axis=1), kind="stable")[:_SINGLE_BLOCKS]]
     offset = model.offset(place.region)
     mark_um = 0.0
     for one in sorted(int(each) for each in fastest):
@@ -182,6 +186,11 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: PlayedFig
         f"single block in lines {lines}: {_duration(time_s)} instead of {_duration(region.time_s.emitted)} "
         f"({len(blocks)} stops, two presses of cycle start a second), marks of up to {mark_um:.0f} µm"
     )
+
+
+def _direction(segment: _core.Segment) -> npt.NDArray[np.float64]:
+    chord = segment.end_mm - segment.start_mm
+    return chord / max(float(np.linalg.norm(chord)), 1e-9)
 
 
 def _duration(time_s: float) -> str:
