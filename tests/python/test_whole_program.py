@@ -16,9 +16,13 @@ from acceptance import PROGRAMS
 from command import run
 from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from judge.in_order import Way, deviation_um, missed_um
+from shapegcode import _core
 from shapegcode.conversion.curve import knee_of
 from shapegcode.conversion.recommendation import Situation, recommend
+from shapegcode.conversion.write import RegionWriter
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.result import Pair, Xyz
+from shapegcode.shaping.grid import choose_grid
 from shapegcode.verdict.figures import RegionVerdict
 
 # Fast facets that shake, a square that rounds its corners, a slow line that does nothing.
@@ -192,6 +196,38 @@ def test_the_curve_says_what_conversions_at_other_tolerances_take() -> None:
         if point.tolerance_um < 16.0:
             other = converted(MIXED, machine_with({"tolerance.contour_um": point.tolerance_um}), **prices)
             assert point.time_s == pytest.approx(other.cycle_time_s.emitted, rel=0.05), point
+
+
+def test_planned_times_are_those_of_the_shaped_command() -> None:
+    """Each tolerance planned after another one beside the shaper that gives every block out, from a cold start."""
+    machine = machine_with({})
+    program = sg.Program.from_text(part(FACETS), machine)
+    (region,) = program.regions
+    model, grid = MachineModel(machine), choose_grid(machine)
+    writer = RegionWriter(model, grid)
+    tolerances = [math.inf, 0.02, 0.012, 0.008]
+    options = writer.options(model.limits(), writer.tolerance(), model.offset(region))
+    planned = _core.plan_tolerances(region.path, grid.fir, options, tolerances)
+    times = [time_s for time_s, _ in planned]
+    assert times == sorted(times)
+    for tolerance_mm, (time_s, reached_mm) in zip(tolerances, planned, strict=True):
+        assert reached_mm <= tolerance_mm
+        cold = writer.options(model.limits(), writer.tolerance(tolerance_mm * 1e3), model.offset(region))
+        shaper = _core.RegionShaper(region.path, grid.fir, [], cold)
+        periods = 0
+        while (piece := shaper.next(1 << 17)) is not None:
+            periods += len(piece.middle_mm)
+        assert time_s == pytest.approx(periods * grid.block_period_s, rel=0.04)
+        assert shaper.is_slowed == (tolerance_mm < planned[0][1])
+
+
+def test_the_same_motion_is_recognised_whatever_its_lines() -> None:
+    one, other, faster = (
+        sg.Program.from_text(part(cut), machine_with({})).regions[0].path
+        for cut in (SQUARE, SQUARE.replace("Y20.", "(A COMMENT)\nY20."), SQUARE.replace("F5000.", "F5001."))
+    )
+    assert one.moves_as(other) and other.moves_as(one)
+    assert not one.moves_as(faster)
 
 
 def test_the_knee_is_where_the_curve_bends() -> None:
