@@ -195,7 +195,7 @@ def _said(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
         yield "controller.least_increment_mm", (answers.least_increment_mm, _ANSWERED)
     if answers.dnc_baud is not None:
         yield "controller.dnc_baud", (answers.dnc_baud, f"{_ANSWERED}: the line that feeds programs")
-    elif answers.delivery is not None:
+    elif answers.delivery not in (None, "dnc"):
         yield "controller.dnc_baud", (0, f"{_ANSWERED}: programs come from {answers.delivery}")
     if answers.program_memory_kb is not None:
         yield "controller.program_memory_bytes", (round(answers.program_memory_kb * 1024), _ANSWERED)
