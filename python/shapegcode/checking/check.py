@@ -41,7 +41,7 @@ _COMMENT = re.compile(r"\([^()\n]*\)?")
 _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
-_WORK_LIMIT = "controller.max_program_"  # in the message of every limit of a reading
+_WORK_LIMIT = re.compile(r"controller\.max_(program|expansion)_")  # in the message of every limit of a reading
 _ROUNDING = 1e-9
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
 # Of one reading (most_alarms in the core's reader).
@@ -191,7 +191,7 @@ def _whole_file(data: bytes, source: str, machine: Machine) -> Iterator[Finding]
 
 def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.alarms:
-        if _WORK_LIMIT in message:
+        if _WORK_LIMIT.search(message):
             # No control refuses it: it is more than is computed here.
             said = f"{message}: what follows is not checked"
             yield _finding("warning", "work_limit", 0, file or program.source, line, column, said)

@@ -13,6 +13,7 @@ from shapegcode._core import ProgramError
 from shapegcode.program.reading import program_bytes, program_loader, reader_options
 from shapegcode.program.several import place_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
+from shapegcode.program.turning import signs_of_turning
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -122,6 +123,10 @@ class Program:
 
         machine = machine or Machine.load("vx500")
         data = text.encode() if isinstance(text, str) else text
+        if not emitted and (turning := signs_of_turning(data)) is not None:
+            line, signs = turning
+            said = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"
+            raise located_error(source, line, 1, said)
         index = None if program_number is None else _index(data, program_number, source)
         options = reader_options(
             machine,
