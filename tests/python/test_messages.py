@@ -94,7 +94,7 @@ def test_a_turning_program_is_named(command: str, tmp_path: Path) -> None:
 def test_check_names_it_too(tmp_path: Path) -> None:
     (tmp_path / "shaft.nc").write_text(LATHE)
     done = run(tmp_path, "check", "shaft.nc", "-m", "vx500")
-    assert done.returncode == 1 and "this is a turning program" in done.stdout
+    assert done.returncode == 2 and "this is a turning program" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -120,9 +120,11 @@ def test_cutter_compensation_is_refused_in_two_lines_with_the_command_that_goes_
     """The command that it names, with a radius put in, converts the program."""
     (tmp_path / "pocket.nc").write_text(POCKET)
     done = run(tmp_path, "convert", "pocket.nc", "-m", "vx500", "-o", "out.nc")
-    what, go_on = done.stderr.removeprefix("shapegcode: ").splitlines()
+    what, go_on = (line.removeprefix("shapegcode: ") for line in done.stderr.splitlines())
     assert done.returncode == 2 and what.startswith("pocket.nc:6:1: ")
-    words = shlex.split(go_on.partition(" shapes ")[0].replace("MACHINE", "vx500").replace("RADIUS_IN_MM", "3"))
+    words = shlex.split(go_on.removeprefix("next: ").partition(" shapes ")[0])
+    assert words[4:5] == ["MACHINE"] and "input.tool_radius_mm.2=RADIUS_IN_MM" in words
+    words = [word.replace("MACHINE", "vx500").replace("RADIUS_IN_MM", "3") for word in words]
     assert words[0] == "shapegcode"
     assert run(tmp_path, *words[1:], "-o", "out.nc").returncode == 0
     kept = run(tmp_path, "convert", "pocket.nc", "-m", "vx500", "--compensation", "keep", "-o", "kept.nc")
@@ -147,7 +149,7 @@ def test_a_radius_of_zero_is_not_expanded(text: str, words: list[str], said: str
     for command in (["expand"], ["convert", "--compensation", "expand"]):
         done = run(tmp_path, *command, "pocket.nc", "-m", "vx500", *words, "-o", "out.nc")
         assert done.returncode == 2
-        assert done.stderr.startswith(f"shapegcode: pocket.nc:{line}:1: the radius of offset D")
+        assert done.stderr.startswith(f"shapegcode: pocket.nc:{line}:1: offset D")
         assert said in done.stderr
     # What keeps the moves as they are, and what only looks, goes on.
     assert run(tmp_path, "expand", "--compensation", "keep", "pocket.nc", "-m", "vx500", "-o", "k.nc").returncode == 0

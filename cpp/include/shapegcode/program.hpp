@@ -64,7 +64,7 @@ struct CodeBindings {
 /// at the line where it is passed: what is too much is never expanded first. A plain text of any length that `bytes`
 /// and `moves` allow is read; what a few lines expand to has limits of its own.
 struct WorkLimits {
-  std::uint64_t steps = 5'000'000;             ///< lines executed, each beyond its first time
+  std::uint64_t steps = 4'000'000;             ///< lines executed, each beyond its first time
   std::uint64_t moves = 100'000'000;           ///< moves, dwells, and blocks with machine functions
   std::uint64_t bytes = 1'000'000'000;         ///< of texts that are read
   std::uint64_t expansion_moves = 800'000;     ///< moves beyond one for each line of the texts

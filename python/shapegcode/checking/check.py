@@ -26,6 +26,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
+from shapegcode.program.memory import require_memory_for_lines
 from shapegcode.program.operating import no_room
 from shapegcode.program.reading import program_bytes
 from shapegcode.program.stamp import STAMP_BEGIN
@@ -46,6 +47,7 @@ _ROUNDING = 1e-9
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
 # Of one reading (most_alarms in the core's reader).
 _MOST_ALARMS = 200
+_MEMORY_PER_LINE = 350  # bytes
 
 
 def check(program: Program | str | Path, machine: Machine, *, program_number: int | str | None = None) -> Check:
@@ -97,6 +99,7 @@ def check_text(
         ProgramError: not to be read at all, without a place to point to.
     """
     data = text.encode() if isinstance(text, str) else text
+    require_memory_for_lines(data, source, _MEMORY_PER_LINE)
     found = list(_whole_file(data, source, machine))
     too_long = len(data) > machine.controller.max_program_bytes  # and no more of it may have been read
     short: ShortBlocks | None = None

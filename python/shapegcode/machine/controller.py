@@ -269,7 +269,7 @@ class Controller(TomlTable):
     max_program_steps: Annotated[int, Strict(), Field(ge=1, le=10**12)] = key(
         "blocks that a program may execute beyond one for each of its lines; more count as endless",
         unit="blocks",
-        default=5_000_000,
+        default=4_000_000,
     )
     max_program_moves: Annotated[int, Strict(), Field(ge=1, le=10**9)] = key(
         "moves that a program may come to, with the pecks of drilling cycles, dwells and blocks with M, S, T, and "

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 RADIUS_NOT_KNOWN = "the radius of offset D"
 """How the reader's warning of a G41 or G42 begins whose radius nothing gives."""
 
-_ZERO_RADIUS = re.compile(r"the radius of offset D(\d+) is 0\b")
+_ZERO_RADIUS = re.compile(r"offset D(\d+) has a radius of 0\b")
 _KEPT = "cutter compensation is on and not expanded"
 _MEMORY_PER_BLOCK = 100
 """Bytes of memory for each block that a conversion writes (docs/evidence/benchmarks.md)."""
@@ -93,9 +93,9 @@ def _undecided(program: Program, line: int, file: str, said: str, machine: Machi
     number = str(int(found[1])) if found else "1"
     known = number in machine.input.tool_radius_mm
     radius = "" if known else f" --set input.tool_radius_mm.{number}=RADIUS_IN_MM"
-    command = f"shapegcode convert {shlex.quote(Path(program.source).name)} -m MACHINE --compensation"
+    command = f"shapegcode convert {shlex.quote(program.source)} -m MACHINE --compensation"
     go_on = f"{command} expand{radius} shapes the path of that radius; --compensation keep leaves these moves unchanged"
-    return located_error(file or program.source, line, 1, f"{said}\n{go_on}")
+    return located_error(file or program.source, line, 1, f"{said}\nnext: {go_on}")
 
 
 def _radius_of(number: str) -> str:

@@ -7,9 +7,12 @@ from pathlib import Path
 
 from shapegcode._core import ProgramError
 
-__all__ = ["available_bytes", "require_memory"]
+__all__ = ["available_bytes", "require_memory", "require_memory_for_lines"]
 
 _CGROUP = Path("/sys/fs/cgroup")
+_PER_LINE = 130
+"""Bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)."""
+_SMALL_BYTES = 2**20
 
 
 def available_bytes() -> int | None:
@@ -40,6 +43,22 @@ def require_memory(source: str, needed: int, what: str) -> None:
             f"{source}:1:1: {what}: some {needed} bytes of memory are needed and {available} are available; split the "
             "program, or take a machine with more memory"
         )
+
+
+def require_memory_for_lines(text: bytes, source: str, per_line: int = _PER_LINE) -> None:
+    """Refuse a program text whose lines the memory would not hold; one of less than a megabyte is not counted.
+
+    Args:
+        text: of the program.
+        source: names it in the message.
+        per_line: bytes for each line.
+
+    Raises:
+        ProgramError: more than what is available.
+    """
+    if len(text) > _SMALL_BYTES:
+        lines = text.count(b"\n")
+        require_memory(source, lines * per_line, f"{lines} lines are to be read")
 
 
 def _of_meminfo(name: str) -> int | None:

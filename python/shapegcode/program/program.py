@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode._core import ProgramError
+from shapegcode.program.memory import require_memory_for_lines
 from shapegcode.program.reading import program_bytes, program_loader, reader_options
 from shapegcode.program.several import place_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
@@ -123,6 +124,7 @@ class Program:
 
         machine = machine or Machine.load("vx500")
         data = text.encode() if isinstance(text, str) else text
+        require_memory_for_lines(data, source)
         if not emitted and (turning := signs_of_turning(data)) is not None:
             line, signs = turning
             said = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 __all__ = ["PROGRAM_SUFFIXES", "program_bytes", "program_loader", "reader_options"]
 
 _NO_LIMIT = 2**63
-_MEMORY_PER_BYTE = 6
-"""Bytes of memory for each of a program text that is read: text, regions and path (docs/evidence/benchmarks.md)."""
 
 
 def reader_options(
@@ -151,7 +149,7 @@ def program_bytes(path: str | Path, most: int) -> bytes:
     try:
         with Path(path).open("rb") as file:
             size = min(os.fstat(file.fileno()).st_size, most + 1)  # 0 of what is no file
-            require_memory(str(path), size * _MEMORY_PER_BYTE, f"{size} bytes of program text are to be read")
+            require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
             return file.read(most + 1)
     except OSError as error:
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error

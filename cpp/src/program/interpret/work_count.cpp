@@ -26,11 +26,11 @@ std::optional<std::string> WorkCount::move(const Segment& segment) {
 std::optional<std::string> WorkCount::wait(double seconds, const char* what) { return add(seconds, what, 0.0); }
 
 std::optional<std::string> WorkCount::passed(double moves) const {
-  if (moves > static_cast<double>(limits_.moves)) {
-    return fmt::format("{} moves (controller.max_program_moves)", limits_.moves);
-  }
   if (moves > static_cast<double>(limits_.expansion_moves) + static_cast<double>(lines_)) {
     return fmt::format("{} moves beyond one for each line (controller.max_expansion_moves)", limits_.expansion_moves);
+  }
+  if (moves > static_cast<double>(limits_.moves)) {
+    return fmt::format("{} moves (controller.max_program_moves)", limits_.moves);
   }
   return std::nullopt;
 }

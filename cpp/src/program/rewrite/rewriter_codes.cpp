@@ -107,7 +107,7 @@ void MoveRewriter::set_compensation(int code) {
     return;
   }
   if (*radius == 0.0) {
-    interpreter_.warn_at(origin_, fmt::format("the radius of offset D{} is 0{}: G{} shifts the path by nothing", number,
+    interpreter_.warn_at(origin_, fmt::format("offset D{} has a radius of 0{}: G{} shifts the path by nothing", number,
                                               named ? "" : ", as there is no D", code));
   }
   compensation_ = code;
