@@ -207,9 +207,11 @@ void register_gcode(py::module_& module) {
 
   py::class_<WorkLimits>(module, "WorkLimits", "What a program may ask at most, counted while it is read.")
       .def(py::init<>())
-      .def_readwrite("steps", &WorkLimits::steps, "Lines executed, each as often as it runs.")
+      .def_readwrite("steps", &WorkLimits::steps, "Lines executed, each beyond its first time.")
       .def_readwrite("moves", &WorkLimits::moves, "Moves, dwells, and blocks with machine functions.")
-      .def_readwrite("bytes", &WorkLimits::bytes, "Of texts that are read, and of the plain text they come to.")
+      .def_readwrite("bytes", &WorkLimits::bytes, "Of texts that are read.")
+      .def_readwrite("expansion_moves", &WorkLimits::expansion_moves, "Moves beyond one for each line of the texts.")
+      .def_readwrite("expansion_bytes", &WorkLimits::expansion_bytes, "Of the plain text beyond those of the texts.")
       .def_readwrite("seconds", &WorkLimits::seconds, "Least time, s.")
       .def_readwrite("feed_mm_per_s", &WorkLimits::feed_mm_per_s, "Highest speed of each axis while cutting, mm/s.")
       .def_readwrite("rapid_mm_per_s", &WorkLimits::rapid_mm_per_s, "Of each axis in a rapid, mm/s.")

@@ -1585,10 +1585,26 @@ class WorkLimits:
     @property
     def bytes(self) -> int:
         """
-        Of texts that are read, and of the plain text they come to.
+        Of texts that are read.
         """
     @bytes.setter
     def bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def expansion_bytes(self) -> int:
+        """
+        Of the plain text beyond those of the texts.
+        """
+    @expansion_bytes.setter
+    def expansion_bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def expansion_moves(self) -> int:
+        """
+        Moves beyond one for each line of the texts.
+        """
+    @expansion_moves.setter
+    def expansion_moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def feed_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -1633,7 +1649,7 @@ class WorkLimits:
     @property
     def steps(self) -> int:
         """
-        Lines executed, each as often as it runs.
+        Lines executed, each beyond its first time.
         """
     @steps.setter
     def steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:

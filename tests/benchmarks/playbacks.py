@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import processes
 import workload
 
 import shapegcode as sg
@@ -28,7 +27,7 @@ def main() -> int:
     parser.add_argument("--lines", type=int, default=100_000, help="G01 lines of the program (default: %(default)s)")
     parser.add_argument("--repetitions", type=int, default=8, help="of each (default: %(default)s)")
     arguments = parser.parse_args()
-    machine = sg.Machine.load("vx500").with_values(processes.ROOM)
+    machine = sg.Machine.load("vx500")
     with tempfile.TemporaryDirectory(prefix="shapegcode-bench-") as name:
         file = Path(name) / "program.nc"
         workload.write_program(file, arguments.lines)

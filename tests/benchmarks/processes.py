@@ -9,6 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 ROOT = Path(__file__).resolve().parents[2]
 _LAUNCHER = Path(__file__).with_name("launch.py")
@@ -60,11 +61,7 @@ class Rs274:
         return [self._program, "-g", "-t", self._tools, "-v", self._variables, program]
 
 
-#: More than the machine file allows by itself: what is measured here needs more than half a gigabyte.
-ROOM = {"controller.max_program_moves": 10**8, "controller.max_program_bytes": 4 * 10**9}
-
-
-def convert(program: Path, output: Path, values: Mapping[str, int] = ROOM) -> Run:
+def convert(program: Path, output: Path, values: Mapping[str, int] = MappingProxyType({})) -> Run:
     """`shapegcode convert` for the built-in VX500 with some values moved, with round trip and plant."""
     command = [Path(sys.executable).with_name("shapegcode"), "convert", program, "-m", "vx500", "-o", output]
     command += [word for key, value in values.items() for word in ("--set", f"{key}={value}")]

@@ -90,7 +90,7 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
     if (found := rs274.count_feed_moves(short)) != 1000:
         raise RuntimeError(f"rs274 reads {found} moves of 1000: the comparison would be void")
 
-    machine = sg.Machine.load("vx500").with_values(processes.ROOM)
+    machine = sg.Machine.load("vx500")
     grid = choose_grid(machine)
     model = MachineModel(machine)
     limits, writer = model.limits(), RegionWriter(model, grid)
@@ -133,7 +133,7 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
 
 def _timing_rows(program: Path, repetitions: int) -> list[Row]:
     """Cycle time in closed form beside the same question answered by giving every set-point."""
-    machine = sg.Machine.load("vx500").with_values(processes.ROOM)
+    machine = sg.Machine.load("vx500")
     read = sg.Program.read(program, machine).core
     rows = []
     for motion in (_core.MotionKind.after_interpolation, _core.MotionKind.look_ahead):

@@ -148,7 +148,7 @@ TEST_CASE("interpreter: a program of more drilling moves than memory holds is re
   const Refusal repeated = refusal(framed(cycle + "K3\nG80\n"), options);
   CHECK(repeated.message ==
         "drilling cycle G83 feeds down 10 times in 3 hole(s), 10.000 mm deep: with its 90 moves the program "
-        "comes to 90 (limit 64, controller.max_program_moves)");
+        "comes to 90, more than 64 moves (controller.max_program_moves)");
   CHECK(repeated.line == 4);
   CHECK(repeated.column == 15);
   // What cycles came to before counts.

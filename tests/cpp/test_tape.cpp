@@ -86,6 +86,9 @@ TEST_CASE("tape: what other controls leave out") {
   CHECK(lines.regions[0]->path->segments()[1].kind == SegmentKind::line);
   check_refused(framed("G01X1.F100.\nG02X5.Y5.\n"), 5, 1, {"arc without R"});
   CHECK(warns(read_program("%\nG90\nG0X0Y0\nM30\n%\n"), "neither G20 nor G21", 3));
+  // The example is a word of that line.
+  CHECK(warns(read_program("%\nG90\nG0X0Y12.5\nM30\n%\n"),
+              "Y12.5 is read as 12.5 mm, and would be 317.5 mm in inch (power_on.units)", 3));
 }
 
 TEST_CASE("tape: a macro that asks what only the control knows is a call that nobody looks into") {

@@ -107,7 +107,7 @@ TEST_CASE("work limits: moves are counted while loops, calls and cycles are expa
   const std::string nested = "F500.\nM98 P0002 L9999\nM30\nO0002\nM98 P0003 L9999\nM99\nO0003\nG01 X1.\nX0\nM99\n%\n";
   const Refused calls = refused(head + nested, options);
   CHECK(calls.message ==
-        "more than 50 moves up to here (controller.max_program_moves); called by O2 line 9; called by "
+        "up to here more than 50 moves (controller.max_program_moves); called by O2 line 9; called by "
         "O1 line 6");
   CHECK(calls.line == 12);
   const Refused loop = refused(head + "F500.\n#1=0\nWHILE[#1EQ0]DO1\nG01 X1.\nX0\nEND1\n" + tail, options);
@@ -121,17 +121,44 @@ TEST_CASE("work limits: moves are counted while loops, calls and cycles are expa
   CHECK(holds(refused(head + "M98 P0002 L9999\nM30\nO0002\nM08\nM99\n%\n", options).message, "max_program_moves"));
 }
 
-TEST_CASE("work limits: every line that is executed is a step, also of a text without calls") {
+TEST_CASE("work limits: a plain text of any length is read, what few lines expand to is limited") {
+  ReaderOptions options = known();
+  options.limits.expansion_moves = 10;
+  options.limits.expansion_bytes = 100;
+  options.limits.steps = 10;
+  std::string lines = "F500.\n";
+  for (int k = 1; k <= 500; ++k) {
+    lines += "G01 X" + std::to_string(k) + ".\n";
+  }
+  CHECK(read_program(head + lines + tail, options).move_count == 501);
+  options.limits.steps = 10'000;
+  const std::string loop = head + "F500.\n#1=0\nWHILE[#1EQ0]DO1\nG01 X1.\nX0\nEND1\n" + tail;
+  options.limits.expansion_bytes = 10'000;
+  const Refused moves = refused(loop, options);  // twelve lines, the last of them empty
+  CHECK(moves.message == "up to here more than 10 moves beyond one for each line (controller.max_expansion_moves)");
+  CHECK((moves.line == 8 || moves.line == 9));
+  options.limits.expansion_moves = 10'000;
+  options.limits.expansion_bytes = 100;
+  const Refused bytes = refused(loop, options);
+  CHECK(bytes.message ==
+        "up to here the expanded program is more than 100 bytes longer than the text (controller.max_expansion_bytes)");
+  // A cut of a drilling cycle is a move beyond its line, and counted before the first one.
+  options.limits.expansion_moves = 40;
+  CHECK(holds(refused(head + "G83 Z-50. R0. Q.5 F600.\n" + tail, options).message,
+              "more than 40 moves beyond one for each line (controller.max_expansion_moves)"));
+}
+
+TEST_CASE("work limits: every line that is executed beyond once is a step") {
   ReaderOptions options = known();
   options.limits.steps = 20;
   std::string lines;
   for (int k = 0; k < 30; ++k) {
     lines += "(LINE)\n";
   }
-  const Refused plain = refused(head + lines + tail, options);
-  CHECK(plain.message == "more than 20 blocks executed (controller.max_program_steps)");
-  CHECK(plain.line == 22);  // the first line is the '%'
-  CHECK(holds(refused(head + "N10 GOTO 10\n" + tail, options).message, "does not seem to end"));
+  CHECK(refused(head + lines + tail, options).message.empty());
+  CHECK(holds(refused(head + "N10 GOTO 10\n" + tail, options).message,
+              "more than 20 blocks executed beyond one for each line (controller.max_program_steps): the program does "
+              "not seem to end"));
   // A program without a line of its own is called, too.
   const std::string empty = head + "M98 P0002 L99999\nM30\nO0002\n%\n";
   CHECK(holds(refused(empty, options).message, "more than 20 blocks"));
@@ -148,7 +175,7 @@ TEST_CASE("work limits: every line that is executed is a step, also of a text wi
   CHECK(holds(refused(head + macros + "M30\n" + bodies + "%\n", options).message, "more than 60 blocks"));
 }
 
-TEST_CASE("work limits: bytes of the text, of called files, and of what they are expanded to") {
+TEST_CASE("work limits: bytes of the text, of called files, and beyond them of what they are expanded to") {
   ReaderOptions options = known();
   const std::string text = head + "G01 X1. F500.\n" + tail;
   options.limits.bytes = text.size();
@@ -166,9 +193,9 @@ TEST_CASE("work limits: bytes of the text, of called files, and of what they are
   options.limits.bytes = caller.size() + 100;
   CHECK(holds(refused(caller, options).message, "controller.max_program_bytes"));
   options.load_program = {};
-  options.limits.bytes = 2000;
+  options.limits.expansion_bytes = 2000;
   const Refused loop = refused(head + "F500.\nM98 P0002 L9999\nM30\nO0002\nG01 X1.\nX0\nM99\n%\n", options);
-  CHECK(holds(loop.message, "more than 2000 bytes of plain text up to here (controller.max_program_bytes)"));
+  CHECK(holds(loop.message, "more than 2000 bytes longer than the text (controller.max_expansion_bytes)"));
   CHECK(loop.line >= 8);
 }
 

@@ -355,6 +355,7 @@ def test_the_command_writes_once_and_fits(tmp_path: Path) -> None:
     jsonschema.validate(report, schema(sg.Characterisation))
     assert report["warnings"] == []
     assert report["output"] == str(tmp_path / "m.toml")
+    assert report["next_step"] == f"shapegcode machine show {tmp_path / 'm.toml'} explains it"
     assert report["files"] == [str(tmp_path / "t" / "RESULTS.toml")]
     sum_of_both = next(each for each in report["findings"] if each["quantity"] == "cutting time constant + bell time")
     assert sum_of_both["key"] == "controller.time_constant_s"

@@ -195,6 +195,11 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "--force" in capsys.readouterr().err
     assert output.read_bytes() == before
     assert main([*argv, "--force"]) == 0
+    said = capsys.readouterr().out
+    assert len(said.splitlines()) <= 30 and "rapid_mm_per_min" in said
+    assert f"identify TAP.csv --update {output}" in said.splitlines()[-1]
+    assert main([*argv, "--force", "--verbose"]) == 0
+    assert "line 6: 1420 A1 P20000.0" in capsys.readouterr().out
     assert main(["machine", "import", "--help"]) == 0
     assert "  shapegcode machine import" in capsys.readouterr().out
 

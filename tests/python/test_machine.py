@@ -70,7 +70,7 @@ def test_keys_that_describe_the_controller_have_their_documented_defaults() -> N
     assert controller.feed_forward_ratio.as_tuple() == (0, 0, 0)
     assert (controller.in_position, controller.in_position_width_um.as_tuple()) == ("measured", (20, 20, 20))
     assert (controller.offset_memory, controller.nesting_limit_subprogram) == ("C", 10)
-    assert controller.max_program_steps == 10_000_000
+    assert controller.max_program_steps == 4_000_000
     assert controller.no_buffer_m_codes == ()
     assert (machine.times.tool_change_s, machine.times.m_function_s) == (0, 0)
 

@@ -193,6 +193,7 @@ def test_machine_file_and_command(tmp_path: Path) -> None:
         "--plots", str(tmp_path / "plots"),
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+    assert f"next: shapegcode machine show {out}" in done.stdout and "-o FILE" not in done.stdout
     machine = sg.Machine.load(out)
     assert machine.controller.position_gain_per_s.x == pytest.approx(35.0, rel=0.01)
     assert machine.controller.feed_forward_ratio.y == pytest.approx(0.5, abs=0.01)

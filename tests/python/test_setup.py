@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import pty
 import re
+import select
+import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -117,13 +121,11 @@ def test_a_dump_and_a_tap_test_are_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('rapid_mm_per_min = 24000\n', "name"),
         ('name = "Fräse"\nrapid_mm_per_min = 9000\n', "plain ASCII"),
-        ('name = "A"\n', "rapid_mm_per_min is missing"),
         ('name = "A"\nrapid_mm_per_min = -1\n', "rapid_mm_per_min"),
         ('name = "A"\nrapid_mm_per_min = 9000\nspindle = 3\n', "spindle"),
         ('name = "A"\nrapid_mm_per_min = 9000\ndelivery = "pigeon"\n', "delivery"),
-        ('name = "A"\nrapid_mm_per_min = 9000\ndelivery = "dnc"\n', "dnc_baud is missing"),
+        ('name = "A"\nrapid_mm_per_min = 9000\ndnc_baud = 9600\n', 'delivery is not "dnc"'),
         ('name = "A"\nrapid_mm_per_min = 9000\nmodes = { x = "none.csv" }\n', "none.csv"),
         ('name = "A"\nrapid_mm_per_min = 9000\nmodes = { x = "5000:3" }\n', "a.toml:3: modes.x"),
         ('name = "A"\nrapid_mm_per_min = 24\n', "24.0: must be 100 to 500000 (unit: mm/min; 24 m/min are 24000)"),
@@ -137,6 +139,12 @@ def test_bad_answers_are_refused_and_nothing_is_written(text: str, said: str, tm
     assert not (tmp_path / "m.toml").exists()
 
 
+def test_a_line_of_unknown_speed_is_a_warning(tmp_path: Path) -> None:
+    """Nobody can say then whether blocks arrive in time; the speed of the line is left at its default."""
+    assert "set controller.dnc_baud" in answered(tmp_path, 'delivery = "dnc"\n')
+    assert "controller" not in tomllib.loads((tmp_path / "m.toml").read_text())
+
+
 def test_an_existing_file_stays(tmp_path: Path) -> None:
     """Also without a terminal the reason is said."""
     (tmp_path / "m.toml").write_text("mine")
@@ -146,7 +154,7 @@ def test_an_existing_file_stays(tmp_path: Path) -> None:
     assert alone.returncode == 2 and "--answers FILE" in alone.stderr
 
 
-DOWN, ENTER = "\x1b[B", "\r"
+DOWN, UP, ENTER = "\x1b[B", "\x1b[A", "\r"
 
 
 @pytest.fixture
@@ -160,20 +168,20 @@ def test_the_dialogue_asks_until_the_answers_do(typed: Any, capsys: pytest.Captu
     """Choices by arrow keys, numbers by typing; a bad one is not taken; each answer is explained."""
     keys = [
         "VMC-3" + ENTER,  # name
-        ENTER,  # control: fanuc
+        DOWN + ENTER,  # control: fanuc
         ENTER,  # no dump
         "fast" + ENTER + "\x7f" * 4 + "24" + ENTER,  # rapid: refused, and in mm/min as well
         " m/min" + ENTER,
-        ENTER,  # feed: nobody knows
+        ENTER,  # feed: not known yet
         "4000, 4000, 3000" + ENTER,  # acceleration
-        ENTER,  # increment: nobody knows
-        DOWN + ENTER,  # delivery: dnc
+        ENTER,  # increment: not known yet
+        DOWN * 2 + ENTER,  # delivery: dnc
         "9600" + ENTER,
-        DOWN + ENTER,  # look-ahead: G05.1
+        DOWN * 2 + ENTER,  # look-ahead: G05.1
         "10" + ENTER,  # contour
-        DOWN + ENTER + "46:3" + ENTER + "\x7f0.02" + ENTER,  # X: known; a damping ratio of 3 is refused
-        DOWN + DOWN + ENTER,  # Y: rigid
-        DOWN + DOWN + DOWN + ENTER,  # Z: nobody knows
+        DOWN * 2 + ENTER + "46:3" + ENTER + "\x7f0.02" + ENTER,  # X: known; a damping ratio of 3 is refused
+        DOWN * 3 + ENTER,  # Y: rigid
+        ENTER,  # Z: not known yet
     ]
     typed.send_text("".join(keys))
     answers = ask_all()
@@ -196,7 +204,7 @@ def test_a_dump_that_lacks_the_rapids_has_them_asked(
     Path("no.txt").write_text("hello\n")
     Path("p.txt").write_text("%\nN01430Q1A1P8000.0A2P6000.0A3P8000.0\n%\n")
     name = "no.txt" + ENTER + "\x7f" * 6 + "p.txt" + ENTER
-    rest = DOWN * 3 + ENTER + ENTER + ENTER + (DOWN * 3 + ENTER) * 3  # delivery, look-ahead, contour, modes
+    rest = ENTER * 6  # delivery, look-ahead, contour, modes
     typed.send_text("HM" + ENTER + ENTER + name + "20000" + ENTER + rest)
     answers = ask_all()
     assert answers.dump == "p.txt" and answers.rapid_mm_per_min is not None
@@ -204,9 +212,83 @@ def test_a_dump_that_lacks_the_rapids_has_them_asked(
     axis = tomllib.loads(machine)["axes"]["y"]
     assert (axis["rapid_mm_per_min"], axis["max_feed_mm_per_min"]) == (20000.0, 6000.0)
     assert re.search(r"max_acceleration_mm_s2 = .*# assumed", machine)
-    alone = sg.read_answers({"name": "HM", "dump": "p.txt"})
-    with pytest.raises(sg.AnswersError, match="rapid_mm_per_min: missing"):
-        sg.set_up(alone)
+    alone = sg.set_up(sg.read_answers({"name": "HM", "dump": "p.txt"})).text
+    assert tomllib.loads(alone)["axes"]["y"]["max_feed_mm_per_min"] == 6000.0
+    assert len(re.findall(r"rapid_mm_per_min = 24000.0  # assumed", alone)) == 3
+
+
+def test_back_and_another_answer(typed: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`<` or the last choice goes to the question before, also over those that were left out; files are taken back."""
+    monkeypatch.chdir(tmp_path)
+    keys = [
+        "<" + ENTER + "A" + ENTER,  # name: nothing lies before it
+        DOWN * 2 + ENTER,  # control: another one, so that no dump is asked for
+        "<" + ENTER + DOWN + ENTER,  # rapid: back to the control, which is a FANUC one
+        "none.txt" + ENTER + "\x7f" * 8 + ENTER,  # dump: no such file, so none
+        "<" + ENTER + ENTER,  # rapid: back to the dump, and on
+        "9000" + ENTER + "<" + ENTER + ENTER,  # feed: back to the rapid, which is not known after all
+        ENTER * 3,  # feed, acceleration, increment
+        DOWN * 2 + ENTER + "<" + ENTER + DOWN + ENTER,  # delivery: a line, or rather the memory
+        "64" + ENTER,
+        UP + ENTER + "32" + ENTER + DOWN * 2 + ENTER,  # look-ahead: back to the memory, and G05.1
+        ENTER,  # contour
+        DOWN + ENTER + "<" + ENTER + DOWN * 3 + ENTER,  # X: tapped, back, rigid
+        DOWN + ENTER + "none.csv" + ENTER + "\x7f" * 8 + ENTER,  # Y: tapped, no such file, not known yet
+        UP + ENTER + DOWN * 2 + ENTER + "40" + ENTER,  # Z: back to Y, which is known
+        DOWN * 2 + ENTER + "<" + ENTER + ENTER,  # Z: known, taken back, not known yet
+    ]
+    typed.send_text("".join(keys))
+    assert ask_all().model_dump(exclude_unset=True) == {
+        "name": "A",
+        "control": "fanuc",
+        "delivery": "memory",
+        "program_memory_kb": 32.0,
+        "look_ahead": "G05.1",
+        "modes": {"x": "rigid", "y": "40"},
+    }
+
+
+def test_enter_at_every_question_claims_nothing(tmp_path: Path) -> None:
+    """At a terminal: a machine file that every command reads, whose every value is assumed or a default."""
+    shown = at_a_terminal(tmp_path, "setup", "-o", "m.toml")
+    questions = shown.count("not known yet")
+    assert questions >= 12, shown
+    machine = sg.Machine.load(tmp_path / "m.toml")
+    origins = {value.key: value.origin for value in machine.values()}
+    assert {key for key, origin in origins.items() if origin not in ("assumed", "default")} == {"name", "description"}
+    assert "answered" not in (tmp_path / "m.toml").read_text()
+    assert not any(axis.modes or axis.rigid for axis in machine.axes.as_tuple())
+    assert run(tmp_path, "machine", "show", "m.toml").returncode == 0
+    (tmp_path / "part.nc").write_text(PART)
+    assert run(tmp_path, "simulate", "part.nc", "-m", "m.toml").returncode == 0
+    nothing = run(tmp_path, "convert", "part.nc", "-m", "m.toml", "-o", "o.nc")
+    assert "no vibration mode" in nothing.stderr and "--tap-plan" in nothing.stderr
+    mode = [f"axes.{axis}.modes=[{{frequency_hz=46, damping_ratio=0.02}}]" for axis in "xy"]
+    done = run(tmp_path, "convert", "part.nc", "-m", "m.toml", "-o", "o.nc", "--set", mode[0], "--set", mode[1])
+    assert done.returncode == 0, done.stderr
+
+
+def at_a_terminal(folder: Path, *words: str) -> str:
+    """A command at a pseudo-terminal; Enter is pressed wherever it waits for an answer. What was shown."""
+    child, terminal = pty.fork()
+    if child == 0:
+        os.chdir(folder)
+        os.environ |= {"PYTHONPATH": str(ROOT / "python"), "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1"}
+        os.execv(sys.executable, [sys.executable, "-m", "shapegcode", *words])
+    shown, pressed = "", 0
+    while True:
+        if not select.select([terminal], [], [], 0.3)[0]:  # it waits for an answer, or works
+            assert pressed < 100, shown
+            pressed += os.write(terminal, ENTER.encode()) if "?" in shown else 0
+            continue
+        try:
+            shown += os.read(terminal, 65536).decode(errors="replace")
+        except OSError:  # the command has ended, and with it the terminal
+            break
+    _, status = os.waitpid(child, 0)
+    os.close(terminal)
+    assert os.waitstatus_to_exitcode(status) == 0, shown
+    return shown
 
 
 def test_giving_up_writes_nothing(typed: Any) -> None:
@@ -230,6 +312,9 @@ def test_show_ranks_what_nobody_measured_on_a_program(tmp_path: Path) -> None:
     )
     assert [row["key"] for row in report["matters"]] == [row.key for row in conversion.rests_on]
     assert f"most of all {conversion.rests_on[0].key}" in ranked.stdout.splitlines()[0]
+    assert len(ranked.stdout.splitlines()) <= 30
+    whole = run(tmp_path, "machine", "show", "m.toml", "--for", "part.nc", "--verbose")
+    assert "largest cutting feed of this axis" in whole.stdout and "largest cutting feed" not in ranked.stdout
 
 
 def test_without_any_mode_the_axis_to_tap_first_is_named(tmp_path: Path) -> None:

@@ -288,6 +288,7 @@ def test_the_taper_gives_the_coefficients_behind_its_records(tmp_path: Path) -> 
     assert [each["spindle_rev_per_min"] for each in report["passes"]] == pytest.approx([1782.0] * 3, rel=2e-3)
     assert any("the feed was" in note for note in report["warnings"])
     assert report["left_out"] == []
+    assert report["next_step"].startswith("put [cutting]") and "-o FILE" not in report["next_step"]
     text = (tmp_path / "cutting.toml").read_text(encoding="utf-8")
     tool = Tool.from_toml(TOOL.partition("[cutting]")[0] + text)
     assert tool.coefficients().specific_exponent == pytest.approx(found["specific_exponent"]["value"], rel=1e-5)

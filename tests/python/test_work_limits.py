@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
 
 import shapegcode as sg
+from command import run_process
 from shapegcode.cli import main
 
 HEAD = "%\nO0001\nG21 G90 G17 G54\nG00 X0 Y0 Z5.\n"  # line 5 is the first of the body
@@ -43,15 +45,15 @@ CASES = {
     ),
     "nested calls": (
         f"{HEAD}F50000\nM98 P0002 L9999\nM30\nO0002\nM98 P0003 L9999\nM99\nO0003\nG01 X.001\nX0\nM99\n%\n",
-        "max_program_moves",
+        "max_expansion_moves",
         0,
     ),
-    "peck cycle of a tiny Q": (f"{HEAD}G91 G83 X1. Z-50. R-2. Q.01 F100 K9999\n{END}", "max_program_moves", 5),
+    "peck cycle of a tiny Q": (f"{HEAD}G91 G83 X1. Z-50. R-2. Q.01 F100 K9999\n{END}", "max_expansion_moves", 5),
     "loop without an end": (f"{HEAD}#1=0\nWHILE[#1EQ0]DO1\n#2=#2+1\nEND1\n{END}", "max_program_steps", 0),
     "long text": (HEAD + "(A COMMENT OF SOME LENGTH)\n" * 2000 + END, "max_program_bytes", 0),
 }
 # The same limits at sizes that a test has time for.
-SMALL = {"max_program_moves": 20_000, "max_program_steps": 30_000, "max_program_bytes": 40_000}
+SMALL = {"max_expansion_moves": 20_000, "max_program_steps": 30_000, "max_program_bytes": 40_000}
 COMMANDS = {
     "time": ["time"],
     "simulate": ["simulate"],
@@ -143,6 +145,55 @@ def test_of_a_file_without_an_end_no_more_is_read_than_the_limit(tmp_path: Path)
     with pytest.raises(sg.ProgramError, match=r"more than 500 bytes .*controller\.max_program_bytes") as caught:
         sg.Program.read(path, machine)
     assert caught.value.line == 3 + (500 - 8) // 13
+
+
+def test_a_plain_text_has_room_for_its_lines_whatever_the_limits_of_an_expansion_are() -> None:
+    zigzag = "".join(f"X{k % 2}.Y{k}.\n" for k in range(200))
+    tight = {"max_expansion_moves": 1, "max_expansion_bytes": 1, "max_program_steps": 1}
+    machine = sg.Machine.load("vx500").with_values({f"controller.{key}": value for key, value in tight.items()})
+    assert sg.Program.from_text(f"{HEAD}G01 F3000\n{zigzag}{END}", machine).core.move_count == 200
+    with pytest.raises(sg.ProgramError, match=r"controller\.max_(program_steps|expansion)"):
+        sg.Program.from_text(subprogram("M98 P0002 L20\n", "G01 X1. F500\nX0\n"), machine)
+
+
+def test_the_defaults_read_a_plain_text_of_a_hundred_megabytes() -> None:
+    controller = sg.Machine.load("vx500").controller
+    assert controller.max_program_bytes >= 100 * 2**20 and controller.max_program_moves >= 3_000_000
+
+
+def test_what_the_memory_would_not_hold_is_refused_before_it_is_taken(tmp_path: Path) -> None:
+    import resource
+
+    path = tmp_path / "huge.nc"
+    with path.open("wb") as file:
+        file.write(b"%\nO0001\n")
+        file.truncate(900_000_000)
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (3 * 2**29, 3 * 2**29))
+
+    for words in (("convert", "-o", "out.nc"), ("simulate",), ("check",), ("time",)):
+        done = run_process(tmp_path, words[0], "huge.nc", "-m", "vx500", *words[1:], limit=limit)
+        assert done.returncode == 2, done.stderr
+        found = re.search(
+            r"huge\.nc:1:1: .* some (\d+) bytes of memory are needed and (\d+) are available", done.stderr
+        )
+        assert found is not None, done.stderr
+        assert int(found[1]) > 900_000_000 and 0 < int(found[2]) < 3 * 2**29
+
+
+def test_what_a_conversion_would_write_counts_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from shapegcode.program import memory
+    from shapegcode.program.compensation import read_for_conversion
+
+    machine = sg.Machine.load("vx500")
+    (tmp_path / "part.nc").write_text(f"{HEAD}G01 X200. F2000\nX0\n{END}")
+    blocks = round(sg.Program.read(tmp_path / "part.nc", machine).core.least_time_s / machine.controller.block_time_s)
+    monkeypatch.setattr(memory, "available_bytes", lambda: 50_000)
+    with pytest.raises(sg.ProgramError, match=rf"up to {blocks} blocks are to be written: .* 50000 are available"):
+        read_for_conversion(tmp_path / "part.nc", machine)
+    monkeypatch.setattr(memory, "available_bytes", lambda: None)
+    assert read_for_conversion(tmp_path / "part.nc", machine).regions
 
 
 def test_a_region_too_long_for_one_piece_keeps_its_text_and_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,13 +60,16 @@ struct CodeBindings {
   std::int64_t tool_program = -1;             ///< T calls it with T in #149; -1: none
 };
 
-/// What a program may ask of whoever reads and plays it. Each is counted while the text is read, and reading ends at
-/// the line where it is passed: what is too much is never expanded first.
+/// What a program may ask of whoever reads and simulates it. Each is counted while the text is read, and reading ends
+/// at the line where it is passed: what is too much is never expanded first. A plain text of any length that `bytes`
+/// and `moves` allow is read; what a few lines expand to has limits of its own.
 struct WorkLimits {
-  std::uint64_t steps = 10'000'000;  ///< lines executed, each as often as it runs
-  std::uint64_t moves = 800'000;     ///< moves, dwells, and blocks with machine functions
-  std::uint64_t bytes = 33'554'432;  ///< of texts that are read, and of the plain text that they come to
-  double seconds = 100'000.0;        ///< least time: moves at their feed, but no faster than the axes are; dwells
+  std::uint64_t steps = 4'000'000;             ///< lines executed, each beyond its first time
+  std::uint64_t moves = 100'000'000;           ///< moves, dwells, and blocks with machine functions
+  std::uint64_t bytes = 1'000'000'000;         ///< of texts that are read
+  std::uint64_t expansion_moves = 800'000;     ///< moves beyond one for each line of the texts
+  std::uint64_t expansion_bytes = 33'554'432;  ///< of the plain text beyond those of the texts
+  double seconds = 100'000.0;  ///< least time: moves at their feed, but no faster than the axes are; dwells
   Vector3 feed_mm_per_s = Vector3::Constant(std::numeric_limits<double>::infinity());   ///< of each axis while cutting
   Vector3 rapid_mm_per_s = Vector3::Constant(std::numeric_limits<double>::infinity());  ///< of each axis in a rapid
   double tool_change_s = 0.0;                                                           ///< of an M06

@@ -130,6 +130,17 @@ class Characterisation(Result):
             return "repeat the tests that contradict the others"
         return "shapegcode machine show explains the machine file with these values, which -o FILE writes"
 
+    def next_step_after(self, file: str) -> str:
+        """The same where the machine file was written.
+
+        Args:
+            file: name of it.
+
+        Returns:
+            One sentence.
+        """
+        return f"shapegcode machine show {file} explains it" if self.ok else self.next_step
+
     def to_toml(self) -> str:
         """The machine file with everything that is known; a remark stands behind each key that was measured."""
         return self.fitted.to_toml(self.remarks)

@@ -26,6 +26,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
+from shapegcode.program.memory import require_memory_for_lines
 from shapegcode.program.operating import no_room
 from shapegcode.program.reading import program_bytes
 from shapegcode.program.several import index_of, programs_of
@@ -42,11 +43,12 @@ _COMMENT = re.compile(r"\([^()\n]*\)?")
 _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
-_WORK_LIMIT = "controller.max_program_"  # in the message of every limit of a reading
+_WORK_LIMIT = re.compile(r"controller\.max_(program|expansion)_")  # in the message of every limit of a reading
 _ROUNDING = 1e-9
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
 # Of one reading (most_alarms in the core's reader).
 _MOST_ALARMS = 200
+_MEMORY_PER_LINE = 350  # bytes
 
 
 def check(program: Program | str | Path, machine: Machine, *, program_number: int | str | None = None) -> Check:
@@ -98,6 +100,7 @@ def check_text(
         ProgramError: not to be read at all, without a place to point to.
     """
     data = text.encode() if isinstance(text, str) else text
+    require_memory_for_lines(data, source, _MEMORY_PER_LINE)
     own, lines_before = _own_text(data, program_number, source)
     found = list(_size_and_macros(own, lines_before, source, machine))
     too_long = len(data) > machine.controller.max_program_bytes  # and no more of it may have been read
@@ -207,7 +210,7 @@ def _size_and_macros(data: bytes, lines_before: int, source: str, machine: Machi
 
 def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.alarms:
-        if _WORK_LIMIT in message:
+        if _WORK_LIMIT.search(message):
             # No control refuses it: it is more than is computed here.
             said = f"{message}: what follows is not checked"
             yield _finding("warning", "work_limit", 0, file or program.source, line, column, said)

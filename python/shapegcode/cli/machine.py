@@ -151,7 +151,8 @@ def _import(args: argparse.Namespace) -> int:
     found = import_parameters(dump, base, tables=tables, name=args.name, keep_modes=keep, rigid=rigid)
     if found.ok:
         _write(args, found.to_toml())
-    return runner.finish(found, args, wrote=[args.output] if found.ok else [])
+    wrote = [args.output] if found.ok else []
+    return runner.finish(found, args, tables=found.tables(everything=args.verbose), wrote=wrote)
 
 
 def _modes_of(machine: Machine | None) -> dict[str, str]:
@@ -190,7 +191,9 @@ def _show(args: argparse.Namespace) -> int:
 
     runner.check_files(args)
     found = replace(describe_machine(args.machine), source=args.machine)
-    return runner.finish(found if args.input is None else _ranked(found, args), args)
+    if args.input is not None:
+        found = _ranked(found, args)
+    return runner.finish(found, args, tables=found.tables(everything=args.verbose))
 
 
 def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescription:

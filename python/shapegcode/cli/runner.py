@@ -163,6 +163,8 @@ def finish(
         report["plots"] = pictures
     if output is not None:
         report["output"] = str(output[0])
+    written = [str(file) for file in (*wrote, *([output[0]] if output is not None else []))]
+    step = report["next_step"] = result.next_step_after(written[0]) if written else result.next_step
     pages = _write_page(result, args, report, output, wrote)
     several: Gathered | None = getattr(args, "several", None)
     if several is not None:
@@ -180,7 +182,7 @@ def finish(
             *(f"wrote {file}" for file in (*wrote, *pages)),
             *([f"wrote {output[0]}"] if output is not None and several is None else []),
             *(pictured if plots is not None else []),
-            f"next: {result.next_step}",
+            f"next: {step}",
         ],
     )
     return result.exit_code

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -17,8 +17,10 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "ask_all", "run"]
 
-_NOBODY_KNOWS = "nobody knows yet"
+_UNKNOWN, _BACK = "unknown", "<"
 _TITLES = {
+    _UNKNOWN: "not known yet",
+    _BACK: "(back to the question before)",
     "fanuc": "FANUC (0i, 16i, 18i, 21i, 30i, 31i, 32i)",
     "other": "another one that reads programs as FANUC does",
     "memory": "it is loaded into the memory",
@@ -31,12 +33,15 @@ _TITLES = {
 _UNITS = {"m/min": ("mm/min", 1000.0), "m/s²": ("mm/s²", 1000.0), "MB": ("kB", 1024.0), "mm": ("µm", 1000.0)}
 """What people say for a unit, and how much of it that is."""
 _OF_AXES = ("rapid_mm_per_min", "max_feed_mm_per_min", "max_acceleration_mm_s2")
-_ANY = 24_000.0  # mm/min: the rapid rate that a question is tried with
+_FILES = {"dump": "parameter file, such as CNC-PARA.TXT", "file": "record of a tap test: CSV, UFF or WAV"}
+_TYPED_MODES = {
+    "file": ("Which file?", _FILES["file"]),
+    "known": ("Which frequency and damping ratio?", "Hz and ratio, such as 46:0.02"),
+}
 _VIBRATION = {
-    "tapped: I have the record of a tap test": "file",
-    "from a data sheet or an earlier test: I know frequency and damping": "known",
-    "taken as rigid: no vibration of it counts": "rigid",
-    _NOBODY_KNOWS: "unknown",
+    "file": "tapped: I have the record of a tap test",
+    "known": "from a data sheet or an earlier test: I know frequency and damping",
+    "rigid": "taken as rigid: no vibration of it counts",
 }
 
 
@@ -45,7 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Asks what a shop knows of its machine, says what each answer changes, reads parameter file and tap tests "
         "where there are some, and writes a short machine file: what was answered, and why; everything else is a "
-        "default. Another machine's modes are never taken."
+        "default. Enter means `not known yet` at every question, and < goes back to the one before. Another machine's "
+        "modes are never taken."
     )
     parser.epilog = "example: shapegcode setup -o mine.toml"
     parser.add_argument(
@@ -93,10 +99,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def ask_all() -> Answers:
-    """Ask every question that the answers before it leave open.
+    """Ask every question that the answers before it leave open; `<` goes back to the one before.
 
     Returns:
-        The answers.
+        The answers; what is not known is left out.
 
     Raises:
         KeyboardInterrupt: the user gave up.
@@ -104,25 +110,40 @@ def ask_all() -> Answers:
     from shapegcode.setup.answers import EXPLAINED, Answers, read_answers
 
     given: dict[str, Any] = {}
-    for name, field in Answers.model_fields.items():
-        if name in _left_out(given):
+    asked: list[str] = []
+    questions = [name for name in Answers.model_fields if name != "modes"] + [f"modes.{axis}" for axis in "xyz"]
+    while open_ones := _open_questions(questions, asked, given):
+        name = open_ones[0]
+        answer = _vibration(name[-1]) if name.startswith("modes.") else _asked(name, given)
+        if answer == _BACK:
+            if asked:
+                given.pop(asked.pop(), None)
             continue
-        answer = _vibration() if name == "modes" else _asked(name, field.description or "", field.annotation, given)
+        asked.append(name)
         if answer is not None:
             given[name] = answer
-        value = getattr(read_answers({"name": "m", "rapid_mm_per_min": _ANY} | _alone(name, given)), name)
-        print(f"  {EXPLAINED[name](value)}")
+        if name == questions[-1]:
+            given["modes"] = {key[-1]: given.pop(key) for key in questions[-3:] if key in given}
+        if not name.startswith("modes.") or "modes" in given:
+            name = name.partition(".")[0]
+            print(f"  {EXPLAINED[name](getattr(read_answers(_alone(name, given)), name))}")
     return read_answers(given)
 
 
-def _alone(name: str, given: dict[str, Any]) -> dict[str, Any]:
+def _open_questions(questions: Sequence[str], asked: Sequence[str], given: Mapping[str, Any]) -> list[str]:
+    """Those behind the last one asked that the answers so far do not make needless."""
+    needless = set(_left_out(given))
+    behind = questions[questions.index(asked[-1]) + 1 :] if asked else questions
+    return [name for name in behind if name not in needless]
+
+
+def _alone(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
     """An answer with what it needs beside it."""
-    needed = {"delivery", "dnc_baud"} if name in ("delivery", "dnc_baud") else {name}
-    found = {key: given[key] for key in needed if key in given}
-    return found | ({"dnc_baud": 9600} if name == "delivery" and given.get(name) == "dnc" else {})
+    needed = {"delivery", "dnc_baud"} if name == "dnc_baud" else {name}
+    return {key: given[key] for key in needed if key in given}
 
 
-def _left_out(given: dict[str, Any]) -> Iterator[str]:
+def _left_out(given: Mapping[str, Any]) -> Iterator[str]:
     """Questions that the answers so far make needless."""
     if given.get("control") == "other":
         yield "dump"
@@ -138,33 +159,39 @@ def _left_out(given: dict[str, Any]) -> Iterator[str]:
         yield "program_memory_kb"
 
 
-def _asked(name: str, question: str, annotation: Any, given: dict[str, Any]) -> Any:
-    """One answer; None: nobody knows."""
-    import questionary
-
+def _asked(name: str, given: Mapping[str, Any]) -> Any:
+    """One answer; None: not known yet."""
     from shapegcode.setup.answers import Answers
 
-    choices = _choices(annotation)
     field = Answers.model_fields[name]
-    if choices:
-        open_ended = [] if field.default in choices else [_NOBODY_KNOWS]
-        titled = [questionary.Choice(_TITLES.get(each, each), each) for each in (*choices, *open_ended)]
-        said = questionary.select(question, choices=titled).unsafe_ask()
-        return None if said == _NOBODY_KNOWS else said
+    question = field.description or ""
+    if choices := _choices(field.annotation):
+        said = _chosen(question, {each: _TITLES[each] for each in choices})
+        return None if said == _UNKNOWN else said
     unit = _unit(name)
-    needed = name == "name" or (name == "rapid_mm_per_min") or name == "dnc_baud"
-    unknown = "" if needed else "Enter: none" if name == "dump" else "Enter: unknown"
-    kind = "such as CNC-PARA.TXT" if name == "dump" else f"{unit}, or x, y, z" if name in _OF_AXES else unit
-    said = "; ".join(filter(None, (kind, unknown)))
-    hint = f" [{said}]" if said else ""
-    return _parsed(name, _typed(question + hint, lambda typed: _problem(name, typed, needed, given)))
+    kind = _FILES.get(name, f"{unit}, or x, y, z" if name in _OF_AXES else unit)
+    typed = _typed(question, kind, lambda text: _problem(name, text, given))
+    return typed if typed == _BACK else _parsed(name, typed)
 
 
-def _typed(question: str, check: Callable[[str], bool | str]) -> str:
-    """One line, which is checked when Enter is pressed: asked again until it does."""
+def _chosen(question: str, titles: Mapping[str, str]) -> str:
+    """One of a few answers, or that it is not known yet, which stands first, or back."""
     import questionary
 
-    said = questionary.text(question, validate=check, validate_while_typing=False).unsafe_ask()
+    shown = {_UNKNOWN: _TITLES[_UNKNOWN], **titles, _BACK: _TITLES[_BACK]}
+    choices = [questionary.Choice(title, value) for value, title in shown.items()]
+    return str(questionary.select(question, choices=choices).unsafe_ask())
+
+
+def _typed(question: str, kind: str, check: Callable[[str], bool | str]) -> str:
+    """One line, which is checked when Enter is pressed: asked again until it does. Empty: not known yet."""
+    import questionary
+
+    def checked(text: str) -> bool | str:
+        return text.strip() in ("", _BACK) or check(text)
+
+    hint = "; ".join(filter(None, (kind, "Enter: not known yet", f"{_BACK}: back")))
+    said = questionary.text(f"{question} [{hint}]", validate=checked, validate_while_typing=False).unsafe_ask()
     return str(said).strip()
 
 
@@ -210,52 +237,47 @@ def _parsed(name: str, typed: str) -> Any:
     return int(numbers[0]) if name == "dnc_baud" else numbers[0]
 
 
-def _problem(name: str, typed: str, needed: bool, given: dict[str, Any]) -> bool | str:
+def _problem(name: str, typed: str, given: Mapping[str, Any]) -> bool | str:
     """True, or what is wrong with an answer; the question is then asked again."""
     from shapegcode.errors import FileError
     from shapegcode.setup.answers import read_answers
 
-    if not typed.strip():
-        return "needed: nothing works without it" if needed else True
     try:
         value = _parsed(name, typed)
     except ValueError:
         of_axes = ", or three with commas between (X, Y, Z)" if name in _OF_AXES else ""
         return f"{typed}: must be a number in {_unit(name)}{of_axes}"
     if name == "dump":
-        if not Path(str(value)).is_file():
-            return f"{value}: no such file"
         from shapegcode.setup.build import dump_problem
 
-        return dump_problem(str(value)).replace("\n", "; ") or True
+        return _of_file(str(value), dump_problem)
     try:
-        read_answers({"name": "m", "rapid_mm_per_min": _ANY} | _alone(name, given | {name: value}))
+        read_answers(_alone(name, {**given, name: value}))
     except FileError as error:
         return "; ".join(f"{problem.value}: {problem.limit}" for problem in error.problems)
     return True
 
 
-def _vibration() -> dict[str, str]:
-    """Of each axis: tapped, known, rigid, or not known. Nothing is taken from another machine."""
-    import questionary
+def _of_file(file: str, problem: Callable[[str], str]) -> bool | str:
+    """True, or what is wrong with a file."""
+    return problem(file).replace("\n", "; ") or True if Path(file).is_file() else f"{file}: no such file"
 
-    said = {}
-    for axis in "xyz":
-        question = f"{axis.upper()}: tapped, from a data sheet, or taken as rigid?"
-        kind = _VIBRATION[questionary.select(question, choices=list(_VIBRATION)).unsafe_ask()]
-        if kind == "file":
-            kind = _typed("File of the tap test (CSV, UFF, WAV)", _tap)
-        elif kind == "known":
-            kind = _typed("Frequency in Hz and damping ratio, such as 46:0.02", _mode)
-        said[axis] = kind
-    return said
+
+def _vibration(axis: str) -> str | None:
+    """Of an axis: tapped, known, rigid; None: not known yet. Nothing is taken from another machine."""
+    while True:
+        kind = _chosen(f"{axis.upper()}: tapped, from a data sheet, or taken as rigid?", _VIBRATION)
+        if kind not in _TYPED_MODES:
+            return None if kind == _UNKNOWN else kind
+        said = _typed(*_TYPED_MODES[kind], _tap if kind == "file" else _mode)
+        if said != _BACK:
+            return said or None
 
 
 def _tap(typed: str) -> bool | str:
     from shapegcode.setup.build import tap_problem
 
-    file = typed.strip()
-    return tap_problem(file).replace("\n", "; ") or True if Path(file).is_file() else f"{file}: no such file"
+    return _of_file(typed.strip(), tap_problem)
 
 
 def _mode(typed: str) -> bool | str:
@@ -265,7 +287,7 @@ def _mode(typed: str) -> bool | str:
     if not is_mode(typed.strip()):
         return f"{typed}: must be FREQUENCY:DAMPING in Hz, such as 46:0.02"
     try:
-        read_answers({"name": "m", "rapid_mm_per_min": _ANY, "modes": {"x": typed.strip()}})
+        read_answers({"modes": {"x": typed.strip()}})
     except FileError as error:
         return "; ".join(problem.limit for problem in error.problems)
     return True

@@ -267,19 +267,28 @@ class Controller(TomlTable):
         "how deep subprograms may call one another; 4 on old controls", unit="levels", default=10, assumed=True
     )
     max_program_steps: Annotated[int, Strict(), Field(ge=1, le=10**12)] = key(
-        "blocks that a program may execute, each as often as it runs; more count as endless",
+        "blocks that a program may execute beyond one for each of its lines; more count as endless",
         unit="blocks",
-        default=10_000_000,
+        default=4_000_000,
     )
     max_program_moves: Annotated[int, Strict(), Field(ge=1, le=10**9)] = key(
-        "moves that a program may come to, with the pecks of drilling cycles, dwells and blocks with M, S, T; each "
-        "takes some 400 bytes of memory",
+        "moves that a program may come to, with the pecks of drilling cycles, dwells and blocks with M, S, T, and "
+        "moves of what is written",
+        unit="moves",
+        default=100_000_000,
+    )
+    max_expansion_moves: Annotated[int, Strict(), Field(ge=1, le=10**9)] = key(
+        "those of them beyond one for each line of the text: what loops, calls and drilling cycles expand to",
         unit="moves",
         default=800_000,
     )
     max_program_bytes: Annotated[int, Strict(), Field(ge=1, le=4 * 10**9)] = key(
-        "largest text that is read, with the programs that it calls, largest plain text that it is expanded to, and "
-        "largest text that is written",
+        "largest text that is read, with the programs that it calls, and largest text that is written",
+        unit="bytes",
+        default=1_000_000_000,
+    )
+    max_expansion_bytes: Annotated[int, Strict(), Field(ge=1, le=4 * 10**9)] = key(
+        "by how much the expanded program (macros, calls, modes resolved) may be longer than the text",
         unit="bytes",
         default=33_554_432,
     )

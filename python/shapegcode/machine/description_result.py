@@ -14,6 +14,8 @@ from shapegcode.settings.keys import KeyValue
 
 __all__ = ["MachineDescription", "OpenValue", "describe_machine"]
 
+_RANKED = 8
+
 
 @dataclass(frozen=True)
 class OpenValue:
@@ -96,8 +98,17 @@ class MachineDescription(Result):
             return f"`shapegcode machine show {self.source} --for part.nc` ranks them by what they do to your program."
         return f"use it: shapegcode convert IN -m {self.source} -o OUT."
 
-    def tables(self) -> list[Table]:
-        """The keys, those of one table of the file below its name."""
+    def tables(self, *, everything: bool = True) -> list[Table]:
+        """What nobody measured, and the keys, those of one table of the file below its name.
+
+        Args:
+            everything: all keys; else, for a program, the values that matter most for it and no others.
+
+        Returns:
+            The tables.
+        """
+        if self.program is not None and not everything:
+            return self._ranking(_RANKED)
         rows = list(self._rows())
         heads = [rank for rank, row in enumerate(rows) if isinstance(row, str)]
         columns = (
@@ -114,7 +125,7 @@ class MachineDescription(Result):
             Table("origins", summary, counts.most_common()),
         ]
 
-    def _ranking(self) -> list[Table]:
+    def _ranking(self, limit: int | None = None) -> list[Table]:
         """What nobody measured: for a program those values that matter, the furthest first; else all by table."""
         if self.program is not None:
             columns = (
@@ -122,7 +133,10 @@ class MachineDescription(Result):
                 Column("value → if it were", value=lambda row: f"{row.value} {row.origin} → {row.moved}", text=True),
                 Column("then, µm", value="effect", text=True),
             )
-            return [Table("", columns, self.matters)] if self.matters else []
+            left_out = len(self.matters[limit:]) if limit is not None else 0
+            more = f"{left_out} more matter less; " if left_out else ""
+            caption = f"{more}--verbose: every value of the machine" if limit is not None else ""
+            return [Table("", columns, self.matters[:limit], caption=caption)] if self.matters else []
         tables: dict[str, list[str]] = {}
         for value in self._open():
             tables.setdefault(value.key.rpartition(".")[0], []).append(_last(value.key))

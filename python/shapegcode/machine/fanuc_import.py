@@ -21,7 +21,7 @@ from shapegcode.machine.fanuc_offsets import take_tables
 from shapegcode.machine.fanuc_program import take_program
 from shapegcode.machine.fanuc_tables import ControlTables, is_table, read_table
 from shapegcode.machine.machine import Machine
-from shapegcode.machine.result import ParameterImport
+from shapegcode.machine.result import DEFAULT_WHY, ParameterImport
 from shapegcode.settings.remarks import inherited
 
 __all__ = ["import_parameters"]
@@ -150,7 +150,7 @@ def _remark_the_rest(draft: Draft, machine: Machine, base: Machine | None) -> No
             continue
         if value.assumed and value.origin == "default":
             draft.remarks[value.key] = "assumed: not in the dump"
-            draft.assume(value.key, value.value, "default of the machine file")
+            draft.assume(value.key, value.value, DEFAULT_WHY)
         elif base and value.origin != "default":
             draft.remarks[value.key] = inherited(base.name, base.remarks.get(value.key, ""))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
@@ -14,6 +14,7 @@ from shapegcode.results.table import Column, Table
 from shapegcode.settings.keys import toml
 
 __all__ = [
+    "DEFAULT_WHY",
     "AssumedValue",
     "MissingParameter",
     "ParameterImport",
@@ -21,6 +22,10 @@ __all__ = [
     "ReadTable",
     "Value",
 ]
+
+DEFAULT_WHY = "default of the machine file"
+"""Why a value is assumed that the dump does not hold and no decision was needed for."""
+_SHOWN = 20
 
 Value = bool | int | float | str | tuple[int, ...] | Xyz[float]
 """Value of a key of the machine file: one, or one per axis."""
@@ -145,22 +150,43 @@ class ParameterImport(Result):
     @property
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
+        return self.next_step_after("MACHINE")
+
+    def next_step_after(self, file: str) -> str:
+        """The same with the name of the machine file that was written.
+
+        Args:
+            file: name of it.
+
+        Returns:
+            One sentence.
+        """
         if not self.ok:
             return "punch the parameters out again (CNC-PARA.TXT, all of them), and import that."
+        find = f"shapegcode identify TAP.csv --update {file}"
         if not any(axis.modes for axis in self.machine.axes.as_tuple()):
-            return "find the vibration modes, which no dump holds: shapegcode identify TAP.csv --update MACHINE."
+            return f"find the vibration modes, which no dump holds: {find}."
         open_axes = [letter for letter in "xyz" if _is_open(getattr(self.machine.axes, letter))]
         if open_axes:
             names = ", ".join(open_axes).upper()
-            return f"tap {names}, whose modes nobody knows: shapegcode identify TAP.csv --update MACHINE."
+            return f"tap {names}, whose modes nobody knows: {find}."
         return "look at what is assumed, and measure it: shapegcode characterize."
 
     def to_toml(self) -> str:
         """The machine file, each value with the parameter it comes from."""
         return self.machine.to_toml(self.remarks)
 
-    def tables(self) -> list[Table]:
-        """What was read, assumed and missed; those of them that have rows."""
+    def tables(self, *, everything: bool = True) -> list[Table]:
+        """What was read, assumed and missed; those of them that have rows.
+
+        Args:
+            everything: each value in a row of its own, with where it comes from; else the keys by table of the file.
+
+        Returns:
+            The tables.
+        """
+        if not everything:
+            return [table for table in (self._keys_by_table(), self._missing_numbers()) if table.rows]
         read = (
             Column("key", value=lambda rows: rows[0].key, left=True),
             Column("value", value=lambda rows: _shown(rows[0]), text=True),
@@ -184,6 +210,45 @@ class ParameterImport(Result):
             Table("missing, not understood or not used", missing, self.missing),
         ]
         return [table for table in found if table.rows]
+
+    def _keys_by_table(self) -> Table:
+        """Keys by table of the machine file: those that were read, and those for which a decision was taken."""
+        tables: dict[str, tuple[list[str], list[str]]] = {}
+        decided = [row.key for row in self.assumed if row.why != DEFAULT_WHY]
+        read = [*(row.key for row in self.read), *(row.key for row in self.tables_read)]
+        for rank, keys in enumerate((read, decided)):
+            for key in dict.fromkeys(keys):
+                table, _, name = key.rpartition(".")
+                tables.setdefault(table, ([], []))[rank].append(name)
+        alike: dict[tuple[str, str], list[str]] = {}
+        for table, (names, assumed) in tables.items():
+            alike.setdefault((_first_of(names), _first_of(assumed)), []).append(f"[{table}]" if table else "")
+        columns = (
+            Column("table", value=lambda row: " ".join(row[1]), text=True),
+            Column("read", value=lambda row: row[0][0], text=True),
+            Column("assumed", value=lambda row: row[0][1], text=True),
+        )
+        defaults = len(self.assumed) - len(decided)
+        more = f"{defaults} more are left at their defaults; " if defaults else ""
+        return Table("", columns, list(alike.items()), caption=f"{more}--verbose: every value, its line, and why")
+
+    def _missing_numbers(self) -> Table:
+        """Parameters by why they are missing, the first of many."""
+        reasons: dict[str, list[str]] = {}
+        for row in self.missing:
+            reasons.setdefault("not in the dump" if row.line is None else "not understood or not used", []).append(
+                row.parameter or row.why.partition(":")[0]
+            )
+        columns = (
+            Column("parameters", value=lambda row: row[0], left=True),
+            Column("numbers", value=lambda row: _first_of(row[1]), text=True),
+        )
+        return Table("", columns, list(reasons.items()))
+
+
+def _first_of(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:_SHOWN])
+    return shown if len(names) <= _SHOWN else f"{shown} and {len(names) - _SHOWN} more"
 
 
 def _is_open(axis: Axis) -> bool:

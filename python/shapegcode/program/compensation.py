@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode._core import ProgramError
 from shapegcode.program import MM_PER_INCH, Program, located_error
+from shapegcode.program.memory import require_memory
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,7 +19,10 @@ if TYPE_CHECKING:
 RADIUS_NOT_KNOWN = "the radius of offset D"
 """How the reader's warning of a G41 or G42 begins whose radius nothing gives."""
 
+_ZERO_RADIUS = re.compile(r"offset D(\d+) has a radius of 0\b")
 _KEPT = "cutter compensation is on and not expanded"
+_MEMORY_PER_BLOCK = 100
+"""Bytes of memory for each block that a conversion writes (docs/evidence/benchmarks.md)."""
 _SLACK_MM = 0.0005  # a radius that differs by more is another one
 
 
@@ -24,12 +30,17 @@ def read_for_conversion(path: str | Path, machine: Machine, *, program_number: i
     """Read a program as `convert` wants it: compensation expanded only if `input.compensation` says so.
 
     Raises:
-        ProgramError: see :meth:`Program.read`, and where compensation is refused.
+        ProgramError: see :meth:`Program.read`; compensation is refused; the memory would not hold what is written.
         OSError: the file cannot be read.
     """
     expand = machine.input.compensation == "expand"
     program = Program.read(path, machine, program_number=program_number, expand_compensation=expand)
     require_decision(program, machine)
+    period_s = machine.emission.block_period_s or machine.controller.block_time_s
+    if period_s > 0.0:
+        blocks = round(program.core.least_time_s / period_s)
+        said = f"up to {blocks} blocks are to be written"
+        require_memory(str(path), blocks * _MEMORY_PER_BLOCK, said)
     return program
 
 
@@ -41,11 +52,12 @@ def require_decision(program: Program, machine: Machine) -> None:
     """
     core, policy = program.core, machine.input.compensation
     if policy == "expand":
-        unknown = next((w for w in core.warnings if w[3].startswith(RADIUS_NOT_KNOWN)), None)
-        if unknown is not None:
-            line, _, _, message, file = unknown
-            reason = message.partition(":")[0]
-            raise located_error(file or program.source, line, 1, f"{reason}: its path cannot be shaped")
+        for line, _, _, message, file in core.warnings:
+            if message.startswith(RADIUS_NOT_KNOWN):
+                raise _undecided(
+                    program, line, file, f"{message.partition(' (')[0]}: its path cannot be shaped", machine
+                )
+        refuse_zero_radius(program)
         if core.kept_compensated_moves:
             raise ProgramError(f"{program.source}:1:1: read the program with expand_compensation=True to expand it")
         return
@@ -56,15 +68,38 @@ def require_decision(program: Program, machine: Machine) -> None:
         )
     if policy == "refuse" and core.kept_compensated_moves:
         line, file = next(((w[0], w[4]) for w in core.warnings if _KEPT in w[3]), (1, ""))
-        raise located_error(
-            file or program.source,
-            line,
-            1,
-            "cutter compensation G41/G42: behind shaped moves the offset in the control would no longer act, and that "
-            "is how a shop hits size. --compensation expand (input.compensation) shapes the path of the radius in "
-            "input.tool_radius_mm or by G10 L12 (the header says so, and a guard stops the program if the control "
-            "holds another one); --compensation keep leaves these moves as they are",
-        )
+        said = "cutter compensation G41/G42: shaped moves do not follow the offset in the control"
+        raise _undecided(program, line, file, said, machine)
+
+
+def refuse_zero_radius(program: Program) -> None:
+    """Refuse a program whose compensation was expanded with a radius of 0: the tool would cut on its contour.
+
+    Raises:
+        ProgramError: with the line, the offset, and what to set.
+    """
+    for line, _, _, message, file in program.core.warnings:
+        if found := _ZERO_RADIUS.match(message):
+            number = found[1]
+            what = "write D with the number of the offset behind it" if number == "0" else _radius_of(number)
+            said = f"{message.partition(':')[0]} mm: expanded, the tool's centre would run on the contour\n{what}"
+            raise located_error(file or program.source, line, 1, said)
+
+
+def _undecided(program: Program, line: int, file: str, said: str, machine: Machine) -> ProgramError:
+    """What is wrong, and in a second line the command that goes on."""
+    text = program.text.split(b"\n", line)[line - 1] if not file or file == program.source else b""
+    found = re.search(rb"D\s*(\d+)", text)
+    number = str(int(found[1])) if found else "1"
+    known = number in machine.input.tool_radius_mm
+    radius = "" if known else f" --set input.tool_radius_mm.{number}=RADIUS_IN_MM"
+    command = f"shapegcode convert {shlex.quote(program.source)} -m MACHINE --compensation"
+    go_on = f"{command} expand{radius} shapes the path of that radius; --compensation keep leaves these moves unchanged"
+    return located_error(file or program.source, line, 1, f"{said}\nnext: {go_on}")
+
+
+def _radius_of(number: str) -> str:
+    return f"give it: --set input.tool_radius_mm.{number}=RADIUS_IN_MM, or G10 L12 P{number} R... in the program"
 
 
 def header_lines(radii_mm: Mapping[int, float]) -> list[str]:

@@ -7,6 +7,7 @@ from typing import Literal
 
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.program.compensation import refuse_zero_radius
 from shapegcode.program.program import Program
 from shapegcode.program.result import Expansion
 
@@ -33,12 +34,15 @@ def expand(
         The plain program, and where each of its lines comes from.
 
     Raises:
-        ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
+        ProgramError: the text is no program that can be read, or its compensation has a radius of 0; the message
+            starts with ``file:line:column``.
         OSError: the file cannot be read.
     """
     if not isinstance(program, Program):
         whole = compensation == "expand"
         program = Program.read(program, machine, program_number=program_number, expand_compensation=whole)
+    if compensation == "expand":
+        refuse_zero_radius(program)
     core = program.core
     if program.stamp is not None and core.expanded:
         # The control keeps the switch of the override in a variable: worked out here, it would be overwritten.

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode._core import ProgramError
+from shapegcode.program.memory import require_memory_for_lines
 from shapegcode.program.reading import program_bytes, program_loader, reader_options
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
+from shapegcode.program.turning import signs_of_turning
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -125,6 +127,11 @@ class Program:
 
         machine = machine or Machine.load("vx500")
         data = text.encode() if isinstance(text, str) else text
+        require_memory_for_lines(data, source)
+        if not emitted and (turning := signs_of_turning(data)) is not None:
+            line, signs = turning
+            said = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"
+            raise located_error(source, line, 1, said)
         index = None if program_number is None else index_of(data, program_number, source)
         options = reader_options(
             machine,

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import errno
 import math
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
+from shapegcode.program.memory import require_memory
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -91,12 +93,14 @@ def _limits(machine: Machine, *, emitted: bool) -> _core.WorkLimits:
     controller, axes = machine.controller, machine.axes.as_tuple()
     limits.steps = controller.max_program_steps
     limits.bytes = controller.max_program_bytes
+    limits.expansion_bytes = controller.max_expansion_bytes
     limits.feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in axes]
     limits.rapid_mm_per_s = [axis.rapid_mm_per_min / 60.0 for axis in axes]
     limits.tool_change_s = machine.times.tool_change_s
     limits.m_function_s = machine.times.m_function_s
     # What is written for a program within the limits has more blocks and takes a little longer.
     limits.moves = _NO_LIMIT if emitted else controller.max_program_moves
+    limits.expansion_moves = _NO_LIMIT if emitted else controller.max_expansion_moves
     limits.seconds = math.inf if emitted else controller.max_program_s
     return limits
 
@@ -139,10 +143,13 @@ def program_bytes(path: str | Path, most: int) -> bytes:
         Its bytes, no more than one beyond `most`: of a file without an end neither.
 
     Raises:
+        ProgramError: the memory would not hold what is read of it.
         OSError: the file cannot be read; it names the file, which a failed read() alone does not.
     """
     try:
         with Path(path).open("rb") as file:
+            size = min(os.fstat(file.fileno()).st_size, most + 1)  # 0 of what is no file
+            require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
             return file.read(most + 1)
     except OSError as error:
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error

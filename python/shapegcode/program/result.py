@@ -52,9 +52,20 @@ class Expansion(Result):
     @property
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
+        return self.next_step_after("OUT")
+
+    def next_step_after(self, file: str) -> str:
+        """The same with the name of the program that was written.
+
+        Args:
+            file: name of it.
+
+        Returns:
+            One sentence.
+        """
         if self.expanded_radii_mm:
             return "use it with these radii alone: the offsets in the control do not act."
-        return "see how long it takes: shapegcode time OUT -m MACHINE."
+        return f"see how long it takes: shapegcode time {file} -m MACHINE."
 
     @property
     def notes(self) -> list[str]:

@@ -99,6 +99,18 @@ class Outcome:
         """The one thing to do next, in one sentence."""
         raise NotImplementedError
 
+    def next_step_after(self, file: str) -> str:
+        """The one thing to do next once a file was written with it.
+
+        Args:
+            file: name of it.
+
+        Returns:
+            One sentence; that of `next_step` unless it would ask for the file.
+        """
+        del file
+        return self.next_step
+
     @property
     def exit_code(self) -> int:
         """Of the command: 0 done and within tolerance, 1 done but out of tolerance, 2 refused."""

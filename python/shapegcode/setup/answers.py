@@ -6,7 +6,7 @@
     dnc_baud = 9600
     modes = { x = "46:0.02", y = "taps/y.csv", z = "rigid" }
 
-Every question but the name has an answer of its own where nobody knows: the key is left out.
+Every question may stay open: its key is left out, and the machine file then claims nothing of it.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ class ModesAnswer(InlineTable):
 class Answers(TomlTable):
     """What a shop says of its machine."""
 
-    name: Text = key("What do you call the machine?")
-    control: Literal["fanuc", "other"] = key("Which control does it have?", default="fanuc")
+    name: Text = key("What do you call the machine?", default="unnamed")
+    control: Literal["fanuc", "other"] | None = key("Which control does it have?", default=None)
     dump: Text | None = key("Is there a parameter file of the control?", default=None)
     rapid_mm_per_min: PositiveAxisValues | None = key("How fast are the rapids (G00)?", unit="mm/min", default=None)
     max_feed_mm_per_min: PositiveAxisValues | None = key(
@@ -110,11 +110,7 @@ class Answers(TomlTable):
         return self
 
     @model_validator(mode="after")
-    def _enough(self) -> Answers:
-        if self.dump is None and self.rapid_mm_per_min is None:
-            raise ValueError("rapid_mm_per_min is missing: without a parameter file the rapid rates must be said")
-        if self.delivery == "dnc" and self.dnc_baud is None:
-            raise ValueError('dnc_baud is missing: delivery = "dnc" needs the speed of the line')
+    def _baud_of_a_line(self) -> Answers:
         if self.dnc_baud is not None and self.delivery != "dnc":
             raise ValueError('dnc_baud is given, and delivery is not "dnc": take one of both out')
         return self
@@ -233,7 +229,11 @@ EXPLAINED: Mapping[str, Callable[[Any], str]] = {
         if said
         else "Limits and time constants are then what you say, or assumed and marked so."
     ),
-    "rapid_mm_per_min": lambda _: "The time of rapids follows from it.",
+    "rapid_mm_per_min": lambda said: (
+        "The time of rapids follows from it."
+        if said
+        else "24 m/min are assumed, as usual for a machining centre: the time of rapids is a guess."
+    ),
     "max_feed_mm_per_min": lambda said: (
         "Feeds above it are cut down, and cost time." if said else "The rapid rate is assumed for it."
     ),
@@ -257,7 +257,7 @@ EXPLAINED: Mapping[str, Callable[[Any], str]] = {
         f"{said / 11:.0f} characters, or some {said / 11 / 25:.0f} short blocks a second: convert warns where that is "
         f"too slow, and `--baud {said}` fits the program to it."
         if said
-        else ""
+        else "Nobody can say then whether blocks arrive in time: set controller.dnc_baud before a shaped program runs."
     ),
     "program_memory_kb": lambda said: "A larger program gets a warning." if said else "256 kB are assumed.",
     "look_ahead": lambda said: (

@@ -7,19 +7,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from shapegcode.errors import ArgumentError, FileError, MachineError, Problem, ShapegcodeError
+from shapegcode.errors import ArgumentError, FileError, MachineError, ShapegcodeError
 from shapegcode.identification.identify import identify
 from shapegcode.identification.update import update_modes
 from shapegcode.machine import Machine
 from shapegcode.machine.fanuc_import import import_parameters
 from shapegcode.machine.result import ParameterImport
-from shapegcode.settings.keys import PositivePerAxis
-from shapegcode.setup.answers import Answers, AnswersError, is_mode, mode_of
+from shapegcode.setup.answers import EXPLAINED, Answers, is_mode, mode_of
 from shapegcode.setup.result import MachineSetup, OpenQuestion
 
 __all__ = ["dump_lacks_rapids", "dump_problem", "set_up", "tap_problem"]
 
 _ANSWERED = "answered"
+_ASSUMED_RAPID_MM_PER_MIN = 24_000.0
 _ASSUMED_ACCELERATION_MM_S2 = 3000.0
 _LOOK_AHEAD = {"G05.1": (["G05.1 Q0"], ["G05.1 Q1"]), "G08": (["G08 P0"], ["G08 P1"])}
 _LIMITS = ("max_feed_mm_per_min", "rapid_mm_per_min", "max_acceleration_mm_s2")
@@ -65,7 +65,7 @@ def set_up(answers: Answers) -> MachineSetup:
         imported=tuple(sorted(value.key for value in machine.values() if value.origin in ("dump", "measured"))),
         open=tuple(_open(machine)),
         notes=tuple(notes),
-        warnings=(),
+        warnings=(EXPLAINED["dnc_baud"](None),) if answers.delivery == "dnc" and answers.dnc_baud is None else (),
         text=text,
     )
 
@@ -85,7 +85,6 @@ def _imported(answers: Answers, rigid: str) -> ParameterImport:
     """The machine of the dump; limits that it does not hold are as they are said, or assumed and marked so.
 
     Raises:
-        AnswersError: it does not hold the rapid rates, and nobody said them.
         MachineError: no dump, or a value that is not plausible.
     """
     dump = answers.dump
@@ -95,12 +94,6 @@ def _imported(answers: Answers, rigid: str) -> ParameterImport:
     except MachineError as error:
         if any(problem.value or problem.key.rpartition(".")[2] not in _LIMITS for problem in error.problems):
             raise
-        lacks = _lacks_rapids(error)
-    if answers.rapid_mm_per_min is None:
-        if lacks:
-            said = f"missing: {dump} does not hold the rapid rates (parameter 1420)"
-            raise AnswersError("answers", (Problem("rapid_mm_per_min", "", said),))
-        answers = answers.model_copy(update={"rapid_mm_per_min": PositivePerAxis(x=1.0, y=1.0, z=1.0)})
     found = import_parameters(dump, _plain(answers), name=answers.name, rigid=rigid)
     own = {
         f"axes.{axis}.max_feed_mm_per_min": getattr(found.machine.axes, axis).rapid_mm_per_min
@@ -115,11 +108,6 @@ def _read(found: ParameterImport) -> set[str]:
     return {each.key for each in found.read}
 
 
-def _lacks_rapids(error: MachineError) -> bool:
-    """Whether a dump could not be taken as it does not hold the rapid rates."""
-    return any(problem.key.endswith(".rapid_mm_per_min") and not problem.value for problem in error.problems)
-
-
 def dump_problem(file: str) -> str:
     """What is wrong with a parameter file, before the other questions are asked.
 
@@ -130,14 +118,14 @@ def dump_problem(file: str) -> str:
         In words; empty: it can be read, and what it lacks can be said.
     """
     try:
-        _started(Answers.model_validate({"name": "m", "dump": file, "rapid_mm_per_min": 24_000.0}))
+        _started(Answers.model_validate({"dump": file}))
     except (FileError, ArgumentError, OSError) as error:
         return str(error)
     return ""
 
 
 def dump_lacks_rapids(file: str) -> bool:
-    """Whether the rapid rates must be said though there is a parameter file.
+    """Whether the rapid rates are a question though there is a parameter file.
 
     Args:
         file: of the control, one that can be read.
@@ -148,7 +136,7 @@ def dump_lacks_rapids(file: str) -> bool:
     try:
         import_parameters(file)
     except MachineError as error:
-        return _lacks_rapids(error)
+        return any(problem.key.endswith(".rapid_mm_per_min") and not problem.value for problem in error.problems)
     return False
 
 
@@ -170,27 +158,27 @@ def tap_problem(file: str) -> str:
 
 def _plain(answers: Answers) -> Machine:
     """Limits as they are said; what is not said is assumed, and marked so."""
-    rapid = answers.rapid_mm_per_min
-    assert rapid is not None
-    feed, acceleration = answers.max_feed_mm_per_min, answers.max_acceleration_mm_s2
+    rapid, feed, acceleration = answers.rapid_mm_per_min, answers.max_feed_mm_per_min, answers.max_acceleration_mm_s2
     axes: dict[str, Any] = {}
     remarks = {}
     for axis in "xyz":
-        own = getattr(rapid, axis)
-        axes[axis] = {
-            "max_feed_mm_per_min": own if feed is None else getattr(feed, axis),
-            "rapid_mm_per_min": own,
+        own = _ASSUMED_RAPID_MM_PER_MIN if rapid is None else getattr(rapid, axis)
+        limits = {
+            "max_feed_mm_per_min": (feed, own, "the rapid rate"),
+            "rapid_mm_per_min": (rapid, own, "24 m/min, usual for a machining centre"),
             "max_acceleration_mm_s2": (
-                _ASSUMED_ACCELERATION_MM_S2 if acceleration is None else getattr(acceleration, axis)
+                acceleration,
+                _ASSUMED_ACCELERATION_MM_S2,
+                "0.3 g, usual for a machining centre",
             ),
         }
-        stem = f"axes.{axis}"
-        remarks[f"{stem}.rapid_mm_per_min"] = _ANSWERED
-        remarks[f"{stem}.max_feed_mm_per_min"] = _ANSWERED if feed is not None else "assumed: the rapid rate"
-        said = _ANSWERED if acceleration is not None else "assumed: 0.3 g, usual for a machining centre"
-        remarks[f"{stem}.max_acceleration_mm_s2"] = said
-    whose = "FANUC control" if answers.control == "fanuc" else "control that reads FANUC's G-code"
-    data = {"name": answers.name, "description": f"{whose}; set up by answers", "axes": axes}
+        axes[axis] = {
+            name: assumed if said is None else getattr(said, axis) for name, (said, assumed, _) in limits.items()
+        }
+        for name, (said, _, why) in limits.items():
+            remarks[f"axes.{axis}.{name}"] = f"assumed: {why}" if said is None else _ANSWERED
+    control = {"fanuc": "FANUC control", "other": "control that reads FANUC's G-code", None: "control not known yet"}
+    data = {"name": answers.name, "description": f"{control[answers.control]}; set up by answers", "axes": axes}
     return Machine.from_data(data, answers.name).with_remarks(remarks)
 
 
@@ -207,7 +195,7 @@ def _said(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
         yield "controller.least_increment_mm", (answers.least_increment_mm, _ANSWERED)
     if answers.dnc_baud is not None:
         yield "controller.dnc_baud", (answers.dnc_baud, f"{_ANSWERED}: the line that feeds programs")
-    elif answers.delivery is not None:
+    elif answers.delivery not in (None, "dnc"):
         yield "controller.dnc_baud", (0, f"{_ANSWERED}: programs come from {answers.delivery}")
     if answers.program_memory_kb is not None:
         yield "controller.program_memory_bytes", (round(answers.program_memory_kb * 1024), _ANSWERED)

@@ -157,6 +157,17 @@ class TaperResult(Result):
             return "more passes, with other feeds or a longer stock"
         return "put [cutting] into the tool file (-o FILE writes it)"
 
+    def next_step_after(self, file: str) -> str:
+        """The same where [cutting] was written.
+
+        Args:
+            file: name of it.
+
+        Returns:
+            One sentence.
+        """
+        return self.next_step if self.poor else f"put [cutting] of {file} into the tool file"
+
     def tables(self) -> list[Table]:
         """One row for each coefficient."""
         chip = f" at a chip of {1e3 * self.chip_mm.middle:.2f} um"

@@ -62,6 +62,9 @@ class Interpreter {
   /// A work offset set by the program: one that is in force shifts the position.
   void set_work_offset(int coordinate_system, int number, int axis, double value_mm, bool incremental = false);
 
+  /// Lines of a text that is read, see WorkCount.
+  void add_lines(std::uint64_t lines) noexcept { work_.add_lines(lines); }
+
   [[nodiscard]] const ModalState& state() const noexcept { return state_; }
   [[nodiscard]] bool ended() const noexcept { return ended_; }
   void end() noexcept { ended_ = true; }
@@ -92,6 +95,7 @@ class Interpreter {
   void m_codes(LineFlow& flow);
   void length_offset(int whole);
   void rapid();
+  [[nodiscard]] std::string unit_example();
   void move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end);
   void cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end);
   void keep_cut(const char* why, const Vector3& end, const std::array<bool, 3>& known_after);

@@ -122,18 +122,34 @@ void Interpreter::rapid() {
   }
 }
 
+// What the unit makes of a word of this block.
+std::string Interpreter::unit_example() {
+  const bool inch = state_.units == 20;
+  for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
+    if (!words().has(letter) || words()[letter].value == 0.0) {
+      continue;
+    }
+    const Word& word = words()[letter];
+    const double own_mm = length_mm(word);
+    state_.units = inch ? 21 : 20;
+    const double other_mm = length_mm(word);
+    state_.units = inch ? 20 : 21;
+    return inch ? fmt::format("{} is read as {:.6g} inch, and would be {:.6g} mm", block_->text_of(word), own_mm / 25.4,
+                              other_mm)
+                : fmt::format("{} is read as {:.6g} mm, and would be {:.6g} mm in inch", block_->text_of(word), own_mm,
+                              other_mm);
+  }
+  return std::string("numbers are read in ") + (inch ? "inch" : "mm");
+}
+
 void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end) {
   check_range();
   if (!distance_given_) {
     warn_once(seen_distance_, fmt::format("neither G90 nor G91 before the first move: G{} assumed (power_on.distance)",
                                           state_.distance));
   }
-  if (!units_given_) {
-    const bool inch = state_.units == 20;
-    warn_once(seen_units_,
-              fmt::format("neither G20 nor G21 before the first move: X100. is read as 100 {}, and would be "
-                          "{} (power_on.units)",
-                          inch ? "inch" : "mm", inch ? "100 mm" : "2540 mm in inch"));
+  if (!units_given_ && seen_units_ == 0) {
+    warn_once(seen_units_, "neither G20 nor G21 before the first move: " + unit_example() + " (power_on.units)");
   }
   for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
     if (words().has(letter) && !words()[letter].has_point && words()[letter].value != 0.0) {
@@ -325,12 +341,12 @@ void Interpreter::require_cycle_data() const {
 void Interpreter::require_room_for_holes(int holes) {
   const double cuts = cuts_per_hole(cycle_);
   const double moves = holes * cuts * most_moves_per_cut(cycle_);
-  if (!work_.has_room(moves)) {
+  const double whole = static_cast<double>(work_.moves()) + moves;
+  if (const auto passed = work_.passed(whole)) {
     ended_ = true;
     fail(fmt::format("drilling cycle G{} feeds down {:.0f} times in {} hole(s), {:.3f} mm deep: with its {:.0f} moves "
-                     "the program comes to {:.0f} (limit {}, controller.max_program_moves)",
-                     cycle_.code, cuts, holes, std::abs(cycle_.r_mm - cycle_.bottom_mm), moves,
-                     static_cast<double>(work_.moves()) + moves, options_.limits.moves),
+                     "the program comes to {:.0f}, more than {}",
+                     cycle_.code, cuts, holes, std::abs(cycle_.r_mm - cycle_.bottom_mm), moves, whole, *passed),
          words().has('Q') ? words()['Q'].column : 1);
   }
 }

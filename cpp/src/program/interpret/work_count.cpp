@@ -25,14 +25,21 @@ std::optional<std::string> WorkCount::move(const Segment& segment) {
 
 std::optional<std::string> WorkCount::wait(double seconds, const char* what) { return add(seconds, what, 0.0); }
 
-bool WorkCount::has_room(double moves) const noexcept {
-  return static_cast<double>(moves_) + moves <= static_cast<double>(limits_.moves);
+std::optional<std::string> WorkCount::passed(double moves) const {
+  if (moves > static_cast<double>(limits_.expansion_moves) + static_cast<double>(lines_)) {
+    return fmt::format("{} moves beyond one for each line (controller.max_expansion_moves)", limits_.expansion_moves);
+  }
+  if (moves > static_cast<double>(limits_.moves)) {
+    return fmt::format("{} moves (controller.max_program_moves)", limits_.moves);
+  }
+  return std::nullopt;
 }
 
 std::optional<std::string> WorkCount::add(double seconds, const char* what, double feed_mm_per_s) {
   seconds_ += seconds;
-  if (++moves_ > limits_.moves) {
-    return fmt::format("more than {} moves up to here (controller.max_program_moves)", limits_.moves);
+  ++moves_;
+  if (moves_ > limits_.moves || (moves_ > lines_ && moves_ - lines_ > limits_.expansion_moves)) {
+    return fmt::format("up to here more than {}", *passed(static_cast<double>(moves_)));
   }
   if (!(seconds_ <= limits_.seconds)) {
     const std::string at = feed_mm_per_s > 0.0 ? fmt::format(" at {:.6g} mm/min", feed_mm_per_s * 60.0) : "";

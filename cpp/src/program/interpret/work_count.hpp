@@ -17,8 +17,11 @@ class WorkCount {
 
   [[nodiscard]] std::optional<std::string> move(const Segment& segment);
   [[nodiscard]] std::optional<std::string> wait(double seconds, const char* what);
-  /// So many moves as are still to come, all of them of one block: before the first one is made.
-  [[nodiscard]] bool has_room(double moves) const noexcept;
+  /// Lines of a text that is read: each may be a move, the others are its expansion.
+  void add_lines(std::uint64_t lines) noexcept { lines_ += lines; }
+  /// What so many moves of the whole program pass, in words: "800000 moves beyond one for each line
+  /// (controller.max_expansion_moves)".
+  [[nodiscard]] std::optional<std::string> passed(double moves) const;
 
   [[nodiscard]] std::uint64_t moves() const noexcept { return moves_; }
   [[nodiscard]] double seconds() const noexcept { return seconds_; }
@@ -27,6 +30,7 @@ class WorkCount {
   [[nodiscard]] std::optional<std::string> add(double seconds, const char* what, double feed_mm_per_s);
 
   const WorkLimits& limits_;
+  std::uint64_t lines_ = 0;
   std::uint64_t moves_ = 0;
   double seconds_ = 0.0;
 };

@@ -64,8 +64,7 @@ void Reader::load_main() {
         {1, "no line '%' at the start: a control that reads from a tape skips all before one", 0, 0, ""});
   }
   program_.header_offset = frame.begin;
-  program_.line_count =
-      static_cast<std::uint32_t>(1 + std::count(text.begin(), text.end(), '\n')) - (text.back() == '\n' ? 1U : 0U);
+  program_.line_count = static_cast<std::uint32_t>(lines_read_) - (text.back() == '\n' ? 1U : 0U);
   store_.add(text, frame, 0);
   for (const auto& unit : store_.units()) {
     if (unit->number >= 0) {
@@ -236,20 +235,30 @@ Program Reader::result() {
 // Counted before a line is executed, so that no reading does more than the limits say.
 void Reader::require_room() {
   const WorkLimits& limits = options_.limits;
-  if (++steps_ > limits.steps) {
+  ++steps_;
+  if (steps_ > lines_read_ && steps_ - lines_read_ > limits.steps) {
     interpreter_.end();
-    fail(fmt::format("more than {} blocks executed (controller.max_program_steps){}", limits.steps,
-                     program_.expanded ? ": the program does not seem to end" : ""));
+    fail(
+        fmt::format("more than {} blocks executed beyond one for each line (controller.max_program_steps): the "
+                    "program does not seem to end",
+                    limits.steps));
   }
-  if (program_.text.size() > limits.bytes) {
+  const std::uint64_t size = program_.text.size();
+  if (size > bytes_read_ && size - bytes_read_ > limits.expansion_bytes) {
     interpreter_.end();
-    fail(fmt::format("more than {} bytes of plain text up to here (controller.max_program_bytes)", limits.bytes));
+    fail(
+        fmt::format("up to here the expanded program is more than {} bytes longer than the text "
+                    "(controller.max_expansion_bytes)",
+                    limits.expansion_bytes));
   }
 }
 
 // Of all files of a reading together.
 void Reader::require_room_for(const std::string& text) {
   bytes_read_ += text.size();
+  const auto lines = static_cast<std::uint64_t>(1 + std::count(text.begin(), text.end(), '\n'));
+  lines_read_ += lines;
+  interpreter_.add_lines(lines);
   const std::uint64_t limit = options_.limits.bytes;
   if (bytes_read_ <= limit) {
     return;

@@ -194,42 +194,47 @@ void Reader::bound_call(const ParsedBlock& block, std::string_view raw) {
     put_block(block);
     return;
   }
-  const auto call = [&](std::int64_t number, const MacroArguments& arguments, bool macro, std::uint32_t column) {
-    if (enter(number, arguments, macro, arguments.repeats, column, block.text())) {
+  // The program does not name what it calls: a message has to say who does.
+  const auto call = [&](std::int64_t number, const MacroArguments& arguments, bool macro, const Word& word,
+                        const char* key) {
+    const std::string by = fmt::format(" that {} calls ({})", block.text_of(word), key);
+    const std::uint32_t column = macro ? word.column : 1;
+    if (enter(number, arguments, macro, arguments.repeats, column, block.text(), by)) {
       frames_.back().by_code = true;
     }
   };
-  const auto call_macro = [&](std::int64_t number, std::uint32_t column) {
-    call(number, parse_arguments(raw, here_.line, variables_, argument_scale()), true, column);
+  const auto call_macro = [&](std::int64_t number, const Word& word, const char* key) {
+    call(number, parse_arguments(raw, here_.line, variables_, argument_scale()), true, word, key);
   };
   for (const Word& word : block) {
     if (word.letter == 'G') {
       const auto found = bound.g_macros.find(static_cast<int>(std::lround(word.value * 10.0)));
       if (found != bound.g_macros.end()) {
-        call_macro(found->second, word.column);
+        call_macro(found->second, word, "input.g_macros, parameters 6050 to 6059");
         return;
       }
     } else if (word.letter == 'M') {
       const auto found = bound.m_macros.find(static_cast<int>(word.value));
       if (found != bound.m_macros.end()) {
-        call_macro(found->second, word.column);
+        call_macro(found->second, word, "input.m_macros, parameters 6080 to 6089");
         return;
       }
     }
   }
-  for (int k = 0; k < words.m_count; ++k) {
-    const int m = words.m_codes[static_cast<std::size_t>(k)];
-    const auto found = bound.m_subprograms.find(m);
+  for (const Word& word : block) {
+    const auto found =
+        word.letter == 'M' ? bound.m_subprograms.find(static_cast<int>(word.value)) : bound.m_subprograms.end();
     if (found != bound.m_subprograms.end()) {
-      put_without(block, [m](const Word& word) { return is_m(word, m); });
-      call(found->second, {}, false, 1);
+      const int m = found->first;
+      put_without(block, [m](const Word& other) { return is_m(other, m); });
+      call(found->second, {}, false, word, "input.m_subprograms, parameters 6071 to 6079");
       return;
     }
   }
   // is_call() left nothing else.
   variables_.write(149, words['T'].value, here_.line, words['T'].column);
   put_without(block, [](const Word& word) { return word.letter == 'T'; });
-  call(bound.tool_program, {}, false, 1);
+  call(bound.tool_program, {}, false, words['T'], "input.tool_program, parameter 6001#5");
 }
 
 // Behind a block with a move: the macro of G66, the one given last first; its own moves call the one before it.
@@ -277,11 +282,11 @@ ProgramUnit* Reader::lookup(std::int64_t number) {
 }
 
 bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool macro, int repeats, std::uint32_t column,
-                   std::string_view text) {
+                   std::string_view text, const std::string& by) {
   ProgramUnit* unit = lookup(number);
   const bool shut = unit != nullptr && is_shut(number);
   if (shut && text.empty()) {
-    fail("program " + program_name(number) + " asks for values that only the control knows", column);
+    fail("program " + program_name(number) + by + " asks for values that only the control knows", column);
   }
   if (unit == nullptr || shut) {
     if (shut || (!text.empty() && number >= options_.opaque_programs[0] && number <= options_.opaque_programs[1])) {
@@ -291,12 +296,13 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
       put_raw(text, origin_);
       interpreter_.forget_all();
       variables_.forget();
-      warn("program " + program_name(number) +
+      warn("program " + program_name(number) + by +
            (shut ? " asks for values that only the control knows" : " is not at hand") +
-           ": the call is kept, position and variables are not known afterwards");
+           ": the call is kept, position and variables are not known afterwards" +
+           (shut ? "" : "; a file " + program_name(number) + " beside this program makes them known"));
       return false;
     }
-    alarm(78, "program " + program_name(number) + " is not found", column);
+    alarm(78, "program " + program_name(number) + by + " is not found", column);
   }
   std::size_t macros = 0;
   for (const Frame& frame : frames_) {

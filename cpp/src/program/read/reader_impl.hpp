@@ -123,7 +123,7 @@ class Reader {
   void bound_call(const ParsedBlock& block, std::string_view raw);
   void modal_calls();
   bool enter(std::int64_t number, const MacroArguments& arguments, bool macro, int repeats, std::uint32_t column,
-             std::string_view text);  // false: the call was kept as it stands
+             std::string_view text, const std::string& by = {});  // false: the call was kept as it stands
   ProgramUnit* lookup(std::int64_t number);
   void leave();
   void put_without(const ParsedBlock& block, const std::function<bool(const Word&)>& left_out);
@@ -165,6 +165,7 @@ class Reader {
   bool moved_ = false;  ///< the line that is executed moves an axis
   std::uint64_t steps_;
   std::uint64_t bytes_read_ = 0;
+  std::uint64_t lines_read_ = 0;
 };
 
 }  // namespace shapegcode::detail

@@ -90,10 +90,7 @@ void MoveRewriter::set_compensation(int code) {
   const BlockWords& words = *words_;
   // Offset number 0 is a radius of 0, and so is none at all.
   const int number = words.has('D') ? static_cast<int>(words['D'].value) : std::max(d_number_, 0);
-  if (!words.has('D') && d_number_ < 0) {
-    interpreter_.warn_at(origin_,
-                         fmt::format("cutter compensation G{} without an offset number D: its radius is 0", code));
-  }
+  const bool named = words.has('D') || d_number_ >= 0;
   d_number_ = number;
   const auto radius = number == 0 ? std::optional(0.0) : interpreter_.offsets().radius(number);
   // While the control compensates with a radius that is not known, it cannot be told to stand where the tool would.
@@ -108,6 +105,10 @@ void MoveRewriter::set_compensation(int code) {
     programmed_.compensation = code;
     compensation_ = 40;
     return;
+  }
+  if (*radius == 0.0) {
+    interpreter_.warn_at(origin_, fmt::format("offset D{} has a radius of 0{}: G{} shifts the path by nothing", number,
+                                              named ? "" : ", as there is no D", code));
   }
   compensation_ = code;
   radius_mm_ = *radius;

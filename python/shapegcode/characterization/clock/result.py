@@ -205,6 +205,17 @@ class LearnedClock(Result):
             return "write it with -o FILE; shapegcode time part.nc -m FILE tells what other programs take"
         return "add runs of other programs, or state what the operator had set (override_percent in RUNS.toml)"
 
+    def next_step_after(self, file: str) -> str:
+        """The same where the machine file was written.
+
+        Args:
+            file: name of it.
+
+        Returns:
+            One sentence.
+        """
+        return f"shapegcode time part.nc -m {file} tells what other programs take" if self.ok else self.next_step
+
     def plots(self) -> Mapping[str, Plot]:
         """Predicted against measured."""
         return self._drawn_beside()

@@ -198,6 +198,17 @@ class ServoFit(Result):
             return "-o FILE writes the machine file with " + ", ".join(self.written)
         return "--plots DIR draws what is left; -m and -o write gain and feed-forward into a machine file"
 
+    def next_step_after(self, file: str) -> str:
+        """To look at the machine file that was written.
+
+        Args:
+            file: name of it.
+
+        Returns:
+            One sentence.
+        """
+        return f"shapegcode machine show {file} explains it; measured here: {', '.join(self.written)}"
+
     def tables(self) -> list[Table]:
         """What the models explain, and their parameters."""
         explained = (
