@@ -47,6 +47,7 @@ class EventReader {
     motion_ = on.motion;
     units_ = on.units;
     compensation_ = on.compensation;
+    coordinate_tenths_ = on.coordinate_system * 10;
   }
 
   Events read() {
@@ -283,6 +284,10 @@ class EventReader {
         add(ComparedKind::offsets, with_words(tenths, "H"));
         return;
       case Group::coordinates:
+        if (emitted_ && tenths == coordinate_tenths_ && tenths != 541 && words().has_any(xyz_letters)) {
+          return;  // a restart point in a shaped cut names what is in force
+        }
+        coordinate_tenths_ = tenths;
         add(ComparedKind::offsets, with_words(tenths, cycle_ == 80 ? "P" : ""));
         return;
       case Group::none:
@@ -467,6 +472,7 @@ class EventReader {
   int cycle_ = 80;
   int units_ = 21;
   int compensation_ = 40;
+  int coordinate_tenths_ = 540;  // of the coordinate system in force
   double feed_ = 0.0;
   bool one_shot_ = false;  // the axis words belong to a code of their own
   bool in_rapid_ = false;

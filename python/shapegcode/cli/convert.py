@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Rewrites the cutting moves of a program so that they no longer excite the machine's vibration modes, and "
         "judges the written program by playing it back: vibration, contour error, time. The input is never "
-        "overwritten; a program that misses its tolerance is written beside OUT with another suffix (exit code 1)."
+        "overwritten; a program that nobody should run is written beside OUT with another suffix (exit code 1)."
     )
     parser.add_argument("input", metavar="IN", help="CNC program")
     add_machine_argument(parser)

@@ -195,6 +195,11 @@ class Aims:
             )
         return bool(order)
 
+    @property
+    def priced(self) -> set[int]:
+        """Cuts that are shaped as closely as their price allows, and not for the tolerance that was asked for."""
+        return {index for index in self._priced if not self.reasons[index]}
+
     def shaped_for_um(self, index: int) -> float:
         """Contour tolerance that a cut is shaped for: what was asked, or the tightest that its price allows."""
         return max(self._asked_um, self.room_um[index] / MARGIN) if index in self._priced else self._asked_um

@@ -302,7 +302,7 @@ def _warnings(run: Run, written: Written, figures: PlayedFigures) -> list[str]:
     if not written.placed:
         # Where something was shaped, what the verdict rests on names them.
         warnings += open_axes(program, machine)
-    warnings += played_warnings(program, figures, machine)
+    warnings += played_warnings(program, figures, machine, is_priced=bool(run.aims.priced))
     return warnings + text_warnings(program, written.placed, figures, machine, written.size, written.blocks)
 
 

@@ -107,7 +107,7 @@ def _cure(reason: str) -> str:
     if "price." in reason:
         return "allow more time (--max-cut-time-increase, --max-time-increase) or a larger --contour-tolerance"
     if "--only" in reason or "--leave" in reason:
-        return "shape it too (--only, --leave)"
+        return "choose it too"
     if "minimum_feed" in reason or "feed" in reason.partition(" ")[0]:
         return "a programmed feed within controller.minimum_feed_mm_per_min"
     if "max_program" in reason or "bytes" in reason or "baud" in reason:
@@ -183,9 +183,18 @@ def chosen_cuts(program: Program, only: Sequence[Lines] | None, leave: Sequence[
                     f"{option} {begin}-{end}: no cut that can be shaped there; cuts are in lines {near or 'none'}"
                 )
     found = {}
+    for span in spans:
+        if (
+            only is not None
+            and any(_overlap(span, each) for each in leave)
+            and any(_overlap(span, each) for each in only)
+        ):
+            raise _core.ArgumentError(
+                f"--only and --leave both name the cut in lines {span[0]} to {span[1]}: name it in one of them"
+            )
     for index, span in enumerate(spans):
         if any(_overlap(span, each) for each in leave):
-            found[index] = "left unchanged by --leave"
+            found[index] = "named by --leave"
         elif only is not None and not any(_overlap(span, each) for each in only):
             found[index] = "not chosen by --only"
     return found

@@ -165,10 +165,19 @@ class Conversion(PlayedFigures, Result):
                 f"{target.original.max:.1f} µm; the program is unchanged"
             )
         change = change_percent(self.cycle_time_s.original, self.cycle_time_s.emitted)
+        worst_stay = target.original.max - target.emitted.max < _LEAST_SHOWN_UM and (
+            vibration.original[axis] - vibration.emitted[axis] < _LEAST_SHOWN_UM
+        )
+        best = max(self.cuts, key=lambda cut: cut.gain_um if cut.is_shaped else -1.0)
+        beside = ""
+        if worst_stay and best.is_shaped:
+            beside = "; the worst cuts are left unchanged, lines {} to {} are better by ".format(*best.lines)
+            beside += f"{best.gain_um:.1f} µm"
         return (
             f"{verdict}: residual vibration {axis.upper()} "
             f"{vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
-            f"contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}{self._share}"
+            f"contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
+            f"{self._share}{beside}"
         )
 
     def _why_unchanged(self) -> str:
@@ -221,6 +230,8 @@ class Conversion(PlayedFigures, Result):
             return "run the original program: nothing in it was shaped."
         if self.recommendation.startswith("no benefit"):
             return "run the original program: the shaped one brings no benefit."
+        if self.proof is not None and self.proof.refused:
+            return f"do not run it, and report this defect of shapegcode with the program: {self.reason}."
         if not self.is_written_as_output:
             stated = any("; feasible: " in warning for warning in self.warnings)
             remedy = "a warning says which limit is feasible" if stated else "lower the feed there, and convert again"

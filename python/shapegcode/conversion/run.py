@@ -156,6 +156,7 @@ class Run:
             rapids = shape_rapids(
                 settled.emitted, settled.written.placed, self.model, self.grid, self.pool, self.budget
             )
+            rapids = self._within_price(settled, rapids)
             written = replace(settled.written, size=rapids.emitted.size, placed=rapids.placed)
             settled = replace(settled, written=written, emitted=rapids.emitted)
         if not settled.written.placed and (rapids is None or not rapids.outcome.shaped) and self._is_alone():
@@ -164,9 +165,28 @@ class Run:
             settled = replace(settled, written=written, emitted=self.program)
         return Shaped(settled, rapids, original_within)
 
+    def _within_price(self, settled: Settled, rapids: ShapedRapids) -> ShapedRapids:
+        """The shaped rapids, or none where with them the program would take more time than its price."""
+        original_s = self.original_s.result()
+        price_s = original_s * self.machine.price.program_time_percent / 100.0
+        if self.machine.emission.header:
+            added_s = self.model.cycle_time_s(rapids.emitted.core) - original_s
+        else:
+            added_s = self._excess_s(settled) + price_s + rapids.extra_s
+        if not rapids.outcome.shaped or added_s <= price_s:
+            return rapids
+        outcome, count = rapids.outcome, rapids.outcome.shaped
+        kept = {**outcome.kept, "the price of the program": count}
+        outcome = replace(outcome, shaped=0, kept=kept, time_saved_s=0.0, blocks=0, slowed_blocks=0, moves=())
+        why = f"{count} rapids stay rapids: with them as cutting moves the program would take {added_s:.2f} s more"
+        return replace(
+            rapids, emitted=settled.emitted, placed=settled.written.placed, outcome=outcome, extra_s=0.0,
+            warnings=[f"{why}, price {price_s:.2f} s (price.program_time_percent)"],
+        )  # fmt: skip
+
     def _is_alone(self) -> bool:
-        """Whether the program has its file for itself."""
-        return len(self.program.own_text) == self.program.size
+        """Whether nothing was left out when it was read: its file as a whole is what was given."""
+        return self.program.number is None
 
     def _original_is_within(self) -> bool:
         """Whether every cut as programmed keeps its limits in every operating condition that counts for it."""

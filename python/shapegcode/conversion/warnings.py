@@ -43,13 +43,14 @@ def open_axes(program: Program, machine: Machine) -> list[str]:
     ]
 
 
-def played_warnings(program: Program, figures: PlayedFigures, machine: Machine) -> list[str]:
+def played_warnings(program: Program, figures: PlayedFigures, machine: Machine, *, is_priced: bool) -> list[str]:
     """What playing the emitted program showed: misses, the tolerance that binds, figures made worse.
 
     Args:
         program: the original.
         figures: of its regions.
         machine: whose tolerances were applied.
+        is_priced: a cut was shaped for a larger tolerance, because of its price.
 
     Returns:
         The warnings, each with its remedy where there is one.
@@ -61,7 +62,7 @@ def played_warnings(program: Program, figures: PlayedFigures, machine: Machine) 
         for miss in region.misses
     ]
     rounding_um = math.sqrt(2.0) * least_increment_mm(machine, 21) * 1e3
-    return [*misses, *_binding(figures, machine.tolerance, rounding_um), *_worse(figures)]
+    return [*misses, *_binding(figures, machine.tolerance, rounding_um, is_priced=is_priced), *_worse(figures)]
 
 
 def text_warnings(
@@ -108,14 +109,15 @@ def _worse(figures: PlayedFigures) -> list[str]:
     ]
 
 
-def _binding(figures: PlayedFigures, tolerance: Tolerance, rounding_um: float) -> Iterator[str]:
+def _binding(figures: PlayedFigures, tolerance: Tolerance, rounding_um: float, *, is_priced: bool) -> Iterator[str]:
     """Which tolerance a conversion left, by how much, and what would be feasible; nothing where all were kept."""
     contour = max((region.contour_error_um for region in figures.regions), default=0.0)
     if contour > tolerance.contour_um:
+        how = "within the price (price.*)" if is_priced else "with the feed lowered as far as it helps"
         share = f"; rounding the words alone may take {rounding_um:.1f} um of it"
         yield (
-            f"tolerance.contour_um = {tolerance.contour_um:g} binds: {contour:.1f} um were reached with the feed "
-            f"lowered as far as it helps{share if rounding_um > 0.2 * contour else ''}; "
+            f"tolerance.contour_um = {tolerance.contour_um:g} binds: {contour:.1f} um were reached "
+            f"{how}{share if rounding_um > 0.2 * contour else ''}; "
             f"feasible: {_rounded_up(contour):g} um"
         )
     over = [pair for region in figures.regions for pair in region.over_limit()]

@@ -162,7 +162,7 @@ class CaseVerdict:
         counts: it lies in the band that the machine file states.
         residual_um: largest of all regions.
         contour_error_um: largest of all regions; null where it was not measured.
-        time_s: of all regions.
+        time_s: of all cuts; null where those left unchanged were not simulated.
         within: every region keeps its limits.
         figure: which figure takes the largest share of its limit.
         value_um: that figure.
@@ -183,7 +183,7 @@ class CaseVerdict:
     counts: bool
     residual_um: Xyz[float]
     contour_error_um: Tracks[float | None]
-    time_s: float
+    time_s: float | None
     within: bool
     figure: str
     value_um: float

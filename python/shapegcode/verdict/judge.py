@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import TypeVar
 
@@ -376,7 +376,8 @@ class Judge:
             ]
             if rows:
                 played, within, lines = [row[0] for row in rows], [row[1] for row in rows], [row[2] for row in rows]
-                verdicts.append(case_verdict(case, played, within, lines, side))
+                verdict = case_verdict(case, played, within, lines, side)
+                verdicts.append(verdict if len(rows) == len(figures) else replace(verdict, time_s=None))
         return tuple(verdicts)
 
 

@@ -33,7 +33,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         ),
         Column("command", value=lambda case: _micrometres(case.contour_error_um.command)),
         Column("table", value=lambda case: _micrometres(case.contour_error_um.response)),
-        Column("s", value="time_s", digits=2),
+        Column("s", value=lambda case: "-" if case.time_s is None else f"{case.time_s:.2f}"),
         Column("of limit", value=lambda case: _share(case.share_of_limit)),
         Column("verdict", value=lambda case: _verdict(case) + (" <- worst" if case is worst else ""), left=True),
     )
