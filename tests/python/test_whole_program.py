@@ -362,14 +362,45 @@ def test_the_answer_of_a_program(name: str) -> None:
     assert verdict is None or verdict in conversion.text
 
 
+def test_restart_points_are_no_change_of_the_program() -> None:
+    """The modal line of a restart point names what is in force: neither an offset nor the end of a cut."""
+    long = FACETS.replace("F6000.", "F600.")
+    conversion = converted(
+        part(long), machine_with({"tolerance.contour_um": 4.0, "shaping.least_gain_um": 0.1,
+                                  "emission.restart_interval_s": 2.0, "emission.restart_stops": True}),
+        shape_all=True, max_time_increase_percent=1e4, max_cut_time_increase_percent=1e4,
+    )  # fmt: skip
+    assert len(conversion.restart_points) > 3
+    assert conversion.proof is not None
+    assert conversion.proof.refused == ()
+    assert "1 of 1 tool calls" in conversion.proof.answer
+
+
+def test_shaped_rapids_stay_within_the_price_too() -> None:
+    machine = machine_with({"tolerance.contour_um": 15.0, "shaping.rapids": True})
+    dear = converted(MIXED, machine, max_time_increase_percent=1e4, max_cut_time_increase_percent=1e4)
+    assert dear.rapids is not None
+    for percent in (0.5, 1.0, 2.0, 4.0):
+        conversion = converted(MIXED, machine, max_time_increase_percent=percent, max_cut_time_increase_percent=1e4)
+        times = conversion.cycle_time_s
+        assert times.emitted <= times.original * (1.0 + percent / 100.0) + 1e-9
+
+
+def test_a_cut_that_is_chosen_and_left_is_refused() -> None:
+    with pytest.raises(sg.ShapegcodeError, match="--only and --leave both name the cut in lines 8 to"):
+        converted(MIXED, machine_with({}), only=[(8, 20)], leave=[(10, 12)])
+
+
 def test_what_is_not_shaped_is_written_as_it_was() -> None:
     """Calls, macros and coordinate modes too, which are expanded only to be simulated."""
     alone = "%\nO1\nG21G17G90G94G54\nG0X0Y0Z5.\n#1=2.\nG68X0Y0R30.\nG1X[#1*10.]F30.\nG69\nG0Z5.\nM30\n%\n"
-    conversion = converted(alone, machine_with({}))
-    assert conversion.expanded
-    assert conversion.recommendation == NONE
-    assert conversion.text == alone.encode()
-    assert conversion.bytes_emitted == len(alone)
+    called = "%\nO1\nG21G17G90G94G54\nG0X0Y0Z5.\nM98P100\nG0Z5.\nM30\nO100\nG1X20.F30.\nX0\nM99\n%\n"
+    for text in (alone, called):
+        conversion = converted(text, machine_with({}))
+        assert conversion.expanded
+        assert conversion.recommendation == NONE
+        assert conversion.text == text.encode()
+        assert conversion.bytes_emitted == len(text)
 
 
 def test_rounding_by_the_control_is_told_apart_from_vibration() -> None:
