@@ -41,6 +41,9 @@ OverrideMaxima::OverrideMaxima(const Path& path, const Segments& blocks, const s
 
 OverrideFigures OverrideMaxima::at(double override_ratio) {
   figures_ = {override_ratio, 0.0, 0.0};
+  if (groups_.empty()) {
+    return figures_;  // rounded to blocks that go nowhere
+  }
   const BlockPlayer player(blocks_, options_.period_s, block_end_, override_ratio);
   followed_.assign(groups_.size(), false);
   places_.resize(groups_.size());

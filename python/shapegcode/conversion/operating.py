@@ -167,6 +167,8 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: PlayedFig
     place, region = placed[index], figures.regions[index]
     blocks = place.blocks(emitted)
     feeds = blocks.segment_feeds_mm_per_s
+    if len(feeds) == 0:
+        return "here the shaped cuts are shorter than an increment"
     fast = np.flatnonzero(feeds >= _FAST_RATIO * feeds.max())
     fast = fast[:: math.ceil(len(fast) / _FAST_BLOCKS)]
     axes = model.machine.axes.as_tuple()
