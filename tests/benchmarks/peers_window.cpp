@@ -25,8 +25,6 @@ std::vector<std::vector<Segment>> cutting_paths(const char* file, double feed_mm
   std::ifstream in(file, std::ios::binary);
   if (!in) throw std::runtime_error(std::string(file) + " cannot be read");
   ReaderOptions options;
-  options.limits.moves = 100'000'000;  // as in step_time.cpp
-  options.limits.bytes = 4'000'000'000;
   const Program program = read_program(std::string(std::istreambuf_iterator<char>(in), {}), options);
   std::vector<std::vector<Segment>> paths;
   for (const auto& region : program.regions) {

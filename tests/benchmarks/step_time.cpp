@@ -83,8 +83,6 @@ std::shared_ptr<const Path> cutting_path(const char* file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw std::runtime_error(std::string(file) + " cannot be read");
   ReaderOptions options;
-  options.limits.moves = 100'000'000;  // what is measured here is longer than a machine file allows by itself
-  options.limits.bytes = 4'000'000'000;
   const Program program = read_program(std::string(std::istreambuf_iterator<char>(in), {}), options);
   std::shared_ptr<const Path> longest;
   for (const auto& region : program.regions) {

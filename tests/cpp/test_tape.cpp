@@ -79,7 +79,8 @@ TEST_CASE("tape: macro words by their first two letters") {
 TEST_CASE("tape: what other controls leave out") {
   CHECK(warns(read("G04\nG01X1.F100.\n"), "a stop, no dwell", 4));
   CHECK(read("G41G01X10.F100.\nX20.\nG40X30.\n").final_state.position_mm == Vector3(30, 0, 0));
-  CHECK(warns(read("G41G01X10.F100.\nG40X30.\n"), "its radius is 0", 4));
+  CHECK(warns(read("G41G01X10.F100.\nG40X30.\n"),
+              "offset D0 has a radius of 0, as there is no D: G41 shifts the path by nothing", 4));
   ReaderOptions options;
   options.arc_without_centre_is_line = true;
   const Program lines = read("G01X1.F100.\nG02X5.Y5.\n", options);
