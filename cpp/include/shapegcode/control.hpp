@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <span>
@@ -53,8 +54,10 @@ class BlockPlayer {
     position = along_mm >= open_.length_mm ? open_.end_mm : open_.start_mm + along_mm / open_.length_mm * way_mm_;
     return true;
   }
-  /// Passes over the set-points that follow on the same line: their number, and the last of them.
-  std::size_t pass_line(Vector3& position) noexcept;
+  /// Passes over the set-points that follow on the same block before `until_mm` from its start: their number, and the
+  /// last of them.
+  std::size_t pass_block(Vector3& position, double until_mm = whole_block) noexcept;
+  static constexpr double whole_block = std::numeric_limits<double>::infinity();
   /// As if the set-point so long behind the beginning of a block were the one last given; gives it.
   Vector3 begin_on(std::size_t block, double elapsed_s) noexcept;
   /// Block on which the set-point last given lies.

@@ -99,7 +99,7 @@ struct PlaybackFigures {
   std::vector<double> response_orbit_error_percent;  ///< the same of the response, where asked for
   FeedExcess feed_excess;                            ///< of the command, where asked for
   Vector3 end_mm = Vector3::Zero();
-  std::vector<StarvedFigures> starved;  ///< one per PlaybackOptions::starved_blocks
+  std::vector<StarvedFigures> starved;           ///< one per PlaybackOptions::starved_blocks
   std::vector<OverrideFigures> other_overrides;  ///< one per PlaybackOptions::other_overrides
   Samples recorded_command;
   Samples recorded_response;

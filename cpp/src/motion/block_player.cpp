@@ -176,20 +176,21 @@ Vector3 BlockPlayer::stand_on_block() noexcept {
   if (open_.kind != SegmentKind::arc && open_.length_mm > 0.0) {
     on_line_until_s_ = duration_s_ - tick_tolerance * period_s_;
   }
-  return point_at(open_, std::min(open_.length_mm, speed_mm_per_s_ * elapsed_s_));
+  return point_at(open_, along_mm());
 }
 
-std::size_t BlockPlayer::pass_line(Vector3& position) noexcept {
+std::size_t BlockPlayer::pass_block(Vector3& position, double until_mm) noexcept {
+  if (finished_ || !(open_.length_mm > 0.0)) {
+    return 0;
+  }
+  const double until_s = std::min(duration_s_ - tick_tolerance * period_s_, until_mm / speed_mm_per_s_);
   std::size_t passed = 0;
-  double elapsed_s = elapsed_s_;
-  while (elapsed_s_ + period_s_ < on_line_until_s_) {
-    elapsed_s = elapsed_s_;
+  while (elapsed_s_ + period_s_ < until_s) {
     elapsed_s_ += period_s_;
     ++passed;
   }
   if (passed > 0) {
-    elapsed_s_ = elapsed_s;
-    step(position);
+    position = stand_on_block();
   }
   return passed;
 }

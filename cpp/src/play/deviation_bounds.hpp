@@ -13,15 +13,21 @@
 
 namespace shapegcode::detail {
 
-/// Blocks in a row, some millimetres of path together.
+/// Some millimetres of blocks: several in a row, or part of one.
 struct BlockGroup {
   std::size_t first_block = 0;
-  double s_mm = 0.0;       ///< foot of its first set-point, from the path's start
-  double bound_mm = 0.0;   ///< no point of its blocks is further from the path
-  double corner_mm = 0.0;  ///< no corner of the path that is nearest to this group is further from its set-points' track
-  bool turns_back = false;  ///< the path turns by a right angle or more: which leg a point belongs to is not plain
+  double along_mm = 0.0;  ///< where on that block the group begins
+  double s_mm = 0.0;      ///< foot of its first set-point, from the path's start
+  double bound_mm = 0.0;  ///< no point of its blocks is further from the path
+  double corner_mm =
+      0.0;  ///< no corner of the path that is nearest to this group is further from its set-points' track
+  double turn_rad = 0.0;   ///< by which the path changes its direction, all changes together
   double first_corner_mm = std::numeric_limits<double>::infinity();  ///< of the corners nearest to its lines
   double last_corner_mm = -std::numeric_limits<double>::infinity();
+  /// Whether the set-point last given is in it, or behind it.
+  [[nodiscard]] bool is_reached(const BlockPlayer& player) const noexcept {
+    return player.block() > first_block || (player.block() == first_block && player.along_mm() >= along_mm);
+  }
   [[nodiscard]] bool has_corners() const noexcept { return first_corner_mm <= last_corner_mm; }
 };
 
@@ -48,7 +54,7 @@ class DeviationBounds {
   };
   [[nodiscard]] double bound_between(const Sample& before, const Sample& now) const noexcept;
   [[nodiscard]] double travel_mm(const Sample& before, const Sample& now) const noexcept;
-  [[nodiscard]] bool turns_back(const Sample& before, const Sample& now) const noexcept;
+  [[nodiscard]] double turn_rad(const Sample& before, const Sample& now) const noexcept;
   void widen_track(const Sample& now) noexcept;
 
   Path path_;
@@ -59,8 +65,9 @@ class DeviationBounds {
   CornerReach corners_;
   std::vector<BlockGroup> groups_;
   Sample last_;
-  Segment open_;                // block of the last set-point
-  bool before_is_arc_ = false;  // that of the one before
+  double curvature_ = 0.0;         // 1/mm, of the block of the last set-point
+  double curvature_before_ = 0.0;  // of that of the one before
+  double path_curvature_ = 0.0;    // of the segment of its foot
 };
 
 }  // namespace shapegcode::detail

@@ -45,7 +45,7 @@ class FreeModes {
 
   double period_s_;
   std::vector<Mode> modes_;
-  std::vector<State> states_;  // one for each
+  std::vector<State> states_;         // one for each
   std::vector<ModeTransition> over_;  // of each mode over 1, 2 ... periods
   Vector3 velocity_ = Vector3::Zero();
 };

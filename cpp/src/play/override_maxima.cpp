@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <cstdio>
 #include <utility>
 
 namespace shapegcode::detail {
@@ -15,7 +13,11 @@ constexpr double slack_mm = 1e-10;
 // So far before a stretch that counts a run begins: the trackers and the corners near its beginning are then those of a
 // run from the path's start.
 constexpr double run_in_mm = 1.0;
-
+// In groups, about: of one with corners, and without.
+constexpr std::size_t run_in_with_corners = 12;
+constexpr std::size_t run_in_without = 2;
+// Of the path over a group and its neighbours, where the piece beside a point is plain.
+constexpr double most_turn_rad = 1.0;
 // Groups that are followed before the others are walked along: their maxima settle many of these.
 constexpr std::size_t followed_first = 4;
 
@@ -56,20 +58,9 @@ OverrideFigures OverrideMaxima::at(double override_ratio) {
   }
   is_walked_ = false;
   search(player, followed_first);
-  auto show = [&](const char* what) {
-    if (!getenv("DBG")) return;
-    std::vector<double> r;
-    for (std::size_t g = 0; g < groups_.size(); ++g) r.push_back(response_mm_[g]);
-    std::sort(r.begin(), r.end());
-    auto q = [](auto& v, double f) { return 1e3 * v[std::size_t(f * double(v.size() - 1))]; };
-    fprintf(stderr, "  %s M %.2f %.2f; min %.2f 10%% %.2f med %.2f 90%% %.2f 99%% %.2f max %.2f\n", what, 1e3 * figures_.command_mm, 1e3 * figures_.response_mm, q(r, 0), q(r, .1), q(r, .5), q(r, .9), q(r, .99), q(r, 1));
-  };
-  show("before walk");
   walk(player);
   is_walked_ = true;
-  show("after walk");
   search(player, groups_.size());
-  if (getenv("DBG")) fprintf(stderr, "followed %zu of %zu, samples %zu\n", std::size_t(std::count(followed_.begin(), followed_.end(), true)), groups_.size(), samples_);
   return figures_;
 }
 
@@ -92,7 +83,7 @@ void OverrideMaxima::pass(BlockPlayer player) {
     } else {
       const double reachable2 = modes_.step((position - last) * rate_hz, 1);
       largest2 = std::max(largest2, reachable2);
-      while (group + 1 < groups_.size() && player.block() >= groups_[group + 1].first_block) {
+      while (group + 1 < groups_.size() && groups_[group + 1].is_reached(player)) {
         deflection_mm_[group] = std::sqrt(largest2);
         ++group;
         begin_group();
@@ -100,14 +91,54 @@ void OverrideMaxima::pass(BlockPlayer player) {
       }
     }
     last = position;
-    const std::size_t periods = player.pass_line(position);
-    if (periods > 0) {
+    const Segment& block = player.on();
+    const bool ends_on_block = group + 1 < groups_.size() && groups_[group + 1].first_block == player.block();
+    const double from_mm = player.along_mm();
+    const std::size_t periods =
+        player.pass_block(position, ends_on_block ? groups_[group + 1].along_mm : BlockPlayer::whole_block);
+    if (periods == 0) {
+      continue;
+    }
+    if (block.kind == SegmentKind::arc) {
+      largest2 = std::max(largest2, turn(block, from_mm, player.along_mm(), periods));
+    } else {
       const Vector3 velocity = (position - last) * (rate_hz / static_cast<double>(periods));
       largest2 = std::max(largest2, modes_.step(velocity, periods));
-      last = position;
     }
+    last = position;
   }
   deflection_mm_[group] = std::sqrt(largest2);
+}
+
+// So many equal steps along an arc: its radius turns by the same angle in each.
+double OverrideMaxima::turn(const Segment& arc, double from_mm, double to_mm, std::size_t periods) noexcept {
+  const double steps = static_cast<double>(periods);
+  const double fraction = (to_mm - from_mm) / arc.length_mm / steps;
+  const double cosine = std::cos(arc.sweep_rad * fraction);
+  const double sine = std::sin(arc.sweep_rad * fraction);
+  const double growth_mm = (arc.end_radius_mm - arc.start_radius_mm) * fraction;
+  const double rate_hz = 1.0 / options_.period_s;
+  const int n = arc.normal;
+  const int a = (n + 1) % axis_count;
+  const int b = (n + 2) % axis_count;
+  const double angle = arc.start_angle_rad + arc.sweep_rad * from_mm / arc.length_mm;
+  double radius = arc.start_radius_mm + (arc.end_radius_mm - arc.start_radius_mm) * from_mm / arc.length_mm;
+  double along = std::cos(angle);
+  double across = std::sin(angle);
+  Vector3 velocity;
+  velocity[n] = (arc.end_mm[n] - arc.start_mm[n]) * fraction * rate_hz;
+  double largest2 = 0.0;
+  for (std::size_t k = 0; k < periods; ++k) {
+    const double next_along = cosine * along - sine * across;
+    const double next_across = sine * along + cosine * across;
+    velocity[a] = ((radius + growth_mm) * next_along - radius * along) * rate_hz;
+    velocity[b] = ((radius + growth_mm) * next_across - radius * across) * rate_hz;
+    largest2 = std::max(largest2, modes_.step(velocity, 1));
+    along = next_along;
+    across = next_across;
+    radius += growth_mm;
+  }
+  return largest2;
 }
 
 bool OverrideMaxima::may_hold_command(std::size_t group) const noexcept {
@@ -124,14 +155,19 @@ Vector3 OverrideMaxima::begin_at(BlockPlayer& player, std::size_t group) noexcep
   return player.begin_on(place.block, place.elapsed_s);
 }
 
-// The distance from any piece of path near by is a bound; beside sharp corners the tracker may hold to another leg.
+// The distance from any piece of path near by is a bound; where the path turns, the tracker may hold to another one.
 void OverrideMaxima::walk(BlockPlayer player) {
   PathWalk path(path_);
   const double rate_hz = 1.0 / options_.period_s;
   const auto is_walked = [&](std::size_t group) {
-    const bool turns_back = groups_[group].turns_back || (group > 0 && groups_[group - 1].turns_back) ||
-                            (group + 1 < groups_.size() && groups_[group + 1].turns_back);
-    return !turns_back && !followed_[group] && may_hold_response(group);
+    double turn_rad = groups_[group].turn_rad;
+    if (group > 0) {
+      turn_rad += groups_[group - 1].turn_rad;
+    }
+    if (group + 1 < groups_.size()) {
+      turn_rad += groups_[group + 1].turn_rad;
+    }
+    return turn_rad < most_turn_rad && !followed_[group] && may_hold_response(group);
   };
   Vector3 position = Vector3::Zero();
   for (std::size_t group = 0; group < groups_.size();) {
@@ -143,7 +179,7 @@ void OverrideMaxima::walk(BlockPlayer player) {
     path.begin_at(groups_[group].s_mm);
     double largest2 = path.distance2_mm2(position + modes_.deflection());
     const auto end_group = [&] {
-      const double corner = groups_[group].corner_mm > 0.0 ? groups_[group].corner_mm + deflection_mm_[group] : 0.0;
+      const double corner = groups_[group].has_corners() ? groups_[group].corner_mm + deflection_mm_[group] : 0.0;
       response_mm_[group] = std::min(response_mm_[group], std::max(std::sqrt(largest2), corner));
       largest2 = 0.0;
       ++group;
@@ -154,7 +190,7 @@ void OverrideMaxima::walk(BlockPlayer player) {
       modes_.step((position - before) * rate_hz);
       before = position;
       const double distance2 = path.distance2_mm2(position + modes_.deflection());
-      while (more && group + 1 < groups_.size() && player.block() >= groups_[group + 1].first_block) {
+      while (more && group + 1 < groups_.size() && groups_[group + 1].is_reached(player)) {
         end_group();
         more = is_walked(group);
       }
@@ -168,11 +204,11 @@ void OverrideMaxima::walk(BlockPlayer player) {
 
 void OverrideMaxima::search(const BlockPlayer& player, std::size_t most) {
   std::vector<std::pair<double, std::size_t>> open;
-  std::size_t run_in = 0;  // groups that are followed at most, those before each of them too
+  std::size_t run_in = 0;  // groups that would be followed, with those before each of them
   for (std::size_t group = 0; group < groups_.size(); ++group) {
     if (may_hold_more(group)) {
       open.emplace_back(response_mm_[group], group);
-      run_in += groups_[group].has_corners() ? 12 : 2;
+      run_in += groups_[group].has_corners() ? run_in_with_corners : run_in_without;
     }
   }
   if (is_walked_ && run_in > 2 * groups_.size()) {
@@ -194,25 +230,22 @@ void OverrideMaxima::search(const BlockPlayer& player, std::size_t most) {
 // Group from whose first set-point on everything is as in a run from the start, once `group` is reached.
 std::size_t OverrideMaxima::restart_before(std::size_t group) const noexcept {
   double needed_mm = groups_[group].s_mm - run_in_mm;
+  const double window_mm = CornerReach::window_mm + run_in_mm;
   if (groups_[group].has_corners()) {
-    needed_mm = std::min(needed_mm, groups_[group].first_corner_mm - CornerReach::window_mm - run_in_mm);
-  }
-  const double reach_mm = groups_[group].s_mm - CornerReach::patience_mm;
-  std::size_t from = group;
-  while (from > 0 && groups_[from].s_mm > std::min(needed_mm, reach_mm)) {
-    --from;
+    const double corner_mm = groups_[group].first_corner_mm;
+    needed_mm = std::min(needed_mm, corner_mm - window_mm);
     // A corner that seems missed keeps those behind it waiting.
-    const BlockGroup& before = groups_[from];
-    if (groups_[group].has_corners() && before.has_corners() &&
-        before.bound_mm + deflection_mm_[from] > CornerReach::missed_mm) {
-      needed_mm = std::min(needed_mm, before.first_corner_mm - CornerReach::window_mm - run_in_mm);
+    for (std::size_t k = group; k > 0 && groups_[k].s_mm > corner_mm - CornerReach::patience_mm; --k) {
+      const BlockGroup& before = groups_[k - 1];
+      if (before.has_corners() && before.corner_mm + deflection_mm_[k - 1] > CornerReach::missed_mm) {
+        needed_mm = std::min(needed_mm, before.first_corner_mm - window_mm);
+      }
     }
   }
-  std::size_t restart = group;
-  while (restart > 0 && groups_[restart].s_mm > needed_mm) {
-    --restart;
+  while (group > 0 && groups_[group].s_mm > needed_mm) {
+    --group;
   }
-  return restart;
+  return group;
 }
 
 void OverrideMaxima::follow(BlockPlayer player, std::size_t first, std::size_t last) {
@@ -234,14 +267,13 @@ void OverrideMaxima::follow(BlockPlayer player, std::size_t first, std::size_t l
       before = position;
     }
     moved = true;
-    while (group + 1 < groups_.size() && player.block() >= groups_[group + 1].first_block) {
+    while (group + 1 < groups_.size() && groups_[group + 1].is_reached(player)) {
       ++group;
       if (is_walked_ && group == last + 1 && may_hold_more(group)) {
         last = group;
         corner_mm = std::max(corner_mm, groups_[group].last_corner_mm);
       }
     }
-    ++samples_;
     const Vector3 response = position + modes_.deflection();
     const double command_off = std::abs(command_tracker_.step(position));
     const double response_off = std::abs(response_tracker_.step(response, command_tracker_));

@@ -14,15 +14,16 @@
 namespace shapegcode::detail {
 
 /// A first pass goes from block to block, with the modes moved in closed form, and says how far the table can be from
-/// its command in each group of blocks. Where that leaves many groups that could hold a maximum, a second pass takes the
-/// distance of the table from the pieces of path beside it, without a search. What then could hold a maximum is
-/// followed set-point by set-point as a playback in full does, the most promising group first, until no other can hold a
-/// larger one.
+/// its command in each group of blocks. Where that leaves many groups that could hold a maximum, a second pass takes
+/// the distance of the table from the pieces of path beside it, without a search. What then could hold a maximum is
+/// followed set-point by set-point as a playback in full does, the most promising group first, until no other can hold
+/// a larger one.
 class OverrideMaxima {
  public:
   /// `bounds` and `groups` of the same blocks at any override; they, blocks, tracker and options must outlive it.
-  OverrideMaxima(const Path& path, const Segments& blocks, const std::vector<BlockGroup>& groups, const CornerReach& corners,
-                 const ContourTracker& tracker, BlockEnd block_end, const PlaybackOptions& options);
+  OverrideMaxima(const Path& path, const Segments& blocks, const std::vector<BlockGroup>& groups,
+                 const CornerReach& corners, const ContourTracker& tracker, BlockEnd block_end,
+                 const PlaybackOptions& options);
   [[nodiscard]] OverrideFigures at(double override_ratio);
 
  private:
@@ -32,6 +33,7 @@ class OverrideMaxima {
     Vector3 velocity_mm_per_s = Vector3::Zero();
   };
   void pass(BlockPlayer player);
+  double turn(const Segment& arc, double from_mm, double to_mm, std::size_t periods) noexcept;
   void walk(BlockPlayer player);
   /// Follows the groups with the largest bounds: so many of them, or until no other can hold a larger maximum.
   void search(const BlockPlayer& player, std::size_t most);
@@ -57,13 +59,12 @@ class OverrideMaxima {
   CornerReach response_reach_;
   // Of each group:
   std::vector<Place> places_;
-  std::vector<double> states_;  // of the modes
+  std::vector<double> states_;         // of the modes
   std::vector<double> deflection_mm_;  // no response is further from its command
   std::vector<double> response_mm_;    // no response is further from the path, nor a corner from its track
   std::vector<bool> followed_;
   OverrideFigures figures_;
-  bool is_walked_ = false;
-  std::size_t samples_ = 0;
+  bool is_walked_ = false;  // the bounds are near what they bound
 };
 
 }  // namespace shapegcode::detail

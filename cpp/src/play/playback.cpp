@@ -320,11 +320,10 @@ void check_other_overrides(const PlaybackOptions& options) {
 
 // Whether the bounds of DeviationBounds hold and the modes move in closed form.
 bool has_bounds(const Path& path, const PlaybackOptions& options) {
-  const bool varies = std::any_of(options.mode_tables.begin(), options.mode_tables.end(),
-                                  [](const std::vector<ModeTable>& tables) {
-                                    return std::any_of(tables.begin(), tables.end(),
-                                                       [](const ModeTable& table) { return !table.empty(); });
-                                  });
+  const bool varies =
+      std::any_of(options.mode_tables.begin(), options.mode_tables.end(), [](const std::vector<ModeTable>& tables) {
+        return std::any_of(tables.begin(), tables.end(), [](const ModeTable& table) { return !table.empty(); });
+      });
   const bool measures = options.measure_contour && options.measure_command && options.measure_response;
   return measures && !varies && options.drives.empty() && options.axis_filters.empty() && path.length_mm() > 0.0;
 }
@@ -402,7 +401,8 @@ PlaybackFigures play_blocks(const Segments& blocks, const Path& path, BlockEnd b
   figures.starved = std::move(starved);
   if (bounds) {
     const std::vector<detail::BlockGroup>& groups = bounds->finish();
-    detail::OverrideMaxima maxima(path, blocks, groups, bounds->corners(), tracker_of(path, options), block_end, options);
+    detail::OverrideMaxima maxima(path, blocks, groups, bounds->corners(), tracker_of(path, options), block_end,
+                                  options);
     for (const double ratio : options.other_overrides) {
       figures.other_overrides.push_back(maxima.at(ratio));
     }
