@@ -116,8 +116,6 @@ def _at_other_overrides(figures: PlayedFigures) -> Iterator[str]:
     worst = max(turned, key=lambda each: max(each.residual_um), default=None)
     if worst is not None:
         yield f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of vibration stay"
-    if any(not case.counts for case in turned):
-        yield "the contour at other settings is measured where verdict.override_percent states them"
 
 
 def _restart_lines(emitted: Program, placed: Sequence[Placed]) -> str:
