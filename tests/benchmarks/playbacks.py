@@ -6,9 +6,12 @@ import argparse
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from statistics import median
 from typing import Any
+from unittest import mock
 
 import workload
 
@@ -17,8 +20,11 @@ from shapegcode import _core
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import choose_grid
-from shapegcode.verdict.case_player import BLOCK_ENDS
+from shapegcode.verdict.case_player import BLOCK_ENDS, CasePlayer
+from shapegcode.verdict.cases import Case
 
+_TEN_LINES = b"%\nO1\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\nG1X50.F3000\nY50.\nX20.\nY20.\nM30\n%\n"
+_PARALLEL = processes.ROOT / "tests" / "golden" / "programs" / "PARALLEL.NC"
 _HEAD = b"%\nO0001\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\n"
 
 
@@ -32,6 +38,7 @@ def main() -> int:
         file = Path(name) / "program.nc"
         workload.write_program(file, arguments.lines)
         program = sg.Program.read(file, machine)
+        _override_rows(Path(name), file, machine, arguments.repetitions)
     (region,) = program.regions
     path, model, grid = region.path, MachineModel(machine), choose_grid(machine)
     writer = RegionWriter(model, grid)
@@ -69,6 +76,40 @@ def main() -> int:
     least("emitted text, planned anew", lambda: model.play_planned(blocks, path, offset=offset, tracker=tracker))
     least("time of the blocks", lambda: _core.play_duration_s(blocks, model.period_s, model.own_rule, 0.8))
     return 0
+
+
+def _override_rows(folder: Path, long_file: Path, machine: sg.Machine, repetitions: int) -> None:
+    """Conversions with and without the contour at other feed overrides, in turn; without the start of Python."""
+    short_file = folder / "ten.nc"
+    short_file.write_bytes(_TEN_LINES)
+    for what, file, keys in (
+        ("ten lines", short_file, {}),
+        ("PARALLEL.NC, 10 um", _PARALLEL, {"tolerance.contour_um": 10.0}),
+        ("the program", long_file, {}),
+    ):
+        own = machine.with_values(keys)
+        ratios = []
+        for _ in range(repetitions + 1):
+            with _without_override_contours():
+                without = _conversion_s(file, own)
+            ratios.append([now / before for now, before in zip(_conversion_s(file, own), without, strict=True)])
+        wall, cpu = (median(column) for column in zip(*ratios[1:], strict=True))  # the first loads modules
+        print(f"override contours, {what:<23} wall x {wall:.2f}, CPU x {cpu:.2f}", flush=True)
+
+
+def _conversion_s(file: Path, machine: sg.Machine) -> tuple[float, float]:
+    wall, cpu = time.perf_counter(), time.process_time()
+    sg.convert(sg.Program.read(file, machine), machine)
+    return time.perf_counter() - wall, time.process_time() - cpu
+
+
+@contextmanager
+def _without_override_contours() -> Iterator[None]:
+    def counts(case: Case, _target: str) -> bool:
+        return case.override == 1.0
+
+    with mock.patch.object(CasePlayer, "_beside", lambda *_: False), mock.patch.object(Case, "needs_contour", counts):
+        yield
 
 
 if __name__ == "__main__":

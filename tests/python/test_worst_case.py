@@ -151,22 +151,36 @@ def pole(frequency_hz: float, damping: float) -> complex:
     return complex(-damping * omega, omega * math.sqrt(1.0 - damping**2))
 
 
-def test_the_contour_of_a_mode_that_is_off_is_the_judges_too(judged: Judged) -> None:
+def test_the_contour_at_other_overrides_and_of_a_mode_that_is_off_is_the_judges_too(judged: Judged) -> None:
     ((programmed, _, _),) = judged.regions()
-    points = play(emitted_cuts(judged), period_s=TICK, block_end="ceil")
     compared = 0
     for case in judged.conversion.to_dict()["cases"]:
-        if case["mode"] is None:
+        if case["mode"] is None and case["override"] == 1.0:
             continue
+        points = play(emitted_cuts(judged), period_s=TICK, block_end="ceil", override=case["override"])
         _, _, moved = response(points, shifted_modes(judged, case["mode"], case["shift"]), TICK)
         over = (len(moved) - 1) // (len(points) - 1)
-        track = moved[::over]
-        # How near the track comes to the one corner counts too.
-        missed = 1e3 * min(distance(np.array([40.0, 40.0, 0.0]), *leg) for leg in pairwise(track))
-        theirs = max(contour_error_um(track, programmed).max_um, missed)
-        assert close(case["contour_error_um"]["response"], theirs, relative=0.01, absolute_um=0.05), case
+        for name, track in (("command", points), ("response", moved[::over])):
+            # How near the track comes to the one corner and to the end counts too.
+            missed = [
+                min(distance(np.array(point), *leg) for leg in pairwise(track))
+                for point in ((40.0, 40.0, 0.0), (60.0, 50.0, 0.0))
+            ]
+            theirs = max(contour_error_um(track, programmed).max_um, *(1e3 * each for each in missed))
+            assert close(case["contour_error_um"][name], theirs, relative=0.01, absolute_um=0.05), (case, name)
         compared += 1
-    assert compared == 6
+    assert compared == 7 + 6
+
+
+@pytest.mark.parametrize("keys", [{}, {"controller.shaped_time_constant_s": 0.008}, {"input.material_side": "left"}])
+def test_no_override_is_without_its_contour(keys: dict[str, Any]) -> None:
+    machine = machine_with(keys)
+    assert MachineModel(machine).bounds_deviations == (not keys)
+    conversion = convert(PART, machine).conversion
+    turned = [case for case in conversion.cases if case.override != 1.0]
+    assert [round(case.override * 100.0) for case in turned] == [50, 60, 70, 80, 90, 110, 120]
+    assert all(case.contour_error_um.command and case.contour_error_um.response for case in turned)
+    assert all((case.gouge_um is None) == ("input.material_side" not in keys) for case in turned)
 
 
 def test_a_stated_uncertainty_is_part_of_the_feed_search(judged: Judged) -> None:
@@ -411,13 +425,20 @@ def test_the_contour_limit_is_for_the_targeted_deviation() -> None:
     assert [each.share for each in tight] == [math.inf, 0.0, 0.0, math.inf]
 
 
+def test_behind_feed_drives_only_the_stated_overrides_have_a_contour() -> None:
+    keys = {"verdict.plant": "feed-drive", "verdict.override_percent": [90.0, 100.0]}
+    cases = convert(LINE, machine_with(keys)).conversion.cases
+    turned = {round(case.override * 100.0): case for case in cases if case.override != 1.0 and case.mode is None}
+    measured = {at: case.contour_error_um.response is not None for at, case in turned.items()}
+    assert measured == {at: at == 90 for at in (50, 60, 70, 80, 90, 110, 120)}
+    assert all(max(case.residual_um) > 0.0 for case in turned.values())
+
+
 def test_what_has_to_be_measured_depends_on_the_target() -> None:
     cases = {case.name: case for case in stated_cases(machine_with(UNCERTAIN))}
     shift, override = cases["X 46 Hz +5 %, damping -20 %"], cases["override 90 %"]
     assert (shift.needs_contour("command"), shift.needs_contour("response")) == (False, True)
-    assert (override.needs_contour("command"), override.needs_contour("response")) == (False, False)
-    counted = {case.name: case for case in stated_cases(machine_with({"verdict.override_percent": [90, 100]}))}
-    assert counted["override 90 %"].needs_contour("command")
+    assert (override.needs_contour("command"), override.needs_contour("response")) == (True, True)
 
 
 def test_table_shows_what_only_stands_beside_in_brackets(judged: Judged) -> None:

@@ -82,7 +82,9 @@ class CasePlayer:
 
     def _whole(self, case: Case) -> bool:
         """Whether the whole region is simulated for a case alone."""
-        return case.needs_contour(self.target) and not self._beside(case)
+        # Behind feed drives each would take a quarter of a conversion: what is only shown makes do with the residual.
+        spared = case.override != 1.0 and not case.counts and self.model.machine.verdict.plant != "modal"
+        return case.needs_contour(self.target) and not spared and not self._beside(case)
 
     def groups(self) -> list[list[Case]]:
         """Overrides and shifted modes: those simulated in full each by itself, the short ones in one task."""
