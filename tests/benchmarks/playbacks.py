@@ -13,6 +13,7 @@ from statistics import median
 from typing import Any
 from unittest import mock
 
+import processes
 import workload
 
 import shapegcode as sg

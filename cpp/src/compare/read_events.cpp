@@ -101,6 +101,7 @@ class EventReader {
 
   Event& add(ComparedKind kind, std::string word) {
     close();
+    in_shaped_cut_ = false;
     events_.all.push_back(event(kind, std::move(word)));
     return events_.all.back();
   }
@@ -121,8 +122,11 @@ class EventReader {
         }
         close();
         in_rapid_ = true;
-      } else if (emitted_ && comment == "(SHAPED)" && in_rapid_) {
-        close();
+      } else if (emitted_ && comment == "(SHAPED)") {
+        if (in_rapid_) {
+          close();
+        }
+        in_shaped_cut_ = true;
       }
     }
   }
@@ -284,7 +288,7 @@ class EventReader {
         add(ComparedKind::offsets, with_words(tenths, "H"));
         return;
       case Group::coordinates:
-        if (emitted_ && tenths == coordinate_tenths_ && tenths != 541 && words().has_any(xyz_letters)) {
+        if (in_shaped_cut_ && tenths == coordinate_tenths_ && tenths != 541 && words().has_any(xyz_letters)) {
           return;  // a restart point in a shaped cut names what is in force
         }
         coordinate_tenths_ = tenths;
@@ -472,6 +476,7 @@ class EventReader {
   int cycle_ = 80;
   int units_ = 21;
   int compensation_ = 40;
+  bool in_shaped_cut_ = false;
   int coordinate_tenths_ = 540;  // of the coordinate system in force
   double feed_ = 0.0;
   bool one_shot_ = false;  // the axis words belong to a code of their own
