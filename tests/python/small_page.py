@@ -22,7 +22,7 @@ def write_small(place: Path) -> None:
 
 
 def convert(place: Path, name: str, out: str, page: str) -> None:
-    done = run(place, "convert", "-m", "vx500", "--set", "tolerance.contour_um=20", name, "-o", out, "--html", page)
+    done = run(place, "convert", "-m", "vx500", "--set", "tolerance.contour_um=15", name, "-o", out, "--html", page)
     assert done.returncode == 0, done.stderr
 
 

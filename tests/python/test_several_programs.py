@@ -171,7 +171,8 @@ def test_a_program_that_cannot_be_read_does_not_stop_the_others(tmp_path: Path) 
 
 
 def test_one_program_out_of_tolerance_sends_the_file_beside_the_one_asked_for(tmp_path: Path) -> None:
-    punch(tmp_path, "%\n" + program("O0001", 30) + program("O0002", 60) + "%\n")
+    slanting = (program("O0001", 30) + program("O0002", 60)).replace("Y40.", "X33.3Y41.7")
+    punch(tmp_path, "%\n" + slanting + "%\n")
     told = run(
         tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--shape-all", "-o", "out.nc",
         "--contour", "command", "--contour-tolerance", "0.4um", "--max-time-increase", "1e5",

@@ -61,6 +61,7 @@ ENTRIES = (
             "path": "How far, and to which side, does the table leave the path? Drawn larger, as the title says.",
             "vibration": "How much does each axis swing about its command, and what is left after the stop (dashed)?",
             "feed": "How fast does the command go, along the path and per axis?",
+            "tolerance": "What does a tighter contour cost in time, and where is the knee?",
         }, "convert",
     ),
     Entry(

@@ -23,6 +23,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "tolerance": (
         "at_least", "contour_tolerance", "vibration_limit", "max_duration", "max_abs_sum", "margin", "settling_band",
     ),
+    "differences": ("allow",),
     "price": ("max_time_increase", "max_cut_time_increase", "tolerance_curve"),
     "budget": ("max_bytes", "baud", "max_blocks_per_second"),
     "cut": (

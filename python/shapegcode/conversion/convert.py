@@ -20,7 +20,7 @@ from shapegcode.conversion.recommendation import Situation, recommend
 from shapegcode.conversion.restart_points import restart_points
 from shapegcode.conversion.rests import RestsOn, rests_on
 from shapegcode.conversion.result import Conversion
-from shapegcode.conversion.run import Choice, Progress, Run, Settled
+from shapegcode.conversion.run import CutChoice, Progress, Run, Settled
 from shapegcode.conversion.warnings import open_axes, played_warnings, text_warnings
 from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
@@ -120,7 +120,7 @@ def convert(
             f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
         )
     _refuse_own_marks(program)
-    choice = Choice(chosen_cuts(program, only, leave), shape_all, tolerance_curve)
+    choice = CutChoice(chosen_cuts(program, only, leave), shape_all, tolerance_curve)
     # Shapes regions, plays the originals, and what was emitted, on all cores.
     pool = ThreadPoolExecutor(max_workers=cores())
     try:

@@ -30,7 +30,7 @@ from shapegcode.verdict.judge import Judge, RegionFigures
 from shapegcode.verdict.placed import Placed
 from shapegcode.verdict.program import rapid_vibration_um, simulate_unchanged, unshaped_regions
 
-__all__ = ["Choice", "Run", "Settled", "Shaped"]
+__all__ = ["CutChoice", "Run", "Settled", "Shaped"]
 
 _ATTEMPTS = 10  # each for cuts that left their tolerance, ran too fast or cost too much; few need more than two
 _PRICE_ROUNDS = 6
@@ -40,7 +40,7 @@ Progress = Callable[[str, float, int], None]
 
 
 @dataclass(frozen=True)
-class Choice:
+class CutChoice:
     """What the caller chose.
 
     Attributes:
@@ -89,7 +89,7 @@ class Run:
         machine: Machine,
         block_period_s: float | None,
         budget: Budget | None,
-        choice: Choice,
+        choice: CutChoice,
         pool: Executor,
         on_progress: Progress,
     ) -> None:

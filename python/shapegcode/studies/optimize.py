@@ -152,7 +152,7 @@ class _Choosing:
             chosen = tuple(ChosenValue(key, toml(value)) for key, value in values.items())
             try:
                 machine = drawn_machine(self._machine, values, "choose")
-                replay = Replay.of(self._program, machine, self._machine, shape_all=self._shape_all)
+                replay = Replay.of(self._program, machine, self._machine, shape_all=self._shape_all, is_whole=True)
                 self._replays[ranks] = replay
                 self.candidates[ranks] = Candidate(chosen, replay.time_s)
             except (ArgumentError, DesignError, MachineError) as no_text:

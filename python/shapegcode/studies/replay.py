@@ -120,7 +120,13 @@ class Replay:
 
     @classmethod
     def of(
-        cls, program: Program | str, machine: Machine, judged_by: Machine | None = None, *, shape_all: bool = False
+        cls,
+        program: Program | str,
+        machine: Machine,
+        judged_by: Machine | None = None,
+        *,
+        shape_all: bool = False,
+        is_whole: bool = False,
     ) -> Replay:
         """Convert a program.
 
@@ -129,6 +135,7 @@ class Replay:
             machine: for which.
             judged_by: whose tolerances count; None: those of the same machine.
             shape_all: see `shapegcode.convert`.
+            is_whole: cuts left unchanged must keep their limits too.
 
         Returns:
             The text, ready to be played.
@@ -140,6 +147,9 @@ class Replay:
         """
         original = program if isinstance(program, Program) else read_for_conversion(program, machine)
         found = convert(original, machine, shape_all=shape_all, tolerance_curve=False)
+        missed = next((cut for cut in found.unchanged if cut.misses), None)
+        if is_whole and missed is not None:
+            raise ArgumentError("lines {} to {}: left unchanged, {}".format(*missed.lines, missed.misses[0]))
         if not found.placed:
             raise ArgumentError(
                 f"{found.program} on {machine.name}: nothing was shaped that could be played: {found.answer}"
