@@ -135,7 +135,7 @@ class Replay:
             machine: for which.
             judged_by: whose tolerances count; None: those of the same machine.
             shape_all: see `shapegcode.convert`.
-            is_whole: cuts left unchanged must keep their limits too.
+            is_whole: every cut must keep its limits as converted, those left unchanged too.
 
         Returns:
             The text, ready to be played.
@@ -147,9 +147,8 @@ class Replay:
         """
         original = program if isinstance(program, Program) else read_for_conversion(program, machine)
         found = convert(original, machine, shape_all=shape_all, tolerance_curve=False)
-        missed = next((cut for cut in found.unchanged if cut.misses), None)
-        if is_whole and missed is not None:
-            raise ArgumentError("lines {} to {}: left unchanged, {}".format(*missed.lines, missed.misses[0]))
+        if is_whole and (missed := next(found.misses(), "")):
+            raise ArgumentError(missed)
         if not found.placed:
             raise ArgumentError(
                 f"{found.program} on {machine.name}: nothing was shaped that could be played: {found.answer}"
