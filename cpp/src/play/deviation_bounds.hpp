@@ -20,8 +20,8 @@ struct BlockGroup {
   double s_mm = 0.0;      ///< foot of its first set-point, from the path's start
   double bound_mm = 0.0;  ///< no point of its blocks is further from the path
   double corner_mm =
-      0.0;  ///< no corner of the path that is nearest to this group is further from its set-points' track
-  double turn_rad = 0.0;   ///< by which the path changes its direction, all changes together
+      0.0;                ///< no corner of the path that is nearest to this group is further from its set-points' track
+  double turn_rad = 0.0;  ///< by which the path changes its direction, all changes together
   double first_corner_mm = std::numeric_limits<double>::infinity();  ///< of the corners nearest to its lines
   double last_corner_mm = -std::numeric_limits<double>::infinity();
   /// Whether the set-point last given is in it, or behind it.

@@ -29,18 +29,6 @@ void FreeModes::reset() noexcept {
   velocity_.setZero();
 }
 
-void FreeModes::step(const Vector3& velocity_mm_per_s) noexcept {
-  const Vector3 jump = velocity_mm_per_s - velocity_;
-  velocity_ = velocity_mm_per_s;
-  for (State& state : states_) {
-    const ModeTransition& by = state.over_period;
-    const double velocity = state.velocity - jump[state.axis];
-    const double deflection = by.dd * state.deflection + by.dv * velocity;
-    state.velocity = by.vd * state.deflection + by.vv * velocity;
-    state.deflection = deflection;
-  }
-}
-
 double FreeModes::step(const Vector3& velocity_mm_per_s, std::size_t periods) noexcept {
   const Vector3 jump = velocity_mm_per_s - velocity_;
   velocity_ = velocity_mm_per_s;
@@ -59,14 +47,6 @@ double FreeModes::step(const Vector3& velocity_mm_per_s, std::size_t periods) no
     state.deflection = state_or_none(deflection);
   }
   return reachable.squaredNorm();
-}
-
-Vector3 FreeModes::deflection() const noexcept {
-  Vector3 deflection = Vector3::Zero();
-  for (const State& state : states_) {
-    deflection[state.axis] += state.participation * state.deflection;
-  }
-  return deflection;
 }
 
 void FreeModes::save(std::span<double> state) const noexcept {

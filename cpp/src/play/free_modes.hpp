@@ -50,4 +50,24 @@ class FreeModes {
   Vector3 velocity_ = Vector3::Zero();
 };
 
+inline void FreeModes::step(const Vector3& velocity_mm_per_s) noexcept {
+  const Vector3 jump = velocity_mm_per_s - velocity_;
+  velocity_ = velocity_mm_per_s;
+  for (State& state : states_) {
+    const ModeTransition& by = state.over_period;
+    const double velocity = state.velocity - jump[state.axis];
+    const double deflection = by.dd * state.deflection + by.dv * velocity;
+    state.velocity = by.vd * state.deflection + by.vv * velocity;
+    state.deflection = deflection;
+  }
+}
+
+inline Vector3 FreeModes::deflection() const noexcept {
+  Vector3 deflection = Vector3::Zero();
+  for (const State& state : states_) {
+    deflection[state.axis] += state.participation * state.deflection;
+  }
+  return deflection;
+}
+
 }  // namespace shapegcode::detail
