@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -17,13 +17,14 @@ import processes
 import workload
 
 import shapegcode as sg
-from shapegcode import _core
+from shapegcode import _core, cli
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import choose_grid
 from shapegcode.verdict.case_player import BLOCK_ENDS, CasePlayer
 from shapegcode.verdict.cases import Case
 
+_WITH, _WITHOUT = "with-override-contours", "without-override-contours"
 _TEN_LINES = b"%\nO1\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\nG1X50.F3000\nY50.\nX20.\nY20.\nM30\n%\n"
 _PARALLEL = processes.ROOT / "tests" / "golden" / "programs" / "PARALLEL.NC"
 _HEAD = b"%\nO0001\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\n"
@@ -39,7 +40,7 @@ def main() -> int:
         file = Path(name) / "program.nc"
         workload.write_program(file, arguments.lines)
         program = sg.Program.read(file, machine)
-        _override_rows(Path(name), file, machine, arguments.repetitions)
+        _override_rows(Path(name), file, arguments.repetitions)
     (region,) = program.regions
     path, model, grid = region.path, MachineModel(machine), choose_grid(machine)
     writer = RegionWriter(model, grid)
@@ -79,39 +80,40 @@ def main() -> int:
     return 0
 
 
-def _override_rows(folder: Path, long_file: Path, machine: sg.Machine, repetitions: int) -> None:
-    """Conversions with and without the contour at other feed overrides, in turn; without the start of Python."""
+def _override_rows(folder: Path, long_file: Path, repetitions: int) -> None:
+    """Whole conversions with and without the contour at other feed overrides, in turn."""
     short_file = folder / "ten.nc"
     short_file.write_bytes(_TEN_LINES)
-    for what, file, keys in (
+    for what, file, values in (
         ("ten lines", short_file, {}),
-        ("PARALLEL.NC, 10 um", _PARALLEL, {"tolerance.contour_um": 10.0}),
-        ("the program", long_file, {}),
+        ("PARALLEL.NC, 10 um", _PARALLEL, {"tolerance.contour_um": 10}),
+        (long_file.name, long_file, {}),
     ):
-        own = machine.with_values(keys)
+        settings = [word for key, value in {**processes.ROOM, **values}.items() for word in ("--set", f"{key}={value}")]
         ratios = []
-        for _ in range(repetitions + 1):
-            with _without_override_contours():
-                without = _conversion_s(file, own)
-            ratios.append([now / before for now, before in zip(_conversion_s(file, own), without, strict=True)])
-        wall, cpu = (median(column) for column in zip(*ratios[1:], strict=True))  # the first loads modules
-        print(f"override contours, {what:<23} wall x {wall:.2f}, CPU x {cpu:.2f}", flush=True)
+        for _ in range(repetitions):
+            without, now = (
+                processes.launched(
+                    [sys.executable, __file__, way, "convert", file, "-m", "vx500", "-o", folder / "out.nc", *settings],
+                    os.environ, accepted=(0, 1),
+                )
+                for way in (_WITHOUT, _WITH)
+            )  # fmt: skip
+            ratios.append((now.wall_s / without.wall_s, now.cpu_s / without.cpu_s))
+        wall, cpu = (median(column) for column in zip(*ratios, strict=True))
+        print(f"override contours, {what:<20} wall x {wall:.2f}, CPU x {cpu:.2f}", flush=True)
 
 
-def _conversion_s(file: Path, machine: sg.Machine) -> tuple[float, float]:
-    wall, cpu = time.perf_counter(), time.process_time()
-    sg.convert(sg.Program.read(file, machine), machine)
-    return time.perf_counter() - wall, time.process_time() - cpu
-
-
-@contextmanager
-def _without_override_contours() -> Iterator[None]:
-    def counts(case: Case, _target: str) -> bool:
-        return case.override == 1.0
-
-    with mock.patch.object(CasePlayer, "_beside", lambda *_: False), mock.patch.object(Case, "needs_contour", counts):
-        yield
+def _run_command(way: str, words: Sequence[str]) -> int:
+    """A command of shapegcode, with the contour at other overrides or with their residual alone."""
+    if way == _WITH:
+        return cli.main(words)
+    with (
+        mock.patch.object(CasePlayer, "_beside", lambda *_: False),
+        mock.patch.object(Case, "needs_contour", lambda case, _target: case.override == 1.0),
+    ):
+        return cli.main(words)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(_run_command(sys.argv[1], sys.argv[2:]) if sys.argv[1:2] in ([_WITH], [_WITHOUT]) else main())

@@ -99,7 +99,9 @@ class Path {
   /// Position at `s_mm` from the start. `cursor` is the segment index of the previous call: amortised O(1) on a
   /// monotonous walk, and real-time safe.
   [[nodiscard]] Vector3 point(double s_mm, std::size_t& cursor) const noexcept;
-  /// Moves `cursor` to the segment at `s_mm` from the start.
+  /// Segment at `s_mm` from the start, wherever that is.
+  [[nodiscard]] std::size_t segment_at(double s_mm) const noexcept;
+  /// Moves `cursor` to the segment at `s_mm` from the start, one by one.
   void seek(double s_mm, std::size_t& cursor) const noexcept;
 
  private:

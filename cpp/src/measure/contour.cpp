@@ -124,6 +124,7 @@ ContourTracker::Piece ContourTracker::bare_piece_of(std::size_t i) const noexcep
 ContourTracker::ContourTracker(const Path& path) : geometry_(geometry_of(path)) { last_ = path.start_mm(0); }
 
 void ContourTracker::begin_at(double s_mm, const Vector3& p) noexcept {
+  cursor_ = geometry_->path.segment_at(s_mm);
   const Vector3 foot = geometry_->path.point(s_mm, cursor_);
   s_ = furthest_ = s_mm;
   last_ = p;

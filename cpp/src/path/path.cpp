@@ -81,6 +81,16 @@ Path PathBuilder::path() {
   return path;
 }
 
+std::size_t Path::segment_at(double s_mm) const noexcept {
+  std::size_t first = 0;
+  std::size_t behind = size();
+  while (first + 1 < behind) {
+    const std::size_t middle = first + (behind - first) / 2;
+    (distance_mm(middle) <= s_mm ? first : behind) = middle;
+  }
+  return first;
+}
+
 void Path::seek(double s_mm, std::size_t& cursor) const noexcept {
   cursor = std::min(cursor, size() - 1);
   while (cursor > 0 && s_mm < distance_mm(cursor)) {

@@ -46,6 +46,9 @@ double DeviationBounds::travel_mm(const Sample& before, const Sample& now) const
 // set-points; between the chords the distance is largest at an end.
 double DeviationBounds::bound_between(const Sample& before, const Sample& now) const noexcept {
   double bound = std::max(before.deviation_mm, now.deviation_mm);
+  if (before.block == now.block && before.segment == now.segment && curvature_ == 0.0 && path_curvature_ == 0.0) {
+    return bound;
+  }
   if (before.segment == now.segment) {
     bound += farthest_from_chord_of_arc(std::abs(now.s_mm - before.s_mm), path_curvature_);
   } else {
@@ -117,11 +120,8 @@ void DeviationBounds::add(const BlockPlayer& player, const Vector3& p, double de
     groups_.back().bound_mm = std::max(groups_.back().bound_mm, bound);
     groups_.back().turn_rad += turn;
     if (now.s_mm >= groups_.back().s_mm + group_mm) {
-      groups_.push_back({.first_block = now.block,
-                         .along_mm = now.along_mm,
-                         .s_mm = now.s_mm,
-                         .bound_mm = bound,
-                         .turn_rad = turn});
+      groups_.push_back(
+          {.first_block = now.block, .along_mm = now.along_mm, .s_mm = now.s_mm, .bound_mm = bound, .turn_rad = turn});
       chord_mm_.push_back(0.0);
     }
   }

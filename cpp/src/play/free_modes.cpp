@@ -12,7 +12,9 @@ FreeModes::FreeModes(const AxisModes& modes, double period_s) : period_s_(period
     for (const Mode& mode : modes[axis]) {
       const std::complex<double> s = pole(mode);
       modes_.push_back(mode);
-      states_.push_back({mode_transition(mode, period_s), static_cast<Eigen::Index>(axis), mode.participation,
+      // The square of a sum is at most its number of terms times the sum of their squares.
+      const double weight2 = static_cast<double>(modes[axis].size()) * mode.participation * mode.participation;
+      states_.push_back({mode_transition(mode, period_s), static_cast<Eigen::Index>(axis), mode.participation, weight2,
                          -s.real(), 1.0 / s.imag()});
       for (std::size_t k = 1; k <= tabulated; ++k) {
         over_.push_back(mode_transition(mode, static_cast<double>(k) * period_s));
@@ -29,44 +31,23 @@ void FreeModes::reset() noexcept {
   velocity_.setZero();
 }
 
-void FreeModes::step(const Vector3& velocity_mm_per_s) noexcept {
-  const Vector3 jump = velocity_mm_per_s - velocity_;
-  velocity_ = velocity_mm_per_s;
-  for (State& state : states_) {
-    const ModeTransition& by = state.over_period;
-    const double velocity = state.velocity - jump[state.axis];
-    const double deflection = by.dd * state.deflection + by.dv * velocity;
-    state.velocity = by.vd * state.deflection + by.vv * velocity;
-    state.deflection = deflection;
-  }
-}
-
 double FreeModes::step(const Vector3& velocity_mm_per_s, std::size_t periods) noexcept {
   const Vector3 jump = velocity_mm_per_s - velocity_;
   velocity_ = velocity_mm_per_s;
-  Vector3 reachable = Vector3::Zero();
+  double reachable2 = 0.0;
   for (std::size_t m = 0; m < states_.size(); ++m) {
     State& state = states_[m];
-    state.velocity -= jump[state.axis];
-    const double quadrature = (state.velocity + state.decay_rate * state.deflection) * state.damped_period_s;
-    reachable[state.axis] +=
-        std::abs(state.participation) * std::sqrt(state.deflection * state.deflection + quadrature * quadrature);
+    const double before = state.deflection;
+    const double velocity = state.velocity - jump[state.axis];
+    const double quadrature = (velocity + state.decay_rate * before) * state.damped_period_s;
+    reachable2 += state.weight2 * (before * before + quadrature * quadrature);
     const ModeTransition by = periods <= tabulated
                                   ? over_[m * tabulated + periods - 1]
                                   : mode_transition(modes_[m], static_cast<double>(periods) * period_s_);
-    const double deflection = by.dd * state.deflection + by.dv * state.velocity;
-    state.velocity = state_or_none(by.vd * state.deflection + by.vv * state.velocity);
-    state.deflection = state_or_none(deflection);
+    state.deflection = state_or_none(by.dd * before + by.dv * velocity);
+    state.velocity = state_or_none(by.vd * before + by.vv * velocity);
   }
-  return reachable.squaredNorm();
-}
-
-Vector3 FreeModes::deflection() const noexcept {
-  Vector3 deflection = Vector3::Zero();
-  for (const State& state : states_) {
-    deflection[state.axis] += state.participation * state.deflection;
-  }
-  return deflection;
+  return reachable2;
 }
 
 void FreeModes::save(std::span<double> state) const noexcept {

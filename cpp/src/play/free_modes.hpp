@@ -19,8 +19,8 @@ class FreeModes {
   void reset() noexcept;
   /// The command moves on at a velocity for a period.
   void step(const Vector3& velocity_mm_per_s) noexcept;
-  /// The same for so many periods. Returns the largest square of |response - command| that can follow from their
-  /// beginning on at this velocity.
+  /// The same for so many periods. Returns a bound of the square of |response - command|, from their beginning on
+  /// and for as long as the velocity stays.
   double step(const Vector3& velocity_mm_per_s, std::size_t periods) noexcept;
   /// Response less command.
   [[nodiscard]] Vector3 deflection() const noexcept;
@@ -37,6 +37,7 @@ class FreeModes {
     ModeTransition over_period;
     Eigen::Index axis = 0;
     double participation = 1.0;
+    double weight2 = 1.0;          // its square, times the number of modes of the axis
     double decay_rate = 0.0;       // 1/s
     double damped_period_s = 0.0;  // over 2 pi
     double deflection = 0.0;       // mm
@@ -49,5 +50,25 @@ class FreeModes {
   std::vector<ModeTransition> over_;  // of each mode over 1, 2 ... periods
   Vector3 velocity_ = Vector3::Zero();
 };
+
+inline void FreeModes::step(const Vector3& velocity_mm_per_s) noexcept {
+  const Vector3 jump = velocity_mm_per_s - velocity_;
+  velocity_ = velocity_mm_per_s;
+  for (State& state : states_) {
+    const ModeTransition& by = state.over_period;
+    const double velocity = state.velocity - jump[state.axis];
+    const double deflection = by.dd * state.deflection + by.dv * velocity;
+    state.velocity = by.vd * state.deflection + by.vv * velocity;
+    state.deflection = deflection;
+  }
+}
+
+inline Vector3 FreeModes::deflection() const noexcept {
+  Vector3 deflection = Vector3::Zero();
+  for (const State& state : states_) {
+    deflection[state.axis] += state.participation * state.deflection;
+  }
+  return deflection;
+}
 
 }  // namespace shapegcode::detail

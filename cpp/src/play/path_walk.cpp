@@ -22,27 +22,18 @@ void PathWalk::take(std::size_t index, Piece& piece) const noexcept {
   }
 }
 
-void PathWalk::begin_at(double s_mm) noexcept { path_.seek(s_mm, here_); }
+void PathWalk::begin_at(double s_mm) noexcept { here_ = path_.segment_at(s_mm); }
 
-PathWalk::Found PathWalk::look(const Piece& piece, const Vector3& p) const noexcept {
-  const auto beside = [&piece](double along) {
-    return along < 0.0 ? Beside::before : along > piece.length ? Beside::behind : Beside::piece;
-  };
-  if (!piece.is_plain) {
-    const Nearest nearest = nearest_on(path_[piece.index], p);
-    const double within = 1e-9 * piece.length;
-    const double along = nearest.s_mm <= within                  ? -1.0
-                         : nearest.s_mm >= piece.length - within ? 2.0 * piece.length + 1.0
-                                                                 : nearest.s_mm;
-    return {nearest.distance_mm * nearest.distance_mm, beside(along)};
-  }
-  const Vector3 from_start = p - piece.start;
-  const double along = from_start.dot(piece.direction);
-  return {(from_start - std::clamp(along, 0.0, piece.length) * piece.direction).squaredNorm(), beside(along)};
+PathWalk::Found PathWalk::look_at_arc(const Piece& piece, const Vector3& p) const noexcept {
+  const Nearest nearest = nearest_on(path_[piece.index], p);
+  const double within = 1e-9 * piece.length;
+  const double along = nearest.s_mm <= within                  ? -1.0
+                       : nearest.s_mm >= piece.length - within ? 2.0 * piece.length + 1.0
+                                                               : nearest.s_mm;
+  return {nearest.distance_mm * nearest.distance_mm, beside(along, piece)};
 }
 
-double PathWalk::distance2_mm2(const Vector3& p) noexcept {
-  Found found = look(at(here_), p);
+double PathWalk::move(Found found, const Vector3& p) noexcept {
   for (int moves = 0; moves < most_moves && found.beside != Beside::piece; ++moves) {
     const bool on = found.beside == Beside::behind;
     if (on ? here_ + 1 >= path_.size() : here_ == 0) {
