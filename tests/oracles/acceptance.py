@@ -27,6 +27,7 @@ from judge import (
 )
 from judge.player import BlockEnd
 from shapegcode import _core
+from shapegcode.machine.output import ANY_PRICE
 
 PROGRAMS = samples.PROGRAMS
 SAMPLES = samples.SAMPLES
@@ -37,10 +38,6 @@ SAMPLE_KEYS: dict[str, dict[str, Any]] = {"BOTTLE.NC": {"input.arc_centre": "abs
 #: What the judges call the moves.
 MOVE_KINDS = {_core.SegmentKind.rapid: "rapid", _core.SegmentKind.line: "line", _core.SegmentKind.arc: "arc"}
 HEADER_LINE = re.compile(r"\([A-Z0-9 .-]{1,60}\)\r?")
-
-
-#: Of any price: for tests of what shaping does.
-ANY_PRICE = {"price.program_time_percent": 1e6, "price.cut_time_percent": 1e6}
 
 
 def machine_with(keys: Mapping[str, Any] | None = None, base: str = "vx500") -> sg.Machine:

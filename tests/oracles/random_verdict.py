@@ -16,13 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 import shapegcode as sg
-from acceptance import ANY_PRICE, memory
+from acceptance import memory
 from judge import Mode, Move, contour_error_um, play, residual_um, response, rest_index
 from judge.dialect import Item, play as play_dialect
 from judge.dialect.moves import as_move
 from judge.draws import Draw
 from judge.in_order import Way, deviation_um, haste, missed_um, places
 from judge.player import BlockEnd
+from shapegcode.machine.output import ANY_PRICE
 
 Vector = npt.NDArray[np.float64]
 RULES: tuple[BlockEnd, ...] = ("ceil", "carry")

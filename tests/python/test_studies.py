@@ -19,11 +19,11 @@ from scipy import stats
 from scipy.stats import qmc
 
 import shapegcode as sg
-from acceptance import ANY_PRICE
 from command import run
 from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from shapegcode.demos.path import path_program
 from shapegcode.errors import ArgumentError, MachineError
+from shapegcode.machine.output import ANY_PRICE
 from shapegcode.studies import replay as replays
 from shapegcode.studies.play import DrawsJob, play_all
 from shapegcode.studies.sampling import drawn

@@ -332,6 +332,24 @@ class MachineModel:
             controller = PlayingController(controller_model(self.machine), override)
         return controller.play(path, options, against=against)
 
+    def play_rapid(
+        self, start_mm: FloatArray, end_mm: FloatArray, options: _core.PlaybackOptions
+    ) -> _core.PlaybackFigures:
+        """A rapid as the control makes it, from rest to rest, without its contour.
+
+        Args:
+            start_mm: where it starts, (3,).
+            end_mm: where it ends, (3,).
+            options: the plant.
+
+        Returns:
+            The figures, positions in mm.
+        """
+        options.measure_contour = False
+        samples = _core.rapid_samples(start_mm, end_mm, self.ordinary.model)
+        still = _core.Path([_core.Segment.line(start_mm, start_mm, 1.0)])
+        return _core.play_samples(np.asfortranarray(samples), still, options)
+
     def play_emitted(
         self,
         blocks: _core.Path,

@@ -125,7 +125,7 @@ def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
     for start_mm, end_mm in _rapids_before_cuts(program):
         key = tuple(np.round(end_mm - start_mm, 9))
         if key not in found:
-            found[key] = _behind(start_mm, end_mm, model)
+            found[key] = model.play_rapid(start_mm, end_mm, model.verdict_options()).residual_mm
     shaped = [
         model.play_emitted(region.path, region.path, rule, contour=False, offset=model.offset(region)).residual_mm
         for region in program.regions
@@ -133,14 +133,6 @@ def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
         for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry)
     ]
     return largest_xyz_um([*found.values(), *shaped])
-
-
-def _behind(start_mm: Vector, end_mm: Vector, model: MachineModel) -> Vector:
-    options = model.verdict_options()
-    options.measure_contour = False
-    samples = _core.rapid_samples(start_mm, end_mm, model.ordinary.model)
-    still = _core.Path([_core.Segment.line(start_mm, start_mm, 1.0)])
-    return np.array(_core.play_samples(np.asfortranarray(samples), still, options).residual_mm)
 
 
 def _rapids_before_cuts(program: Program) -> Iterator[tuple[Vector, Vector]]:

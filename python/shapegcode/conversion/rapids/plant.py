@@ -115,11 +115,7 @@ class RapidPlant:
 
     def play_original(self, rapid: Rapid) -> _core.PlaybackFigures:
         """The rapid's figures beside which those of the replacement stand."""
-        options = self._options(rapid.region)
-        options.measure_contour = False
-        samples = _core.rapid_samples(rapid.start_mm, rapid.end_mm, self.model)
-        still = _core.Path([_core.Segment.line(rapid.start_mm, rapid.start_mm, 1.0)])
-        return _core.play_samples(np.asfortranarray(samples), still, options)
+        return self._playing.play_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
 
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
         """The replacement as the text has it: the slower of both rules of block end; `stops_s`: dwells before it."""
