@@ -219,7 +219,7 @@ struct Program {
   std::vector<MachineFunction> functions;
   std::vector<ProgramStep> steps;  ///< all of the three in the order in which they happen
   std::vector<MoveEnd> move_ends;  ///< in order
-  std::vector<ProgramCall> calls;    ///< in order, each as often as it was executed in a row of different ones
+  std::vector<ProgramCall> calls;  ///< in order, each as often as it was executed in a row of different ones
   std::vector<Finding> warnings;
   ModalState final_state;
   std::vector<ModalState> probed;  ///< state behind each of ReaderOptions::probe_lines
