@@ -323,6 +323,18 @@ def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
     return code, out, err
 
 
+def test_arcs_of_another_post_are_explained_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A quarter circle about X15 Y5, its I and J absolute: refused as an offset, exact as a position."""
+    program = folder / "post.nc"
+    arcs = "".join("G02 X15. Y15. I15. J5.\nG01 X5. Y5.\n" for _ in range(50))
+    program.write_text(f"%\nO1\nG21 G90 G17 G94\nG00 X0. Y0. Z5.\nG01 X5. Y5. F500.\n{arcs}M30\n%\n")
+    assert main(["check", str(program), "-m", "vx500"]) == 2
+    told = " ".join(capsys.readouterr().out.split())
+    assert "50 alarms" in told and told.count("arc end is") == 20
+    assert "with absolute I J K the whole program reads: --set input.arc_centre=absolute" in told
+    assert main(["check", str(program), "-m", "vx500", "--set", "input.arc_centre=absolute", "-q"]) == 0
+
+
 def test_exit_codes_and_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "good.nc", "-m", "vx500")
     assert (code, err) == (0, "")

@@ -18,6 +18,7 @@ from shapegcode.results.table import Column, Table
 __all__ = ["Check", "Finding", "FindingCounts", "SerialLine", "ShortBlocks", "ShortRun", "StarvedRun"]
 
 _SHOWN_ALIKE = 5
+_SHOWN_ALARMS = 20  # with one number
 _STYLES = {"alarm": "bold red", "warning": "yellow", "note": "dim"}
 
 
@@ -232,6 +233,8 @@ class Check(Result):
         """The one thing to do next, in one sentence."""
         if self.refused:
             first = next(finding for finding in self.findings if finding.severity == "alarm")
+            if "arc_centre" in self.counts_by_code:
+                return "set input.arc_centre as the note says, and check again."
             return f"correct {first.place} first: alarms behind it may come from it."
         worst = {finding.code for finding in self.findings if finding.severity == "warning"}
         if "work_limit" in worst:
@@ -274,10 +277,10 @@ class Check(Result):
         return [Table("", columns, shown, caption="\n".join(more))]
 
     def _first_of_each(self) -> Iterator[Finding]:
-        seen: Counter[tuple[str, str]] = Counter()
+        seen: Counter[tuple[str, str, int]] = Counter()
         for finding in self.findings:
-            kind = (finding.severity, finding.code)
+            kind = (finding.severity, finding.code, finding.alarm)
             seen[kind] += 1
             # What the control refuses is what the user came for.
-            if finding.severity == "alarm" or seen[kind] <= _SHOWN_ALIKE:
+            if seen[kind] <= (_SHOWN_ALARMS if finding.severity == "alarm" else _SHOWN_ALIKE):
                 yield finding

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 __all__ = ["add_override_arguments", "overridden"]
 
 # How a value of a unit is typed on the command line: what is shown for it, what reads it, an example.
-_TYPED = {"µm": ("LENGTH", micrometres, "5um"), "s": ("TIME", seconds, "5ms")}
+_TYPED = {
+    "µm": ("LENGTH", micrometres, "5um"),
+    "s": ("TIME", seconds, "5ms"),
+    "%": ("PERCENT", lambda text: number(text.removesuffix("%")), "10%"),
+}
 _MOST_CHOICES_SHOWN = 4
 
 

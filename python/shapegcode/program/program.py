@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MM_PER_INCH = 25.4
 _ANY_PROGRAM = [0, 99_999_999]
 _KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
-_ARC_OFF_RADIUS = "off its radius"
+ARC_OFF_RADIUS = "off its radius"
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class Program:
         try:
             core = _core.read_program(data, options)
         except ProgramError as error:
-            hint = _absolute_centre_hint(data, options) if _ARC_OFF_RADIUS in str(error) else ""
+            hint = _absolute_centre_hint(data, options) if ARC_OFF_RADIUS in str(error) else ""
             raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
 
         return cls(core, source, data if core.expanded else None, folder, program_number)
