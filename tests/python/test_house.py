@@ -498,14 +498,3 @@ def test_public_names_say_what_they_take_what_they_give_and_what_they_raise() ->
         if name.partition(".")[0] in names and (lacks := silent_on(function))
     ]
     assert offenders == []
-
-
-def test_docstrings_are_whole() -> None:
-    """Of every function: all arguments or none, then what it returns, and always what it raises."""
-    offenders = []
-    for file in sorted(PACKAGE.rglob("*.py")):
-        for name, function in public_functions(file):
-            described, lacks = described_parameters(function), silent_on(function)
-            if (described and (lacks or described != parameters_of(function))) or "Raises" in lacks:
-                offenders.append(f"{file.relative_to(PACKAGE)}: {name}: {lacks or sorted(described)}")
-    assert offenders == []
