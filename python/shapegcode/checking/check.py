@@ -69,7 +69,9 @@ def check(program: Program | str | Path, machine: Machine, *, program_number: in
         OSError: the file cannot be read.
     """
     if isinstance(program, Program):
+        program.require_machine(machine)
         text, source, folder = program.text, program.source, program.folder
+        program_number = program.number if program_number is None else program_number
     else:
         text = program_bytes(program, machine.controller.max_program_bytes)
         source, folder = str(program), Path(program).parent

@@ -27,7 +27,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
-from shapegcode.program.compensation import read_for_conversion, require_decision
+from shapegcode.program.compensation import program_for_conversion
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
@@ -97,7 +97,8 @@ def convert(
         OSError: its file cannot be read.
         MachineError: a value that a machine file could not have.
         DesignError: no shaper exists on this grid.
-        ArgumentError: a block period that the controller cannot play, a budget without a choice, lines without a cut.
+        ArgumentError: the program was read with other settings than the machine has; a block period that the
+            controller cannot play, a budget without a choice, lines without a cut.
         RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
     """
     stated = {
@@ -112,9 +113,7 @@ def convert(
     }
     if stated := {key: value for key, value in stated.items() if value is not None}:
         machine = machine.with_values(stated, source="options of convert")
-    if not isinstance(program, Program):
-        program = read_for_conversion(program, machine)
-    require_decision(program, machine)
+    program = program_for_conversion(program, machine)
     if program.stamp is not None:
         raise _core.ProgramError(
             f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from shapegcode import _core
@@ -232,4 +233,4 @@ def _read_back(text: bytes, program: Program, places: Sequence[int], machine: Ma
                 f"{program.lines(before)}: written from line {line}, read back from line {after.first_line}; ends "
                 f"{off:g} mm apart, lengths differ by {longer:g} mm"
             )
-    return Program(emitted.core, program.source)
+    return replace(emitted, source=program.source, unexpanded=None)

@@ -44,6 +44,20 @@ def read_for_conversion(path: str | Path, machine: Machine, *, program_number: i
     return program
 
 
+def program_for_conversion(program: Program | str | Path, machine: Machine) -> Program:
+    """A program as it is, or read from its file as `convert` wants it.
+
+    Raises:
+        ArgumentError: it was read with other settings than the machine has.
+        ProgramError, OSError: see `read_for_conversion`.
+    """
+    if not isinstance(program, Program):
+        return read_for_conversion(program, machine)
+    program.require_machine(machine)
+    require_decision(program, machine)
+    return program
+
+
 def require_decision(program: Program, machine: Machine) -> None:
     """Refuse a program with G41 or G42 unless the machine file says what becomes of it.
 

@@ -36,9 +36,12 @@ def expand(
     Raises:
         ProgramError: the text is no program that can be read, or its compensation has a radius of 0; the message
             starts with ``file:line:column``.
+        ArgumentError: it was read with other settings than the machine has.
         OSError: the file cannot be read.
     """
-    if not isinstance(program, Program):
+    if isinstance(program, Program):
+        program.require_machine(machine)
+    else:
         whole = compensation == "expand"
         program = Program.read(program, machine, program_number=program_number, expand_compensation=whole)
     if compensation == "expand":

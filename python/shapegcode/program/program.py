@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.memory import require_memory_for_lines
-from shapegcode.program.reading import program_bytes, program_loader, reader_options
+from shapegcode.program.reading import Reading, program_bytes
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
 from shapegcode.program.turning import signs_of_turning
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 MM_PER_INCH = 25.4
-_ANY_PROGRAM = [0, 99_999_999]
 _KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
 ARC_OFF_RADIUS = "off its radius"
 
@@ -33,6 +32,7 @@ class Program:
     Attributes:
         core: what the core made of it: text, regions (runs of cutting moves between stops), other moves.
         source: name for messages.
+        reading: the machine whose controller read it, and how.
         unexpanded: the text that was read, where the core's is the plain program that it comes to.
         folder: where programs that it calls are looked for.
         number: which program of the text it is, as it was asked for; None: the first.
@@ -40,6 +40,7 @@ class Program:
 
     core: _core.ProgramText
     source: str
+    reading: Reading
     unexpanded: bytes | None = None
     folder: Path | None = None
     number: int | str | None = None
@@ -132,25 +133,26 @@ class Program:
             line, signs = turning
             said = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"
             raise located_error(source, line, 1, said)
-        index = None if program_number is None else index_of(data, program_number, source)
-        options = reader_options(
+        reading = Reading(
             machine,
             # What shapegcode wrote has FANUC's arcs, whatever those of its original were.
             emitted=emitted or STAMP_BEGIN in data,
-            probe_lines=probe_lines,
-            program_number=program_number if isinstance(program_number, int) and index is None else None,
-            program_index=index,
+            probe_lines=tuple(probe_lines),
             expand_compensation=expand_compensation,
             collect_alarms=collect_alarms,
         )
-        _look_in(options, machine, [folder] if folder is not None else [])
+        options = reading.options([folder] if folder is not None else [])
+        if program_number is not None:
+            index = index_of(data, program_number, source)
+            options.program_index = -1 if index is None else index
+            options.program = program_number if isinstance(program_number, int) and index is None else -1
         try:
             core = _core.read_program(data, options)
         except ProgramError as error:
             hint = _absolute_centre_hint(data, options) if ARC_OFF_RADIUS in str(error) else ""
             raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
 
-        return cls(core, source, data if core.expanded else None, folder, program_number)
+        return cls(core, source, reading, data if core.expanded else None, folder, program_number)
 
     @classmethod
     def from_parts(
@@ -170,14 +172,27 @@ class Program:
         Raises:
             ProgramError: as `from_text` does.
         """
-        options = reader_options(machine, emitted=True, probe_lines=probe_lines)
-        options.opaque_programs = _ANY_PROGRAM  # a call that stands in such a text was kept
-        _look_in(options, machine, [])
+        reading = Reading(machine, emitted=True, keeps_calls=True, probe_lines=tuple(probe_lines))
         try:
-            core = _core.read_parts(parts, options)
+            core = _core.read_parts(parts, reading.options([]))
         except ProgramError as error:
             raise located_error(error.file or source, error.line, error.column, str(error), error.alarm) from None
-        return cls(core, source, core.unexpanded if core.expanded else None)
+        return cls(core, source, reading, core.unexpanded if core.expanded else None)
+
+    def require_machine(self, machine: Machine) -> None:
+        """Refuse a machine that would read this program otherwise than the one that read it.
+
+        Args:
+            machine: on which it is to be simulated, converted, checked or timed.
+
+        Raises:
+            ArgumentError: with the settings that differ, both values of each, and what to do.
+        """
+        if differences := self.reading.differences(machine):
+            raise _core.ArgumentError(
+                f"{self.source} was read with other settings than those of the machine {machine.name}: "
+                f"{'; '.join(differences)}; read it with that machine: machine= of Program.read or Program.from_text"
+            )
 
     @property
     def text(self) -> bytes:
@@ -311,13 +326,6 @@ class Program:
         return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
 
 
-def _look_in(options: _core.ReaderOptions, machine: Machine, folders: list[Path]) -> None:
-    """Let the core look for called programs in folders, and in those of the machine."""
-    folders = [*folders, *(Path(name).expanduser() for name in machine.input.program_folders)]
-    if folders:
-        options.load_program = program_loader(folders, machine.controller.max_program_bytes)
-
-
 def least_increment_mm(machine: Machine, units: int) -> float:
     """Least increment of the words of a program in G20 or G21, mm."""
     controller = machine.controller
@@ -346,6 +354,10 @@ def given_program(program: Program | str | Path, machine: Machine) -> Program:
     """A program as it is, or read from its file as the controller of `machine` would.
 
     Raises:
+        ArgumentError: it was read with other settings than the machine has.
         ProgramError, OSError: see :meth:`Program.read`.
     """
-    return program if isinstance(program, Program) else Program.read(program, machine)
+    if not isinstance(program, Program):
+        return Program.read(program, machine)
+    program.require_machine(machine)
+    return program

@@ -97,6 +97,8 @@ def optimize(
         check_ends(machine, varied, columns)
     rows = [_rows([each.key for each in varied], columns) for columns in samples]
     _check_values(machine, choices)
+    if isinstance(program, Program):
+        program.require_machine(machine)
     source = str(program) if isinstance(program, Path) else program
     run = _Choosing(source, machine, choices, rows, probability, shape_all)
     total = min(most, math.prod(len(values) for values in choices.values()))

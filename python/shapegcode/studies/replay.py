@@ -14,7 +14,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
-from shapegcode.program.compensation import read_for_conversion
+from shapegcode.program.compensation import program_for_conversion
 from shapegcode.results.figures import Deviation
 from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures
@@ -145,7 +145,7 @@ class Replay:
             ShapegcodeError: it cannot be converted.
             OSError: its file cannot be read.
         """
-        original = program if isinstance(program, Program) else read_for_conversion(program, machine)
+        original = program_for_conversion(program, machine)
         found = convert(original, machine, shape_all=shape_all, tolerance_curve=False)
         if is_whole and (missed := next(found.misses(), "")):
             raise ArgumentError(missed)

@@ -82,6 +82,8 @@ def study(
     varied = varied_values(machine, vary)
     columns = drawn(varied, n, sampling, seed, indices=indices)
     check_ends(machine, varied, columns)
+    if isinstance(program, Program):
+        program.require_machine(machine)
     source = str(program) if isinstance(program, Path) else program
     with _pool(scheduler) as pool:
         run = _StudyRun(source, machine, varied, columns, wanted, pool, shape_all, on_progress)
