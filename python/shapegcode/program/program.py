@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -150,7 +151,9 @@ class Program:
             hint = _absolute_centre_hint(data, options) if _ARC_OFF_RADIUS in str(error) else ""
             raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
 
-        return cls(core, source, data if core.expanded else None, folder, program_number)
+        # The core leaves the mark out too.
+        whole = data.removeprefix(codecs.BOM_UTF8) if core.expanded else None
+        return cls(core, source, whole, folder, program_number)
 
     @classmethod
     def from_parts(
