@@ -45,6 +45,8 @@ _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
 _WORK_LIMIT = re.compile(r"controller\.max_(program|expansion)_")  # in the message of every limit of a reading
+# Of the reader's remarks those by which a control may do something else than the text seems to say.
+_NOT_AS_WRITTEN = re.compile(r"does not end with M30|^text behind the '%'|^G68 R|byte-order mark")
 _ROUNDING = 1e-9
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
 # Of one reading (most_alarms in the core's reader).
@@ -226,7 +228,8 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
         message = f"reading stopped here after {_MOST_ALARMS} alarms: what follows is not checked"
         yield Finding("note", "reader", 0, file or program.source, line, 0, message)
     for line, column, alarm, message, file in program.core.warnings:
-        yield _finding("note", "reader", alarm, file or program.source, line, column, message)
+        severity = "warning" if _NOT_AS_WRITTEN.search(message) else "note"
+        yield _finding(severity, "reader", alarm, file or program.source, line, column, message)
 
 
 def _arc_centre_finding(data: bytes, program: Program, machine: Machine) -> Iterator[Finding]:

@@ -112,7 +112,7 @@ class Run:
         self.aims = Aims(
             program, machine,
             [
-                choice.not_shaped.get(index) or why_kept(region, machine, self.grid)
+                choice.not_shaped.get(index) or why_kept(program, region, machine, self.grid)
                 for index, region in enumerate(program.regions)
             ],
             self.curves.of,

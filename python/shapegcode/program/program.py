@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -152,7 +153,9 @@ class Program:
             hint = _absolute_centre_hint(data, options) if ARC_OFF_RADIUS in str(error) else ""
             raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
 
-        return cls(core, source, reading, data if core.expanded else None, folder, program_number)
+        # The core leaves the mark out too.
+        whole = data.removeprefix(codecs.BOM_UTF8) if core.expanded else None
+        return cls(core, source, reading, whole, folder, program_number)
 
     @classmethod
     def from_parts(
@@ -330,6 +333,39 @@ def least_increment_mm(machine: Machine, units: int) -> float:
     """Least increment of the words of a program in G20 or G21, mm."""
     controller = machine.controller
     return controller.least_increment_inch * MM_PER_INCH if units == 20 else controller.least_increment_mm
+
+
+_ON_INCREMENT = 1e-6  # increments: so near to one a position is on it
+
+
+def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
+    """How far the end of a region lies from the nearest position that its words can name.
+
+    A program that changes between G20 and G21, or that has more digits than the control resolves, may end elsewhere.
+
+    Args:
+        region: of a program.
+        increment_mm: least increment of its words.
+
+    Returns:
+        Of X, Y and Z, mm; 0 where only the rounding of floating-point numbers is left.
+    """
+    off = [abs(each / increment_mm - round(each / increment_mm)) for each in map(float, region.path.end_mm)]
+    return [each * increment_mm if each > _ON_INCREMENT else 0.0 for each in off]
+
+
+def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
+    """Which axes rest through a whole region where none of its words leads: nothing may be written of them.
+
+    Args:
+        region: of a program.
+        increment_mm: least increment of its words.
+
+    Returns:
+        Of X, Y and Z.
+    """
+    off_mm = end_off_grid_mm(region, increment_mm)
+    return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 
 
 def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:
