@@ -29,7 +29,7 @@ from shapegcode.program import Program
 from shapegcode.program.memory import require_memory_for_lines
 from shapegcode.program.operating import no_room
 from shapegcode.program.program import ARC_OFF_RADIUS
-from shapegcode.program.reading import program_bytes
+from shapegcode.program.reading import is_program_text, program_bytes
 from shapegcode.program.several import index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN
 
@@ -54,7 +54,9 @@ _MOST_ALARMS = 200
 _MEMORY_PER_LINE = 350  # bytes
 
 
-def check(program: Program | str | Path, machine: Machine, *, program_number: int | str | None = None) -> Check:
+def check(
+    program: Program | str | Path, machine: Machine | str | Path, *, program_number: int | str | None = None
+) -> Check:
     """Check a program: what the control would refuse, and what it would not run as programmed.
 
     Args:
@@ -70,10 +72,13 @@ def check(program: Program | str | Path, machine: Machine, *, program_number: in
         ProgramError: not to be read at all, without a place to point to.
         OSError: the file cannot be read.
     """
+    machine = Machine.of(machine)
     if isinstance(program, Program):
         program.require_machine(machine)
         text, source, folder = program.text, program.source, program.folder
         program_number = program.number if program_number is None else program_number
+    elif is_program_text(program):
+        return check_text(str(program), machine, program_number=program_number)
     else:
         text = program_bytes(program, machine.controller.max_program_bytes)
         source, folder = str(program), Path(program).parent
@@ -82,7 +87,7 @@ def check(program: Program | str | Path, machine: Machine, *, program_number: in
 
 def check_text(
     text: bytes | str,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     source: str = "<text>",
     program_number: int | str | None = None,
@@ -104,6 +109,7 @@ def check_text(
     Raises:
         ProgramError: not to be read at all, without a place to point to.
     """
+    machine = Machine.of(machine)
     data = text.encode() if isinstance(text, str) else text
     require_memory_for_lines(data, source, _MEMORY_PER_LINE)
     own, lines_before = _own_text(data, program_number, source)

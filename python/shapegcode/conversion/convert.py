@@ -47,7 +47,7 @@ __all__ = ["convert"]
 
 def convert(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     contour: str | None = None,
     contour_tolerance_um: float | None = None,
@@ -101,6 +101,7 @@ def convert(
             controller cannot play, a budget without a choice, lines without a cut.
         RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
     """
+    machine = Machine.of(machine)
     stated = {
         "shaping.contour": contour,
         "tolerance.contour_um": contour_tolerance_um,

@@ -40,7 +40,7 @@ Progress = Callable[[float], None]
 
 def schedule_feed(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     tools: Tool | Sequence[Tool],
     stock: Stock,
     *,
@@ -72,6 +72,7 @@ def schedule_feed(
 
     Source: this project; the force model and feeds that follow the force are those of Kim and Ko, 2001 (paper 001).
     """
+    machine = Machine.of(machine)
     surveyed = survey(
         program,
         machine,

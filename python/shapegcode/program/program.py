@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.memory import require_memory_for_lines
-from shapegcode.program.reading import Reading, program_bytes
+from shapegcode.program.reading import Reading, is_program_text, program_bytes
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
 from shapegcode.program.turning import signs_of_turning
@@ -50,7 +50,7 @@ class Program:
     def read(
         cls,
         path: str | Path,
-        machine: Machine | None = None,
+        machine: Machine | str | Path | None = None,
         *,
         program_number: int | str | None = None,
         expand_compensation: bool = True,
@@ -61,8 +61,8 @@ class Program:
         Programs that it calls are looked for in the file, beside it, and in `input.program_folders`.
 
         Args:
-            path: the file.
-            machine: whose controller reads it.
+            path: the file; a string of several lines is the program's text itself.
+            machine: whose controller reads it, its file or its built-in name.
             program_number: which program of a file that holds several: its O number, or an address as in
                 `shapegcode.program.several`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
@@ -77,7 +77,15 @@ class Program:
         """
         from shapegcode.machine import Machine
 
-        machine = machine or Machine.load("vx500")
+        machine = Machine.of(machine or "vx500")
+        if is_program_text(path):
+            return cls.from_text(
+                str(path),
+                machine,
+                program_number=program_number,
+                expand_compensation=expand_compensation,
+                collect_alarms=collect_alarms,
+            )
         return cls.from_text(
             program_bytes(path, machine.controller.max_program_bytes),
             machine,
@@ -92,7 +100,7 @@ class Program:
     def from_text(
         cls,
         text: bytes | str,
-        machine: Machine | None = None,
+        machine: Machine | str | Path | None = None,
         *,
         source: str = "<text>",
         emitted: bool = False,
@@ -127,7 +135,7 @@ class Program:
         """
         from shapegcode.machine import Machine
 
-        machine = machine or Machine.load("vx500")
+        machine = Machine.of(machine or "vx500")
         data = text.encode() if isinstance(text, str) else text
         require_memory_for_lines(data, source)
         if not emitted and (turning := signs_of_turning(data)) is not None:

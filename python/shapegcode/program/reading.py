@@ -17,7 +17,7 @@ from shapegcode.settings.keys import toml
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["PROGRAM_SUFFIXES", "Reading", "program_bytes", "program_loader", "reader_options"]
+__all__ = ["PROGRAM_SUFFIXES", "Reading", "is_program_text", "program_bytes", "program_loader", "reader_options"]
 
 _NO_LIMIT = 2**63
 _ANY_PROGRAM = (0, 99_999_999)
@@ -113,6 +113,11 @@ def _settings_of_reading(machine: Machine) -> dict[str, object]:
 def _shown(value: object) -> str:
     text = toml(value)
     return text if len(text) <= _SHOWN_CHARACTERS else f"{text[:_SHOWN_CHARACTERS]}..."
+
+
+def is_program_text(given: object) -> bool:
+    """Whether a string is the text of a program and not the name of a file: it has several lines."""
+    return isinstance(given, str) and ("\n" in given or "\r" in given)
 
 
 def reader_options(

@@ -34,7 +34,7 @@ Progress = Callable[[str, float], None]
 
 def study(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     vary: Vary,
     *,
     n: int = 1000,
@@ -77,6 +77,7 @@ def study(
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
     """
+    machine = Machine.of(machine)
     check_probability("at_least", at_least)
     wanted = checked_measures(measure)
     varied = varied_values(machine, vary)
