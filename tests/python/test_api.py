@@ -151,11 +151,11 @@ def test_progress_is_told() -> None:
         shape_all=True,
         on_progress=lambda *step: heard.append(step),
     )
-    assert {stage for stage, _, _ in heard} == {"shaping", "round trip", "what it rests on"}
+    assert {stage for stage, _, _ in heard} == {"shaping", "round trip", "sensitivity to unverified parameters"}
     shaped = [(done, total) for which, done, total in heard if which == "shaping"]
     assert shaped == sorted(shaped)
     assert shaped[-1][0] == shaped[-1][1] == shaped[0][1]
-    for stage in ("round trip", "what it rests on"):
+    for stage in ("round trip", "sensitivity to unverified parameters"):
         steps = [(done, total) for which, done, total in heard if which == stage]
         assert steps == [(k, len(steps)) for k in range(1, len(steps) + 1)]
 

@@ -387,7 +387,7 @@ def test_exit_codes_and_table(folder: Path, capsys: pytest.CaptureFixture[str]) 
     assert (code, err) == (1, "")
     assert "short.nc:6" in out
     # The table says it, and nothing says it again.
-    assert " ".join(out.split()).count("without blocks in store") == 1
+    assert " ".join(out.split()).count("with an empty block buffer") == 1
     code, out, err = run(capsys, "bad.nc", "-m", "vx500")
     assert (code, err) == (2, "")
     for said in ("bad.nc:6:1", "0010", "bad.nc:8:4", "0005", "2 alarms", "next: correct bad.nc:6:1 first"):

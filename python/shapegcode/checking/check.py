@@ -277,7 +277,7 @@ def _low_feed_findings(program: Program, machine: Machine) -> Iterator[Finding]:
             continue
         message = (
             f"{program.lines(region)}: feed {slowest:g} mm/min is below controller.minimum_feed_mm_per_min = {least:g}"
-            ": convert keeps them untouched"
+            ": convert leaves them unchanged"
         )
         yield _at(program, "note", "reader", region.first_line, message)
 
@@ -289,7 +289,8 @@ def _short_findings(program: Program, machine: Machine, runs: Iterable[CuttingRu
             message = (
                 f"{run.short_blocks} of {run.blocks} blocks up to {_end(program, run)} are "
                 f"shorter than the block time of {block_time_s * 1e3:g} ms, the shortest {run.shortest_s * 1e3:.3g} "
-                f"ms: without blocks in store the control starves, and {run.time_s:.3f} s become {run.taken_s:.3f} s"
+                "ms: with an empty block buffer the control stops between blocks (buffer underrun), and "
+                f"{run.time_s:.3f} s become {run.taken_s:.3f} s"
             )
             lost = run.taken_s - run.time_s >= _LOST_S
             yield _at(program, "warning" if lost else "note", "short_block", run.first_short_line, message)
@@ -346,7 +347,9 @@ def _dnc_findings(program: Program, line: SerialLine, runs: Iterable[CuttingRun]
     for run in runs:
         if run.time_s > 0.0 and run.needed_per_s > line.characters_per_s:
             factor = run.needed_per_s / line.characters_per_s
-            where = "" if run.bytes > run.time_s * line.characters_per_s else "its busiest stretch "
+            where = (
+                "" if run.bytes > run.time_s * line.characters_per_s else "its section with the most blocks per second "
+            )
             message = (
                 f"up to {_end(program, run)} the program asks for {run.needed_per_s:.0f} characters/s "
                 f"({run.blocks / run.time_s:.0f} blocks/s), the serial line carries {line.characters_per_s:.0f}: "

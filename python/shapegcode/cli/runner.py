@@ -171,7 +171,7 @@ def finish(
         several.add(report, output)
     else:
         _write(report, getattr(args, "json", None), output)
-    pictured = [f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none are drawn of this"]
+    pictured = [f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: there are none of this result"]
     _say(
         result,
         args,

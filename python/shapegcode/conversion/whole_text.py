@@ -320,10 +320,10 @@ class TextWriter:
         """The warning for a region that keeps its text."""
         if not keepable(region, self._machine):
             raise self._program.region_error(
-                region, f"{reason}; its arcs have absolute centres and cannot be kept as they are"
+                region, f"{reason}; its arcs have absolute centres and cannot be left unchanged"
             )
         program = self._program
-        return f"{program.place(region.first_line)}: {program.lines(region)} kept untouched: {reason}"
+        return f"{program.place(region.first_line)}: {program.lines(region)} left unchanged: {reason}"
 
     def _opening(self, *, shapes: bool) -> bytes:
         """Header comments where something is shaped, and the guards of expanded radii."""

@@ -30,7 +30,7 @@ MEASURES: Mapping[str, str] = {
     "peak_um": "vibration on the way, worst axis",
     "contour_um": "contour error that is judged",
     "command_um": "contour error of the command",
-    "response_um": "contour error of the table",
+    "response_um": "contour error of the machine table",
     "cutting_time_s": "time of the shaped cuts",
     "time_s": "cycle time",
     "original_residual_um": "residual vibration of the original",
@@ -151,7 +151,7 @@ class Replay:
             raise ArgumentError(missed)
         if not found.placed:
             raise ArgumentError(
-                f"{found.program} on {machine.name}: nothing was shaped that could be played: {found.answer}"
+                f"{found.program} on {machine.name}: nothing was shaped that could be simulated: {found.answer}"
             )
         judging = MachineModel(judged_by or machine)
         judge, ranks = Judge(judging), {id(region): index for index, region in enumerate(original.regions)}

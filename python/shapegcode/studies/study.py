@@ -226,7 +226,7 @@ def _result(
     kept = np.flatnonzero(~np.isnan(run.measured[:, run.wanted.index(SHARE)]))
     refused = [text for text in texts if text.replay is None]
     if len(kept) == 0:
-        raise ArgumentError(f"no draw could be played: {refused[0].why}")
+        raise ArgumentError(f"no sample could be simulated: {refused[0].why}")
     columns = [[column[index] for index in kept] for column in run.columns]
     measured = {name: run.measured[kept, rank] for rank, name in enumerate(run.wanted)}
     shares = measured[SHARE]
