@@ -41,12 +41,7 @@ COMMANDS = {
     "MachineDescription": "machine show vx500",
     "TapPlan": "identify --tap-plan -m vx500",
     "CharacterisationTests": "characterize --write tests -m vx500",
-    "TapDemo": "demo tap",
-    "CornerDemo": "demo corner",
-    "MetrologyDemo": "demo metrology",
-    "CycleTimeDemo": "demo cycle-time",
     "PathDemo": "demo path",
-    "ShaperDemo": "demo shaper",
 }
 
 

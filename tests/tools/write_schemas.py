@@ -17,7 +17,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "docs" / "schema"
 def results() -> dict[str, type[Result]]:
     """Every kind of result by its name."""
     for module in pkgutil.walk_packages(shapegcode.__path__, "shapegcode."):
-        if (module.name.endswith("result") or ".demos." in module.name) and ".cli" not in module.name:
+        if module.name.endswith(("result", "demos.path")) and ".cli" not in module.name:
             importlib.import_module(module.name)
 
     def below(cls: type[Result]) -> dict[str, type[Result]]:
