@@ -193,6 +193,7 @@ from shapegcode.model.stream import stream as stream
 from shapegcode.program import Program as Program
 from shapegcode.program.expand import expand as expand
 from shapegcode.program.result import Expansion as Expansion
+from shapegcode.results.json import schema as schema
 from shapegcode.results.motion_plots import View as View, plot_feed as plot_feed, plot_vibration as plot_vibration
 from shapegcode.results.path_plots import plot_path as plot_path
 from shapegcode.results.result import Pair as Pair, Result as Result, Xyz as Xyz
