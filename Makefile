@@ -83,7 +83,7 @@ test:
 	$(PYTEST) -m 'not slow'
 
 # What takes longer than a person waits; .ci/run does of it what guards a file that changed since it last passed, which
-# tests/full_pass.txt tells. Commit that file with the change.
+# tests/full_pass.txt tells by folder. Commit that file with the change.
 test-all:
 	$(MAKE) test
 	$(MAKE) test-all-core
