@@ -168,8 +168,8 @@ def imported_modules(file: Path) -> set[str]:
 
 # The folders of the package from the bottom up: each may import what stands before it.
 PACKAGE_FOLDERS = [
-    "settings",
     "io",
+    "settings",
     "results",
     "machine",
     "program",

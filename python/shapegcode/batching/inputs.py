@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode.batching.manifest import MANIFEST, short
 from shapegcode.errors import ArgumentError
+from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file
 from shapegcode.program.reading import PROGRAM_SUFFIXES, program_loader
 from shapegcode.program.several import is_subprogram
 
@@ -89,7 +90,7 @@ def _each(given: Iterable[str], avoid: Path) -> Iterator[Source]:
 def _listed(file: Path, avoid: Path) -> Iterator[Source]:
     """What a list names; a message says where it stands."""
     try:
-        text = file.read_text()
+        text = read_file(file, MAX_SETTINGS_BYTES).decode()
     except UnicodeDecodeError:
         raise ArgumentError(f"{file}: no list of programs: it is no text") from None
     lines = [(number, _COMMENT.sub("", line).strip()) for number, line in enumerate(text.splitlines(), 1)]
@@ -144,7 +145,7 @@ def _in_folder(folder: Path, avoid: Path) -> Iterator[Source]:
 
 def _only_returns(path: str) -> bool:
     try:
-        return is_subprogram(Path(path).read_bytes())
+        return is_subprogram(read_file(path))
     except OSError:
         return False  # its run will say why
 
@@ -172,7 +173,7 @@ def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterato
     numbers = [*bound.g_macros.values(), *bound.m_macros.values(), *bound.m_subprograms.values()]
     numbers += [bound.tool_program] if bound.tool_program else []
     seen: set[int] = set()
-    waiting = [*numbers, *_mentioned(Path(path).read_bytes(), folders)]
+    waiting = [*numbers, *_mentioned(read_file(path), folders)]
     while waiting:
         number = waiting.pop()
         if number in seen:

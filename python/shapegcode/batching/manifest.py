@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import bisect
 import contextlib
-import fcntl
 import hashlib
 import json
 import os
+import sys
 from array import array
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -78,18 +78,10 @@ class Manifest:
     def __init__(self, folder: Path, *, resume: bool, base: str = "") -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.path = folder / MANIFEST
-        # The folder itself is locked: that leaves no file behind, however the batch ends.
-        self._lock = os.open(folder, os.O_RDONLY)
         self._before: BinaryIO | None = None
         self._known: dict[bytes, int] = {}
         self._old, self._new = array("q"), array("q")
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            os.close(self._lock)
-            raise ArgumentError(
-                f"{folder}: another batch is writing there; wait for it or name another folder"
-            ) from None
+        self._lock = _locked(folder)
         try:
             # The file of before stays open, so that its rows can be read though a new one has its name.
             with contextlib.suppress(FileNotFoundError):
@@ -184,6 +176,23 @@ class Manifest:
             self._new.append(end)
             end += len(line)
             yield line.decode()
+
+
+def _locked(folder: Path) -> int:
+    """Lock a folder, in a way that leaves nothing behind however the batch ends; gives what to close."""
+    lock = -1
+    try:
+        if sys.platform == "win32":  # deleted by the system when it is closed
+            return os.open(folder / ".batch.lock", os.O_CREAT | os.O_EXCL | os.O_TEMPORARY)
+        import fcntl
+
+        lock = os.open(folder, os.O_RDONLY)
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, FileExistsError):
+        if lock >= 0:
+            os.close(lock)
+        raise ArgumentError(f"{folder}: another batch is writing there; wait for it or name another folder") from None
+    return lock
 
 
 def _base_of(stream: BinaryIO, output: str | Path) -> str:

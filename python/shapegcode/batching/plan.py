@@ -10,6 +10,7 @@ from pathlib import Path
 from shapegcode.batching.inputs import Source, called_files
 from shapegcode.batching.job import Base, BatchJob
 from shapegcode.errors import ArgumentError
+from shapegcode.io.data_file import read_file
 from shapegcode.machine import Machine
 
 __all__ = ["COMMANDS", "WRITES", "Plan", "plan"]
@@ -95,9 +96,9 @@ class Plan:
         """
         line, source = self._of(rank)
         name = self.base.name_of(source.path)
-        found = {name: Path(source.path).read_bytes()}
+        found = {name: read_file(source.path)}
         for called, path in called_files(source.path, line.machine, self.base.path_of(".")):
-            found[self.base.name_of(called)] = Path(path).read_bytes()
+            found[self.base.name_of(called)] = read_file(path)
         return found | {key: content for key, content in self.shared.items() if key in line.files}
 
     def size_bytes(self, rank: int) -> int:
@@ -156,12 +157,12 @@ def plan(
         if word.partition("=")[0] in _OF_ONE_RUN:
             raise ArgumentError(f"{word} behind --: names a file of one run; a batch has -m, -o and --html itself")
     words, given = _with_files(options, base)
-    shared = {name: Path(path).read_bytes() for name, path in given}
+    shared = {name: read_file(path) for name, path in given}
     lines: list[_OnMachine] = []
     for name, label in zip(machines, labels, strict=True):
         machine = Machine.load(name)
         own = [base.name_of(name)] if os.path.exists(name) else []
-        shared |= {key: Path(name).read_bytes() for key in own}
+        shared |= {key: read_file(name) for key in own}
         below = label if len(machines) > 1 else ""
         lines.append(_OnMachine(name, own[0] if own else name, below, machine, (*own, *(key for key, _ in given))))
     page = base.name_of(html) if html else ""

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode.batching.job import FAILED_CODES, Ending, JobOutcome, Packed
+from shapegcode.io.atomic import named_errors
 from shapegcode.results.made import this_version
 
 __all__ = ["Hosts", "begin_host", "run_packed"]
@@ -145,7 +146,8 @@ class Hosts:
         for name, content in packed.files.items():
             target = Path(os.path.normpath(cwd / name))
             target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(content)
+            with named_errors(target):
+                target.write_bytes(content)
         for word in packed.words:
             _make_parent(cwd, word)
         host = self._host(packed.words[0])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.cli import modes
@@ -171,11 +170,12 @@ def _sorted(files: list[str]) -> tuple[str, list[str]]:
         OSError: a file cannot be read.
     """
     from shapegcode.errors import ArgumentError
+    from shapegcode.io.data_file import read_file
     from shapegcode.machine.fanuc_tables import is_table
 
     if len(files) == 1:
         return files[0], []
-    tables = [file for file in files if is_table(Path(file).read_bytes())]
+    tables = [file for file in files if is_table(read_file(file))]
     dumps = [file for file in files if file not in tables]
     if len(dumps) != 1:
         said = f"more than one: {', '.join(dumps)}" if dumps else "none: tables of offsets do not make a machine"

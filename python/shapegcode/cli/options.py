@@ -116,10 +116,15 @@ def _toml_value(text: str) -> Any:
     # A bare word is a string: quotes would have to be escaped from the shell.
     import tomllib
 
+    from shapegcode.errors import MachineError, Problem
+    from shapegcode.io.data_file import toml_tables
+
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return toml_tables(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text
+    except ValueError as error:
+        raise MachineError("--set", (Problem("", "", str(error)),)) from None
 
 
 def output_file(name: str) -> Path:

@@ -216,13 +216,11 @@ def _refuse_whole_tool_file(name: str) -> None:
     Raises:
         ArgumentError: it does.
     """
-    import tomllib
-    from pathlib import Path
-
     from shapegcode.errors import ArgumentError
+    from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file, toml_tables
 
     try:
-        more = sorted(set(tomllib.loads(Path(name).read_text(encoding="utf-8"))) - {"cutting"})
+        more = sorted(set(toml_tables(read_file(name, MAX_SETTINGS_BYTES).decode())) - {"cutting"})
     except (OSError, ValueError):  # not there, or nothing of ours
         return
     if more:

@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import re
+import secrets
 import stat
 import sys
 from collections.abc import Iterable, Iterator
@@ -23,6 +24,7 @@ __all__ = [
 ]
 
 _passing = False
+_LONGEST_NAME = 200  # of a file, so that more has room behind it
 
 
 def write_in_passing() -> None:
@@ -31,7 +33,7 @@ def write_in_passing() -> None:
     _passing = True
 
 
-_TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
+_TEMPORARY = re.compile(r"\..+\.[0-9a-f]+\.tmp")  # digits alone: of versions before
 
 
 @contextlib.contextmanager
@@ -57,7 +59,7 @@ def named_errors(path: str | Path) -> Iterator[None]:
 def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
     """A stream whose content takes the place of a file when the block ends well; otherwise the file stays as it was.
 
-    A symbolic link is followed; a device or pipe is written to directly.
+    A symbolic link is followed, but not round in a circle; a device or pipe is written to directly.
 
     Args:
         path: of the file.
@@ -68,15 +70,17 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
     Raises:
         OSError: the file cannot be written, for example a full disk or a missing folder.
     """
-    target = Path(os.path.realpath(path))
+    target = _target_of(path)
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
         with open(target, "wb") as stream:
             yield stream
         return
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")  # see is_temporary
+    # No number of a process: a container counts from 1 again, and threads have the same one. See is_temporary.
+    temporary = target.with_name(f".{target.name[:_LONGEST_NAME]}.{secrets.token_hex(8)}.tmp")
+    stream = open(temporary, "xb")  # noqa: SIM115 - what another one has written is not removed below
     try:
-        with open(temporary, "xb") as stream:
+        with stream:
             yield stream
             stream.flush()
             if not _passing:
@@ -87,6 +91,14 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def _target_of(path: str | Path) -> Path:
+    """The file that a symbolic link leads to."""
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():  # realpath gives up only where links lead to each other
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    return target
 
 
 def is_temporary(path: str | Path) -> bool:
@@ -156,7 +168,7 @@ def write_bytes(path: str | Path, data: bytes | memoryview, *, overwrite: bool =
             with replaced_file(path) as stream:
                 stream.write(data)
         else:
-            _write_new(Path(os.path.realpath(path)), data)
+            _write_new(_target_of(path), data)
 
 
 def _write_new(target: Path, data: bytes | memoryview) -> None:

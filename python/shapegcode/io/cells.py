@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from shapegcode.errors import RecordError
+from shapegcode.io.data_file import read_file
 
 __all__ = [
     "cells_of", "has_thousands", "is_clock_time", "is_number", "refuse_binary", "utf8_text", "without_thousands",
@@ -33,7 +34,7 @@ def utf8_text(path: Path) -> bytes:
     Raises:
         RecordError: it is not text.
     """
-    data = path.read_bytes()
+    data = read_file(path)
     if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         data = data.decode("utf-16", errors="replace").encode("utf-8")
     data = data.removeprefix(b"\xef\xbb\xbf")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from shapegcode.errors import RecordError
+from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.options import ReadOptions
 from shapegcode.io.record import Record
@@ -95,9 +96,7 @@ def read_measurement(path: str | Path, options: ReadOptions | None = None) -> li
 
 def _head(path: Path) -> bytes:
     """The first bytes of a file that is one."""
-    if path.exists() and not path.is_file():
-        raise RecordError(f"{path}: not a regular file")
-    with path.open("rb") as file:
+    with open_file(path) as file:
         head = file.read(_BYTES_TO_KNOW)
     if not head.strip():
         raise RecordError(f"{path}: the file is empty; a record of time, force and acceleration is needed")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
+from shapegcode.io.data_file import open_file
 from shapegcode.program.memory import require_memory
 from shapegcode.settings.keys import toml
 
@@ -241,8 +242,8 @@ def program_bytes(path: str | Path, most: int) -> bytes:
         OSError: the file cannot be read; it names the file, which a failed read() alone does not.
     """
     try:
-        with Path(path).open("rb") as file:
-            size = min(os.fstat(file.fileno()).st_size, most + 1)  # 0 of what is no file
+        with open_file(path) as file:
+            size = min(os.fstat(file.fileno()).st_size, most + 1)
             require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
             return file.read(most + 1)
     except OSError as error:

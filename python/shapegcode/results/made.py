@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from shapegcode.io.data_file import open_file
+
 __all__ = ["FORMAT", "Made", "MadeFile", "file_hash", "this_version"]
 
 FORMAT = 1
@@ -98,7 +100,7 @@ def file_hash(name: str | Path) -> tuple[str, int]:
     import hashlib
 
     digest, size = hashlib.sha256(), 0
-    with Path(name).open("rb") as stream:
+    with open_file(name) as stream:
         while piece := stream.read(_PIECE_BYTES):
             digest.update(piece)
             size += len(piece)

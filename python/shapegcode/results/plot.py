@@ -10,11 +10,14 @@ apart.
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from shapegcode.io.atomic import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -221,11 +224,13 @@ def save(drawn: Axes | Figure, file: str | Path) -> None:
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         raise ValueError(f"{path}: the ending of a picture must be one of {', '.join(FORMATS)}")
+    stream = io.BytesIO()
     if suffix == ".svg":
         with matplotlib.rc_context({"svg.hashsalt": "shapegcode", "svg.fonttype": "none"}):
-            figure.savefig(path, format="svg", metadata={"Date": None})
+            figure.savefig(stream, format="svg", metadata={"Date": None})
     else:
-        figure.savefig(path, format="png", dpi=150, metadata={"Software": None})
+        figure.savefig(stream, format="png", dpi=150, metadata={"Software": None})
+    write_bytes(path, stream.getvalue())
 
 
 _MANY_POINTS = 6000

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from shapegcode._core import ArgumentError
+from shapegcode.io.data_file import DataFile
 from shapegcode.results.made import FORMAT, Made
 from shapegcode.results.outcome import NotKeptError
 from shapegcode.results.result import Result
@@ -99,18 +100,15 @@ def written_reports(path: str | Path) -> list[dict[str, Any]]:
         ArgumentError: it is cut off, or is no JSON of results; with line and column.
         OSError: it cannot be read.
     """
-    data = Path(path).read_bytes()
     try:
-        text = data.decode()
-        found = json.loads(text, parse_constant=partial(_no_number, path))
+        with DataFile(path, ArgumentError) as file:
+            found = file.json(str(path), file.read(), partial(_no_number, path))
     except UnicodeDecodeError as error:
         raise ArgumentError(f"{path}: byte {error.start} is not UTF-8: this is no JSON of shapegcode") from None
     except json.JSONDecodeError as error:
-        cut = error.pos >= len(text.rstrip()) or "Unterminated" in error.msg
-        why = f"the file ends in the middle ({len(data)} bytes): it was cut off" if cut else error.msg
+        cut = error.pos >= len(error.doc.rstrip()) or "Unterminated" in error.msg
+        why = f"the file ends in the middle ({len(error.doc)} characters): it was cut off" if cut else error.msg
         raise ArgumentError(f"{path}: line {error.lineno}, column {error.colno}: {why}") from None
-    except RecursionError:
-        raise ArgumentError(f"{path}: nested too deeply: this is no JSON of shapegcode") from None
     found = found if isinstance(found, list) else [found]
     for rank, each in enumerate(found, 1):
         if not isinstance(each, dict):

@@ -20,6 +20,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, Strict, field_validator, model_validator
 
 from shapegcode.errors import FileError, Problem
+from shapegcode.io.data_file import DataFile
 from shapegcode.settings.keys import InlineTable, Positive, PositiveAxisValues, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem, line_of
@@ -179,7 +180,8 @@ def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
         data = parsed(text, str(path), AnswersError)
     else:
         try:
-            data = json.loads(text)
+            with DataFile(path, lambda said: AnswersError(str(path), (Problem("", "", said),))) as file:
+                data = file.json("the answers", file.read())
         except json.JSONDecodeError as error:
             raise AnswersError(str(path), (Problem("", "", f"not JSON: {error.msg}", error.lineno),)) from None
         if not isinstance(data, dict):

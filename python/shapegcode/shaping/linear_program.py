@@ -37,6 +37,13 @@ _FREE: list[_Quiet] = []
 """Solvers whose program is no longer needed: a new one takes a third of the time of a small program."""
 
 
+def _solver() -> _Quiet:
+    try:
+        return _FREE.pop()  # in one step: another thread may take the last one
+    except IndexError:
+        return _Quiet()
+
+
 def _give_back(solver: _Quiet) -> None:
     solver.clearModel()
     _FREE.append(solver)
@@ -53,7 +60,7 @@ class LinearProgram:
 
     def __init__(self, lower: FloatArray, upper: FloatArray, equal: tuple[FloatArray, FloatArray]) -> None:
         self._columns = np.arange(len(lower), dtype=np.int32)
-        self._solver = _FREE.pop() if _FREE else _Quiet()
+        self._solver = _solver()
         weakref.finalize(self, _give_back, self._solver).atexit = False
         self._set(threads=1, solver="simplex", presolve="off")
         nothing = np.zeros(0)

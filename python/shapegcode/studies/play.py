@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-import os
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 
 from shapegcode.studies.replay import PackedText, Replay
 from shapegcode.studies.varied import drawn_machine
+from shapegcode.verdict.ahead import cores
 
 __all__ = ["DrawsJob", "play_all"]
 
@@ -97,7 +97,7 @@ def play_all(
         packed = replay.packed()
         running = [pool.submit(_play_packed, packed, part) for part in parts]
     else:
-        own = ThreadPoolExecutor(os.cpu_count() or 1)
+        own = ThreadPoolExecutor(cores())
         running = [own.submit(part.play, replay) for part in parts]
     try:
         for future, part in zip(running, parts, strict=True):

@@ -20,7 +20,11 @@ _WAITING = 2  # parts per core that are under way or done and not yet taken: wha
 
 
 def cores() -> int:
-    """Cores that this process may use; SHAPEGCODE_THREADS says less."""
+    """Processors that this process may use, by its affinity; SHAPEGCODE_THREADS says another number.
+
+    Returns:
+        How many; every pool of threads or processes here is as large.
+    """
     said = os.environ.get("SHAPEGCODE_THREADS", "")
     if said.isdecimal() and int(said) > 0:
         return int(said)
