@@ -24,7 +24,7 @@ _PAPER_JUMP = 0.9  # of the diameter
 _PAPER_DROP_PERCENT = 50.0
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class CornerDemo(Demonstration):
     """Three corners, the feeds of equation 7, and what the scheduler makes of them.
 

@@ -67,7 +67,7 @@ class CycleTimeCase:
         return " / ".join(f"{each * 1e3:.0f}" for each in constants) + " ms"
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class CycleTimeDemo(Demonstration):
     """Our test piece with both sets of constants of the paper.
 

@@ -87,7 +87,7 @@ class Study:
         return found
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class EvidenceDemo(Demonstration):
     """Runs left out, predicted beside measured.
 

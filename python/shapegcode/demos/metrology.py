@@ -104,7 +104,7 @@ class SpecimenCase:
         return None if roughness is None else float(getattr(roughness, key))
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class MetrologyDemo(Demonstration):
     """The paper's specimens, measured on the model.
 
@@ -158,7 +158,7 @@ class MetrologyDemo(Demonstration):
 
     def plots(self) -> Mapping[str, Plot]:
         """The walls at the highest feed."""
-        return self.drawn.plots()
+        return self._drawable(lambda: self.drawn.plots())  # noqa: PLW0108 (drawn may be missing)
 
 
 def metrology_demo(on_progress: Callable[[float], None] = lambda _done: None) -> MetrologyDemo:

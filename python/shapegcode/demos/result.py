@@ -102,7 +102,7 @@ def compared(
     return Statement(place, what, said[0], said[1], _verdict(abs(ours - published) <= within), difference_percent, note)
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class Demonstration(Result):
     """A paper's figures, repeated.
 
@@ -175,5 +175,4 @@ class Demonstration(Result):
         name = f"{type(self).__module__}_plots"
         if importlib.util.find_spec(name) is None:
             return {}
-        found: Mapping[str, Plot] = importlib.import_module(name).plots_of(self)
-        return found
+        return self._drawable(lambda: importlib.import_module(name).plots_of(self))

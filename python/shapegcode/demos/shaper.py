@@ -59,7 +59,7 @@ class DemoShaper:
     worst_residual_percent: float
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class ShaperDemo(Demonstration):
     """Two-mode shapers, their branches, step responses and sensitivities, and the test on a stage.
 

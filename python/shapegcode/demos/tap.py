@@ -64,7 +64,7 @@ _MILL_THETA = 1.4  # the usual one
 _CUTTING_FORCE_N = 100.0
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class TapDemo(Demonstration):
     """Mass, damping and stiffness from a tap.
 

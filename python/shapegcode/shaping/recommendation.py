@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.bands import ModeBand, machine_bands, parse_mode_band
 from shapegcode.shaping.comparison import choose
@@ -68,14 +70,18 @@ def choose_shaper(
         ArgumentError: neither modes nor a machine with modes, equal modes, or a value outside its range.
         DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
     """
+    # Arrays are lists, too, and their numbers Python's.
+    modes = np.asarray(modes, dtype=object).tolist()
+    periods = None if periods_s is None else np.asarray(periods_s, dtype=object).tolist()
+    families = None if families is None else np.asarray(families, dtype=object).tolist()
     if modes:
         bands = [_band(each, uncertainty) for each in modes]
     elif machine is not None:
         bands = machine_bands(machine, uncertainty)
     else:
         raise ArgumentError("a comparison of shapers needs modes or a machine: neither is given")
-    if periods_s is not None and machine is not None:
-        for period_s in periods_s:
+    if periods is not None and machine is not None:
+        for period_s in periods:
             if period_s is not None:
                 check_block_period(period_s, machine)
     own = parse_taps(taps) if isinstance(taps, str) else taps
@@ -85,7 +91,7 @@ def choose_shaper(
 
     def compared(longest_s: float) -> Recommendation:
         options = DesignOptions(None, longest_s, max_abs_sum, limit, own)
-        kinds = periods_s
+        kinds: Sequence[float | None] | None = periods
         if kinds is None:
             best = candidate_periods(bands, machine, longest_s, limit)
             kinds = best if machine is not None else [None, *best]
