@@ -149,7 +149,7 @@ _FIGURES = (
 )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Batch(Result):
     """A command over many programs and machines.
 

@@ -26,7 +26,7 @@ def plots_of(conversion: Conversion) -> dict[str, Plot]:
     Returns:
         By name; none for a program without shaped regions.
     """
-    found = motion_pictures(partial(_played, conversion)) if conversion.placed else {}
+    found = motion_pictures(partial(_played, conversion)) if conversion.regions else {}
     if conversion.tolerance_curve is not None and len(conversion.tolerance_curve.points) > 1:
         found["tolerance"] = partial(plot_tolerance, conversion.tolerance_curve)
     return found

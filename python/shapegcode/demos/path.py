@@ -110,7 +110,7 @@ class PathCondition:
     published_orbit_error_percent: float
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class PathDemo(Result):
     """Line, quarter arc, line: ideal command, emitted program and the paper.
 

@@ -176,6 +176,18 @@ class MachineModel:
         self.slowest_decay_per_s = min(rates, default=math.inf)
         """Decay rate of the mode that rings longest: damping ratio times angular frequency; infinite without modes."""
 
+    def __reduce__(self) -> tuple[type[MachineModel], tuple[Machine]]:
+        """Built again from the machine: what the core holds does not travel."""
+        return MachineModel, (self.machine,)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same machine."""
+        return self.machine == other.machine if isinstance(other, MachineModel) else NotImplemented
+
+    def __hash__(self) -> int:
+        """That of the machine."""
+        return hash(self.machine)
+
     @cached_property
     def ordinary(self) -> PlayingController:
         """The controller as it plays an ordinary program."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,6 +51,7 @@ class Reading:
         probe_lines: ascending line numbers behind which the modal state is kept.
         expand_compensation: G41/G42 became plain moves.
         collect_alarms: the reader went on behind an alarm.
+        called: name and text of programs in other files that it calls, by O number; found when it was read.
     """
 
     machine: Machine
@@ -57,6 +60,7 @@ class Reading:
     probe_lines: tuple[int, ...] = ()
     expand_compensation: bool = True
     collect_alarms: bool = False
+    called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
     def options(self, folders: Sequence[Path]) -> _core.ReaderOptions:
         """Settings with which the core reads a text so.
@@ -78,7 +82,8 @@ class Reading:
             options.opaque_programs = list(_ANY_PROGRAM)
         folders = [*folders, *(Path(name).expanduser() for name in self.machine.input.program_folders)]
         if folders:
-            options.load_program = program_loader(folders, self.machine.controller.max_program_bytes)
+            load = program_loader(folders, self.machine.controller.max_program_bytes)
+            options.load_program = partial(_called, self.called, load)
         return options
 
     def differences(self, machine: Machine) -> list[str]:
@@ -100,6 +105,15 @@ class Reading:
             for key, value in mine.items()
             if value != other[key] and key not in unused
         ]
+
+
+def _called(
+    known: dict[int, tuple[str, bytes]], load: Callable[[int], tuple[str, bytes] | None], number: int
+) -> tuple[str, bytes] | None:
+    """A program of another file, kept with the reading: it is read again where these files are not."""
+    if number not in known and (found := load(number)) is not None:
+        known[number] = found
+    return known.get(number)
 
 
 def _settings_of_reading(machine: Machine) -> dict[str, object]:

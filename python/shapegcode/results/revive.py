@@ -25,7 +25,7 @@ import numpy as np
 from shapegcode._core import ArgumentError
 from shapegcode.io.data_file import DataFile
 from shapegcode.results.made import FORMAT, Made
-from shapegcode.results.outcome import NotKeptError
+from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.result import Result
 
 __all__ = ["MODULES", "NotKept", "load_result", "made_of", "revived", "written_reports"]
@@ -194,8 +194,7 @@ def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingPr
         raise ArgumentError(f"key {unknown[0]} is not one of a {made.result}: written by {made.by}")
     hidden = {name: value for name, value in kept.items() if name in known and value is not None}
     own = {key: value for key, value in report.items() if key in names}
-    result = cls(**(dict(_fields(cls, own, "", {})) | hidden))
-    object.__setattr__(result, "from_json", True)
+    result: Result = _from_json(cls(**(dict(_fields(cls, own, "", {})) | hidden)))
     return result
 
 
@@ -270,7 +269,13 @@ def _object(cls: Any, arguments: Sequence[Any], data: Any, where: str, bound: Ma
     if not isinstance(data, dict):
         _wrong(where, data, "an object")
     own = dict(zip(getattr(cls, "__parameters__", ()), (bound.get(each, each) for each in arguments), strict=False))
-    return cls(**dict(_fields(cls, data, where, own)))
+    return _from_json(cls(**dict(_fields(cls, data, where, own))))
+
+
+def _from_json(made: Any) -> Any:
+    if isinstance(made, Outcome):
+        object.__setattr__(made, "from_json", True)
+    return made
 
 
 def _fields(cls: Any, data: Mapping[str, Any], where: str, bound: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:

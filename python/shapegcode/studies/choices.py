@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
+from shapegcode.studies.distributions import listed
 from shapegcode.studies.varied import check_keys
 
 __all__ = ["Choices", "checked_choices", "search", "usual_choices"]
@@ -63,12 +64,15 @@ def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
     if not choices:
         raise ArgumentError("choose: nothing to choose: give a list of values for one key or more")
     check_keys("choose", choices)
+    checked = {}
     for key, values in choices.items():
-        if isinstance(values, str) or not isinstance(values, Sequence) or not values:
-            raise ArgumentError(f"choose: {key} = {values!r}: must be a list of one value or more")
+        try:
+            checked[key] = listed(values).values
+        except ArgumentError:
+            raise ArgumentError(f"choose: {key} = {values!r}: must be a list of one value or more") from None
         if key in varied:
             raise ArgumentError(f"choose: {key}: it is drawn (vary): a value is either drawn or chosen")
-    return choices
+    return checked
 
 
 def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float]) -> Iterator[Ranks]:

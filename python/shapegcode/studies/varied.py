@@ -9,6 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine import Machine
@@ -17,7 +21,7 @@ from shapegcode.studies.distributions import Distribution, listed
 
 __all__ = ["Varied", "Vary", "check_keys", "drawn_machine", "varied_values"]
 
-Vary = Mapping[str, Distribution | Sequence[object]]
+Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]
 """What each key is drawn from."""
 
 # A machine may differ from its file in these, and they are read when blocks are played.
@@ -94,7 +98,7 @@ def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
     held = {value.key: value for value in machine.values()}
     found = []
     for key, given in vary.items():
-        if isinstance(given, str) or not isinstance(given, Distribution | Sequence):
+        if isinstance(given, str) or not isinstance(given, Distribution | Sequence | np.ndarray):
             raise ArgumentError(f"vary: {key} = {given!r}: must be a distribution or a list of values")
         drawn = given if isinstance(given, Distribution) else listed(given)
         # Tables such as controller.in_position_s can be varied axis by axis.

@@ -12,7 +12,7 @@ from typing import Any
 
 from shapegcode.results.json import plain
 from shapegcode.results.made import Made, this_version
-from shapegcode.results.outcome import NotKeptError, Outcome, Plot
+from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.page.how import HOW, UNKNOWN
 from shapegcode.results.page.model import (
     Figure,
@@ -143,7 +143,7 @@ def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Sectio
     Returns:
         A section of those on paper, one of the others; none where there are none.
     """
-    pictures = [Picture(name, plot, how_to_read(name)) for name, plot in _drawable(result).items()]
+    pictures = [Picture(name, plot, how_to_read(name)) for name, plot in result.plots().items()]
     chosen = [each for each in pictures if each.name in printed] or pictures[:_PRINTED_PICTURES]
     if chosen:
         yield Section("pictures", "Pictures", tuple(chosen))
@@ -152,23 +152,6 @@ def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Sectio
     if result.from_json:
         left_out = "Pictures that need the samples of the run are not here: the JSON does not hold them."
         yield Section("no-pictures", "Pictures that are not here", (Text((left_out,)),), printed=False)
-
-
-def _drawable(result: Outcome) -> Mapping[str, Plot]:
-    """The pictures; of a result that came from its JSON those which need nothing else."""
-    try:
-        plots = result.plots()
-    except NotKeptError:
-        return {}
-    return {name: plot for name, plot in plots.items() if not result.from_json or _draws(plot)}
-
-
-def _draws(plot: Plot) -> bool:
-    try:
-        plot()
-    except NotKeptError:
-        return False
-    return True
 
 
 def how_to_read(name: str) -> str:
