@@ -129,7 +129,7 @@ def _interrupted(folder: Path, number: int, after_s: float) -> subprocess.Comple
     process.stdout.readline()
     time.sleep(after_s)
     process.send_signal(number)
-    out, said = process.communicate(timeout=120)
+    out, said = process.communicate()
     return subprocess.CompletedProcess(words, process.returncode, out, said)
 
 

@@ -44,20 +44,7 @@ class Source:
 
 
 def find_programs(given: Sequence[str], output: str | Path) -> tuple[Source, ...]:
-    """The programs that folders, patterns and lists name.
-
-    Args:
-        given: files, folders (all programs in them and below), patterns such as ``parts/*.nc``, and ``@LIST``, a file
-            with one of these per line (``#`` begins a comment; relative to the list).
-        output: folder of the results, in which no program is looked for.
-
-    Returns:
-        Each program once, in the order in which they were given, those of a folder by name.
-
-    Raises:
-        ArgumentError: something names no program, or two programs would have the same results.
-        OSError: a list or a folder cannot be read.
-    """
+    """The programs that folders, patterns and lists name."""
     found: list[Source] = []
     files, places = set[bytes](), set[bytes]()
     for source in _each(given, Path(output).absolute()):
@@ -154,17 +141,6 @@ def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterato
     """Files of programs that a program may call, and those that these may.
 
     More than are called may be among them: any number behind a P counts, of a program that calls at all.
-
-    Args:
-        path: of the program.
-        machine: whose folders and macro codes count too.
-        base: folder from which the machine names its folders.
-
-    Returns:
-        Name of each, beside the program, and the file.
-
-    Raises:
-        OSError: a file cannot be read.
     """
     beside = Path(path).parent
     folders = [beside, *(Path(base, Path(name).expanduser()) for name in machine.input.program_folders)]

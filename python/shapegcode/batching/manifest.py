@@ -31,18 +31,7 @@ _FOLDER = "folder"
 
 
 def begun_in(output: str | Path) -> str:
-    """The folder in which the batch of an output folder was begun.
-
-    Args:
-        output: folder of the results.
-
-    Returns:
-        Its absolute path; the current folder if there is no batch yet.
-
-    Raises:
-        ArgumentError: what lies there is no manifest of this version.
-        OSError: it cannot be read.
-    """
+    """The folder in which the batch of an output folder was begun."""
     try:
         with (Path(output) / MANIFEST).open("rb") as stream:
             return _base_of(stream, output) or os.getcwd()
@@ -51,14 +40,7 @@ def begun_in(output: str | Path) -> str:
 
 
 def short(text: str) -> bytes:
-    """Sixteen bytes that stand for a text of any length.
-
-    Args:
-        text: a key or a path.
-
-    Returns:
-        Its hash.
-    """
+    """Sixteen bytes that stand for a text of any length."""
     return hashlib.blake2b(os.fsencode(text), digest_size=16).digest()
 
 
@@ -97,14 +79,7 @@ class Manifest:
             raise
 
     def earlier(self, key: str) -> dict[str, Any] | None:
-        """The row of an earlier batch, also one that is forgotten: its files are known by it.
-
-        Args:
-            key: of a run.
-
-        Returns:
-            The row; None: there is none.
-        """
+        """The row of an earlier batch, also one that is forgotten: its files are known by it."""
         at = self._known.get(short(key))
         if at is None or self._before is None:
             return None
@@ -113,28 +88,11 @@ class Manifest:
         return row
 
     def kept_at(self, key: str) -> int:
-        """Where the row of an earlier batch stands now.
-
-        Args:
-            key: of a run that has one, which is not forgotten.
-
-        Returns:
-            Where it begins in the file.
-        """
+        """Where the row of an earlier batch stands now."""
         return self._new[bisect.bisect_left(self._old, self._known[short(key)])]
 
     def add(self, row: Mapping[str, Any]) -> int:
-        """Write a row, to the disk itself.
-
-        Args:
-            row: with its "key".
-
-        Returns:
-            Where it begins in the file.
-
-        Raises:
-            OSError: a full disk; the row is then not there.
-        """
+        """Write a row, to the disk itself."""
         with named_errors(self.path):
             end = self._stream.tell()
             try:

@@ -65,14 +65,7 @@ class Plan:
         return len(self.sources) * len(self.lines)
 
     def job(self, rank: int) -> BatchJob:
-        """A run.
-
-        Args:
-            rank: from 0 on.
-
-        Returns:
-            The run; nothing is read for it.
-        """
+        """A run."""
         line, source = self._of(rank)
         target = os.path.join(self.output, line.below, source.place)
         page = os.path.join(self.html, line.below, f"{source.place}.html") if self.html else ""
@@ -83,17 +76,7 @@ class Plan:
         return BatchJob(source.path, line.given, tuple(words), target)
 
     def files(self, rank: int) -> dict[str, bytes]:
-        """What a run reads.
-
-        Args:
-            rank: of the run.
-
-        Returns:
-            Content by name in the folder of the run.
-
-        Raises:
-            OSError: a file cannot be read.
-        """
+        """What a run reads."""
         line, source = self._of(rank)
         name = self.base.name_of(source.path)
         found = {name: read_file(source.path)}
@@ -102,14 +85,7 @@ class Plan:
         return found | {key: content for key, content in self.shared.items() if key in line.files}
 
     def size_bytes(self, rank: int) -> int:
-        """How large the program of a run is.
-
-        Args:
-            rank: of the run.
-
-        Returns:
-            Its size; 0 if nobody may read it.
-        """
+        """How large the program of a run is."""
         try:
             return os.path.getsize(self._of(rank)[1].path)
         except OSError:
@@ -129,25 +105,7 @@ def plan(
     html: str | Path | None,
     base: Base,
 ) -> Plan:
-    """The runs of programs on machines.
-
-    Args:
-        sources: the programs.
-        machines: files or names of built-in ones.
-        output: folder of the results.
-        command: of `COMMANDS`.
-        options: further words of each command line.
-        html: folder of the pages; None: none.
-        base: folder in which the batch was begun.
-
-    Returns:
-        The runs.
-
-    Raises:
-        ArgumentError: there is no machine, or two would have the same folder.
-        MachineError: one is none.
-        OSError: a file of a machine or an option cannot be read.
-    """
+    """The runs of programs on machines."""
     if not machines:
         raise ArgumentError("no machine: name one with -m")
     labels = [Path(machine).stem for machine in machines]

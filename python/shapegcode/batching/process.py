@@ -89,26 +89,12 @@ class Hosts:
         self._ended = False
 
     def begin(self, command: str) -> None:
-        """Have one load while its first job is still looked for.
-
-        Args:
-            command: of the jobs.
-        """
+        """Have one load while its first job is still looked for."""
         host = self._ready[command] = _Host(command)
         self._all.add(host)
 
     def run(self, packed: Packed) -> JobOutcome:
-        """Run a job in a process of its own, in a folder that is gone afterwards.
-
-        Args:
-            packed: the job.
-
-        Returns:
-            What it wrote and how it ended; a crash is an outcome, not an error.
-
-        Raises:
-            OSError: there is no room for its folder.
-        """
+        """Run a job in a process of its own, in a folder that is gone afterwards."""
         if packed.version != (mine := this_version()):
             return JobOutcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
         folder = Path(tempfile.mkdtemp(prefix="job-", dir=packed.scratch or None))
@@ -176,26 +162,12 @@ _of_worker = Hosts()
 
 
 def begin_host(command: str) -> None:
-    """Have a Dask worker load what its first run needs.
-
-    Args:
-        command: of the runs.
-    """
+    """Have a Dask worker load what its first run needs."""
     _of_worker.begin(command)
 
 
 def run_packed(packed: Packed) -> JobOutcome:
-    """`Hosts.run` on a Dask worker, whose hosts last as long as it does.
-
-    Args:
-        packed: the job.
-
-    Returns:
-        What it wrote and how it ended.
-
-    Raises:
-        OSError: there is no room for its folder.
-    """
+    """`Hosts.run` on a Dask worker, whose hosts last as long as it does."""
     return _of_worker.run(packed)
 
 

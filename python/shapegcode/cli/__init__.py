@@ -202,17 +202,7 @@ class _Interrupts:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line and return the exit code (see :class:`ExitCode`).
-
-    Args:
-        argv: the arguments without the program's name; None: those of the process.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        Exception: with ``--debug``, the error as it is; without it, only what is a defect of shapegcode.
-    """
+    """Run the command line and return the exit code (see :class:`ExitCode`)."""
     words = list(sys.argv[1:] if argv is None else argv)
     if "numpy" not in sys.modules:
         # Matrices of a command are small: further threads of OpenBLAS would only wait, and burn processor time.

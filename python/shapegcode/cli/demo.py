@@ -43,11 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Repeat a paper's figures.
-
-    Raises:
-        OSError: the JSON file cannot be written.
-    """
+    """Repeat a paper's figures."""
     from shapegcode.cli import runner
     from shapegcode.demos.path import path_demo
 

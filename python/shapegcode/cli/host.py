@@ -53,11 +53,7 @@ _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl
 
 
 def main() -> int:
-    """Serve until the input ends.
-
-    Returns:
-        The exit code.
-    """
+    """Serve until the input ends."""
     for command in sys.argv[1:]:
         for name in (*_LOADED, f"shapegcode.cli.{command}", *_OF_COMMAND[command]):
             importlib.import_module(name)

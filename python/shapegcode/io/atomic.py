@@ -38,17 +38,7 @@ _TEMPORARY = re.compile(r"\..+\.[0-9a-f]+\.tmp")  # digits alone: of versions be
 
 @contextlib.contextmanager
 def named_errors(path: str | Path) -> Iterator[None]:
-    """Errors of the file system get the name of *path*: a failed write() has none, that of a temporary file misleads.
-
-    Args:
-        path: named in the errors.
-
-    Yields:
-        A context.
-
-    Raises:
-        OSError: with the name of *path* and the reason.
-    """
+    """Errors of the file system get the name of *path*: a failed write() has none, a temporary file another."""
     try:
         yield
     except OSError as error:
@@ -60,15 +50,6 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
     """A stream whose content takes the place of a file when the block ends well; otherwise the file stays as it was.
 
     A symbolic link is followed, but not round in a circle; a device or pipe is written to directly.
-
-    Args:
-        path: of the file.
-
-    Yields:
-        The stream to write to.
-
-    Raises:
-        OSError: the file cannot be written, for example a full disk or a missing folder.
     """
     target = _target_of(path)
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
@@ -102,29 +83,12 @@ def _target_of(path: str | Path) -> Path:
 
 
 def is_temporary(path: str | Path) -> bool:
-    """Whether a file has the name of one that was being written and never took its place: its process was killed.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        True for such a name.
-    """
+    """Whether a file has the name of one that was being written and never took its place: its process was killed."""
     return _TEMPORARY.fullmatch(Path(path).name) is not None
 
 
 def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
-    """Write a UTF-8 file so that it is either complete or as it was before; line ends as they are.
-
-    Args:
-        path: the file; a symbolic link is followed; a device or pipe is written to directly.
-        text: its content.
-        overwrite: False: an existing file is an error, even if it appears at the last moment.
-
-    Raises:
-        FileExistsError: the file exists and *overwrite* is False.
-        OSError: with the name of *path* and the reason, for example a full disk or a missing folder.
-    """
+    """Write a UTF-8 file so that it is either complete or as it was before; line ends as they are."""
     write_bytes(path, _encoded(text), overwrite=overwrite)
 
 
@@ -134,15 +98,7 @@ def _encoded(text: str) -> bytes:
 
 
 def write_lines(path: str | Path, lines: Iterable[str]) -> None:
-    """As `write_text`, line by line, without holding all of them; ``-`` is standard output.
-
-    Args:
-        path: of the file, or ``-``.
-        lines: with their line ends.
-
-    Raises:
-        OSError: with the name of *path* and the reason.
-    """
+    """As `write_text`, line by line, without holding all of them; ``-`` is standard output."""
     if path == "-":
         sys.stdout.writelines(lines)
         return
@@ -152,17 +108,7 @@ def write_lines(path: str | Path, lines: Iterable[str]) -> None:
 
 
 def write_bytes(path: str | Path, data: bytes | memoryview, *, overwrite: bool = True) -> None:
-    """As :func:`write_text`, for bytes.
-
-    Args:
-        path: of the file.
-        data: its content.
-        overwrite: False: an existing file is an error.
-
-    Raises:
-        FileExistsError: the file exists and *overwrite* is False.
-        OSError: with the name of *path* and the reason.
-    """
+    """As :func:`write_text`, for bytes."""
     with named_errors(path):
         if overwrite:
             with replaced_file(path) as stream:

@@ -54,17 +54,7 @@ Fault = Callable[[str], Exception]
 
 
 def open_file(path: str | Path) -> BinaryIO:
-    """Open a regular file to read it; a pipe or device is refused at once, without waiting for it.
-
-    Args:
-        path: of the file; a symbolic link is followed.
-
-    Returns:
-        The open file.
-
-    Raises:
-        OSError: it cannot be read, or is no regular file; names it.
-    """
+    """Open a regular file to read it; a pipe or device is refused at once, without waiting for it."""
     wanted = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_NONBLOCK", 0)
     try:
         mode = os.stat(path).st_mode  # before it is opened: that alone can wind a tape back
@@ -83,18 +73,7 @@ def open_file(path: str | Path) -> BinaryIO:
 
 
 def read_file(path: str | Path, most: int = _MAX_BYTES) -> bytes:
-    """The bytes of a regular file.
-
-    Args:
-        path: of the file.
-        most: bytes that it may have.
-
-    Returns:
-        Its content.
-
-    Raises:
-        OSError: it cannot be read, is no regular file, or is longer.
-    """
+    """The bytes of a regular file."""
     with open_file(path) as file:
         try:
             data = file.read(most + 1)
@@ -115,15 +94,7 @@ class DataFile:
     """
 
     def __init__(self, path: str | Path, fault: Fault = RecordError) -> None:
-        """Open it.
-
-        Args:
-            path: of the file.
-            fault: makes the error of a message.
-
-        Raises:
-            OSError: it cannot be read, or is no regular file.
-        """
+        """Open it."""
         self.path, self._fault = Path(path), fault
         self._file = open_file(path)
         self.size = os.fstat(self._file.fileno()).st_size
@@ -141,15 +112,7 @@ class DataFile:
         self._file.close()
 
     def pieces(self) -> Iterator[bytes]:
-        """Its content in pieces, unpacked by gzip where it is packed so.
-
-        Returns:
-            The pieces, in order.
-
-        Raises:
-            RecordError: (or as `fault` makes it) damaged, or unpacks to too much.
-            OSError: it cannot be read.
-        """
+        """Its content in pieces, unpacked by gzip where it is packed so."""
         if self.kind != "gzip":
             while piece := self._file.read(_PIECE_BYTES):
                 yield piece
@@ -158,31 +121,13 @@ class DataFile:
             yield from self._checked(cast(BinaryIO, packed))
 
     def read(self) -> bytes:
-        """Its whole content, unpacked; see `pieces`.
-
-        Returns:
-            The bytes.
-
-        Raises:
-            RecordError: (or as `fault` makes it) damaged, too long, or unpacks to too much.
-            OSError: it cannot be read.
-        """
+        """Its whole content, unpacked; see `pieces`."""
         if self.kind != "gzip" and self.size > _MAX_BYTES:
             raise self._fault(f"{self.path}: {self.size} bytes: at most {_MAX_BYTES} are read at once")
         return b"".join(self.pieces())
 
     def members(self, suffix: str) -> Iterator[tuple[str, bytes]]:
-        """Files in a zip archive.
-
-        Args:
-            suffix: of their names, in lower case.
-
-        Returns:
-            Name and content of each.
-
-        Raises:
-            RecordError: (or as `fault` makes it) damaged, locked, or unpacks to too much.
-        """
+        """Files in a zip archive."""
         try:
             with zipfile.ZipFile(self._file) as archive:
                 for each in archive.infolist():
@@ -213,21 +158,7 @@ class DataFile:
             yield piece
 
     def json(self, where: str, data: bytes, constant: Callable[[str], Any] | None = None) -> Any:
-        """The value of a JSON text of this file, within the limits.
-
-        Args:
-            where: names it in messages.
-            data: the text, UTF-8.
-            constant: takes NaN and Infinity; None: they are numbers.
-
-        Returns:
-            The value.
-
-        Raises:
-            RecordError: (or as `fault` makes it) nested too deeply, too long a text, too large a number or too many
-                values.
-            UnicodeDecodeError, json.JSONDecodeError: no UTF-8, no JSON.
-        """
+        """The value of a JSON text of this file, within the limits."""
         self._memory += len(data) * (3 if data.isascii() else 6)
         self._memory += sum(count * data.count(mark) for mark, count in _MEMORY.items())
         most = max(_MAX_GROWTH * self.size, _ANY_GROWTH_BYTES)
@@ -262,17 +193,7 @@ def _integer(digits: str, fault: Fault) -> int:
 
 
 def toml_tables(text: str) -> dict[str, Any]:
-    """The tables of a TOML text, within the limits.
-
-    Args:
-        text: of the file.
-
-    Returns:
-        The tables.
-
-    Raises:
-        ValueError: no TOML, nested too deeply, or too long a text or number.
-    """
+    """The tables of a TOML text, within the limits."""
     if len(text) > MAX_SETTINGS_BYTES:
         raise ValueError(f"more than {MAX_SETTINGS_BYTES} characters: no more is read of a TOML file")
     if found := _LONG_KEY.search(text):

@@ -29,14 +29,7 @@ _CYCLE_MS = (0.05, 50.0)
 
 
 def is_edge_json(head: bytes) -> bool:
-    """Whether a file may be such a capture, by its first bytes.
-
-    Args:
-        head: its first bytes, some 200 of them.
-
-    Returns:
-        Whether it begins as JSON with a Header or a Payload, or is packed by gzip or zip.
-    """
+    """Whether a file may be such a capture, by its first bytes."""
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     return head[:2] == b"\x1f\x8b" or head[:4] == b"PK\x03\x04" or (text[:1] == b"{" and text[1:].lstrip()[:1] == b'"')
 

@@ -60,32 +60,12 @@ except Exception as error:  # SciPy raises what its parts do
 
 
 def is_mat(path: Path, head: bytes) -> bool:
-    """Whether it is a MATLAB file.
-
-    Args:
-        path: of the file.
-        head: its first bytes.
-
-    Returns:
-        True by its first bytes, or by its name.
-    """
+    """Whether it is a MATLAB file."""
     return head[:6] == b"MATLAB" or path.suffix.lower() == ".mat"
 
 
 def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read a frequency response from a MATLAB file: a vector of frequencies, a complex one of the response.
-
-    Args:
-        path: of the file.
-        options: what the file does not say; `response_columns` names the variable, ``H`` or ``H:2`` for its 2nd column.
-
-    Returns:
-        One frequency response.
-
-    Raises:
-        RecordError: what was found and what is needed.
-        OSError: the file cannot be read.
-    """
+    """Read a frequency response from a MATLAB file: a vector of frequencies, a complex one of the response."""
     held = _variables(path)
     listed = ", ".join(f"{name} {_shape(value)}" for name, value in held.items()) or "nothing"
     name = next((each for each in held if each.lower() in (*_FREQUENCIES, *_ANGULAR)), None)

@@ -36,20 +36,7 @@ _Observation = tuple[int, int, float, bytes, Item, bytes]  # sequence, line, tim
 
 
 def mtconnect_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
-    """The values of the items that are used.
-
-    Args:
-        path: of the file: documents one behind the other, also with the headers of a multipart answer between them.
-        table: what the items are.
-        notes: takes what is left out.
-
-    Returns:
-        Events; within a document in the order of their sequence numbers, since it is sorted by component there.
-
-    Raises:
-        RecordError: no XML, cut off, or no streams.
-        OSError: the file cannot be read.
-    """
+    """The values of the items that are used."""
     reader = _Documents(path, table, notes)
     notes.feed_unit = _FEED_UNIT  # of PathFeedrate by the standard, whatever the control counts in
     for piece in chunks(path):

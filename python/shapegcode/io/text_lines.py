@@ -16,18 +16,7 @@ _HEAD_BYTES = 65_536
 
 
 def chunks(path: Path) -> Iterator[bytes]:
-    """Pieces of a file as UTF-8, without a byte order mark.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        The pieces, in order.
-
-    Raises:
-        RecordError: a packed file is cut off or damaged, or unpacks to too much.
-        OSError: the file cannot be read.
-    """
+    """Pieces of a file as UTF-8, without a byte order mark."""
     decoder: codecs.IncrementalDecoder | None = None
     first = True
     with DataFile(path) as file:
@@ -44,18 +33,7 @@ def chunks(path: Path) -> Iterator[bytes]:
 
 
 def line_chunks(path: Path) -> Iterator[list[bytes]]:
-    """The lines of a file, many at a time, without their ends.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        Lists of lines, in order; the last line too where it has no end.
-
-    Raises:
-        RecordError: a packed file is cut off or damaged, or unpacks to too much.
-        OSError: the file cannot be read.
-    """
+    """The lines of a file, many at a time, without their ends."""
     rest = b""
     for piece in chunks(path):
         lines = (rest + piece).split(b"\n")
@@ -68,18 +46,7 @@ def line_chunks(path: Path) -> Iterator[list[bytes]]:
 
 
 def head_of(path: Path) -> bytes:
-    """The beginning of a file.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        Its first 64 kB, unpacked.
-
-    Raises:
-        RecordError: the file is empty or binary.
-        OSError: the file cannot be read.
-    """
+    """The beginning of a file."""
     head = next(chunks(path), b"")[:_HEAD_BYTES]
     if not head.strip():
         raise RecordError(f"{path}: the file is empty; needed is the log of a run")

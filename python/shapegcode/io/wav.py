@@ -51,17 +51,6 @@ def read_wav(path: Path, options: ReadOptions) -> list[Record]:
 
     Float samples are in N and m/s² (or times the scales); integers are shares of full scale, which mean N and m/s² by
     the scales only.
-
-    Args:
-        path: of the file.
-        options: scales, and which channel is the force.
-
-    Returns:
-        One record.
-
-    Raises:
-        RecordError: what was found and what is needed.
-        OSError: the file cannot be read.
     """
     rate, data, shares = _channels(path)
     count, channels = data.shape

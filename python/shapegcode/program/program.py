@@ -368,28 +368,13 @@ def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
     """How far the end of a region lies from the nearest position that its words can name.
 
     A program that changes between G20 and G21, or that has more digits than the control resolves, may end elsewhere.
-
-    Args:
-        region: of a program.
-        increment_mm: least increment of its words.
-
-    Returns:
-        Of X, Y and Z, mm; 0 where only the rounding of floating-point numbers is left.
     """
     off = [abs(each / increment_mm - round(each / increment_mm)) for each in map(float, region.path.end_mm)]
     return [each * increment_mm if each > _ON_INCREMENT else 0.0 for each in off]
 
 
 def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
-    """Which axes rest through a whole region where none of its words leads: nothing may be written of them.
-
-    Args:
-        region: of a program.
-        increment_mm: least increment of its words.
-
-    Returns:
-        Of X, Y and Z.
-    """
+    """Which axes rest through a whole region where none of its words leads: nothing may be written of them."""
     off_mm = end_off_grid_mm(region, increment_mm)
     return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 
@@ -413,12 +398,7 @@ def _absolute_centre_hint(text: bytes, options: _core.ReaderOptions) -> str:
 
 
 def given_program(program: Program | str | Path, machine: Machine) -> Program:
-    """A program as it is, or read from its file as the controller of `machine` would.
-
-    Raises:
-        ArgumentError: it was read with other settings than the machine has.
-        ProgramError, OSError: see :meth:`Program.read`.
-    """
+    """A program as it is, or read from its file as the controller of `machine` would."""
     if not isinstance(program, Program):
         return Program.read(program, machine)
     program.require_machine(machine)

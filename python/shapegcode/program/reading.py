@@ -63,14 +63,7 @@ class Reading:
     called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
     def options(self, folders: Sequence[Path]) -> _core.ReaderOptions:
-        """Settings with which the core reads a text so.
-
-        Args:
-            folders: where called programs are looked for, before `input.program_folders`.
-
-        Returns:
-            The options of the core.
-        """
+        """Settings with which the core reads a text so."""
         options = reader_options(
             self.machine,
             emitted=self.emitted,
@@ -87,14 +80,7 @@ class Reading:
         return options
 
     def differences(self, machine: Machine) -> list[str]:
-        """Settings with which another machine would read the text otherwise.
-
-        Args:
-            machine: the other one.
-
-        Returns:
-            Each with both values; none where both machines read alike.
-        """
+        """Settings with which another machine would read the text otherwise."""
         if machine is self.machine:
             return []
         unused = {"input.arc_centre"} if self.emitted else set()
@@ -143,18 +129,7 @@ def reader_options(
     expand_compensation: bool = True,
     collect_alarms: bool = False,
 ) -> _core.ReaderOptions:
-    """Settings with which the core reads a program of this machine.
-
-    Args:
-        machine: whose controller reads the text.
-        emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
-        probe_lines: ascending line numbers behind which the modal state is kept.
-        expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
-        collect_alarms: go on behind an alarm.
-
-    Returns:
-        The options of the core.
-    """
+    """Settings with which the core reads a program of this machine."""
     options = _core.ReaderOptions()
     options.calculator_decimal_point = machine.controller.calculator_decimal_point
     options.absolute_arc_centres = machine.input.arc_centre == "absolute" and not emitted
@@ -242,19 +217,7 @@ PROGRAM_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".
 
 
 def program_bytes(path: str | Path, most: int) -> bytes:
-    """Content of a program file.
-
-    Args:
-        path: the file.
-        most: bytes that are of use to the caller.
-
-    Returns:
-        Its bytes, no more than one beyond `most`: of a file without an end neither.
-
-    Raises:
-        ProgramError: the memory would not hold what is read of it.
-        OSError: the file cannot be read; it names the file, which a failed read() alone does not.
-    """
+    """Content of a program file."""
     try:
         with open_file(path) as file:
             size = min(os.fstat(file.fileno()).st_size, most + 1)
@@ -265,15 +228,7 @@ def program_bytes(path: str | Path, most: int) -> bytes:
 
 
 def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[str, bytes] | None]:
-    """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix.
-
-    Args:
-        folders: where to look, in this order.
-        most: bytes of it that are of use, see `program_bytes`.
-
-    Returns:
-        A function of the O number: name and content of the file, None where there is none.
-    """
+    """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix."""
 
     def load(number: int) -> tuple[str, bytes] | None:
         for folder in folders:

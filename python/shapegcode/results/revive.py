@@ -88,18 +88,7 @@ class NotKept:
 
 
 def written_reports(path: str | Path) -> list[dict[str, Any]]:
-    """The JSON of the results in a file: one, or those of ``--program all``.
-
-    Args:
-        path: of the file that ``--json`` wrote.
-
-    Returns:
-        The objects.
-
-    Raises:
-        ArgumentError: it is cut off, or is no JSON of results; with line and column.
-        OSError: it cannot be read.
-    """
+    """The JSON of the results in a file: one, or those of ``--program all``."""
     try:
         with DataFile(path, ArgumentError) as file:
             found = file.json(str(path), file.read(), partial(_no_number, path))
@@ -146,17 +135,7 @@ def load_result(path: str | Path) -> Result:
 
 
 def made_of(report: Mapping[str, Any]) -> Made:
-    """Of what a result was made.
-
-    Args:
-        report: JSON of a result.
-
-    Returns:
-        What stands under `made`.
-
-    Raises:
-        ArgumentError: nothing stands there, or not what this version writes.
-    """
+    """Of what a result was made."""
     if "error" in report and "made" not in report:
         raise ArgumentError(f"the command failed for this program: {report['error']}")
     if "made" not in report:
@@ -171,18 +150,7 @@ def made_of(report: Mapping[str, Any]) -> Made:
 
 
 def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingProxyType({})) -> Result:
-    """A result from its JSON.
-
-    Args:
-        report: as ``--json`` wrote it.
-        kept: values of fields that no JSON holds, where the class has them.
-
-    Returns:
-        The result; its `from_json` is true.
-
-    Raises:
-        ArgumentError: an unknown class, a key too many or too few, or a value of another kind; names the key.
-    """
+    """A result from its JSON."""
     made = made_of(report)
     if made.result not in MODULES:
         raise ArgumentError(f"made.result = {made.result}: not a result that this version knows")

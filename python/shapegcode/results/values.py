@@ -49,15 +49,7 @@ class CoreFigures:
 
 
 def same_fields(first: Any, second: Any) -> bool:
-    """Whether two dataclasses of one class hold the same data: arrays by value, NaN like NaN; handles are no data.
-
-    Args:
-        first: a result, or a part of one.
-        second: the other one.
-
-    Returns:
-        True where nothing that is data differs; fields that are not compared count as none.
-    """
+    """Whether two dataclasses of one class hold the same data: arrays by value, NaN like NaN; handles are no data."""
     return all(_same(getattr(first, each.name), getattr(second, each.name)) for each in fields(first) if each.compare)
 
 

@@ -71,41 +71,19 @@ class LinearProgram:
         self._add(equal[0], equal[1], equal[1])
 
     def add_below(self, matrix: FloatArray, above: FloatArray) -> None:
-        """Add ``matrix @ x <= above``.
-
-        Args:
-            matrix: (k, n).
-            above: (k,).
-        """
+        """Add ``matrix @ x <= above``."""
         self._add(matrix, np.full(len(above), -math.inf), above)
 
     def set_cost(self, cost: FloatArray) -> None:
-        """Take another cost.
-
-        Args:
-            cost: (n,).
-        """
+        """Take another cost."""
         self._solver.changeColsCost(len(cost), self._columns, cost)
 
     def bound(self, column: int, lower: float, upper: float) -> None:
-        """Bound one unknown anew.
-
-        Args:
-            column: which.
-            lower: its least value.
-            upper: its largest value.
-        """
+        """Bound one unknown anew."""
         self._solver.changeColBounds(column, lower, upper)
 
     def solve(self) -> FloatArray | None:
-        """The least cost.
-
-        Returns:
-            (n,) unknowns; None: nothing meets the conditions.
-
-        Raises:
-            DesignError: the solver does not know, whichever way it is asked.
-        """
+        """The least cost."""
         pivots = _MOST_PIVOTS * (len(self._columns) + self._rows)
         for attempt, (tolerance, presolve) in enumerate(_WAYS):
             if attempt:  # from the beginning
@@ -151,13 +129,6 @@ def non_negative_least_squares(matrix: FloatArray, right: FloatArray) -> FloatAr
     """The x >= 0 for which ``matrix @ x`` comes nearest to a right-hand side, to rounding.
 
     Written out here because SciPy's is behind an import that takes longer than all the designs of a conversion.
-
-    Args:
-        matrix: (m, n).
-        right: (m,).
-
-    Returns:
-        (n,) unknowns; None if the search does not end within three rounds per unknown.
 
     Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """

@@ -40,17 +40,7 @@ class DrawsJob:
     times: bool
 
     def play(self, replay: Replay) -> list[list[float]]:
-        """Play them.
-
-        Args:
-            replay: the text.
-
-        Returns:
-            What was measured, in the order of `wanted`, for each draw.
-
-        Raises:
-            MachineError: a draw that no machine file could have.
-        """
+        """Play them."""
         found = []
         for row, draw in zip(self.rows, self.draws, strict=True):
             machine = drawn_machine(replay.machine, row, f"{self.name}, draw {draw}")
@@ -60,14 +50,7 @@ class DrawsJob:
         return found
 
     def parts(self, motion_s: float) -> Iterator[DrawsJob]:
-        """The same in tasks.
-
-        Args:
-            motion_s: how long the program takes.
-
-        Yields:
-            Some draws each.
-        """
+        """The same in tasks."""
         size = max(1, min(_AT_ONCE, int(_PLAYED_S / max(motion_s, 1e-3))))
         for at in range(0, len(self.rows), size):
             rows, draws = self.rows[at : at + size], self.draws[at : at + size]
@@ -77,20 +60,7 @@ class DrawsJob:
 def play_all(
     replay: Replay, job: DrawsJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
 ) -> list[list[float]]:
-    """Play the draws of one text.
-
-    Args:
-        replay: the text.
-        job: the draws.
-        pool: of a cluster, to which the text goes as bytes; None: threads of this process.
-        on_done: called with how many more are done.
-
-    Returns:
-        What was measured, in the order of the draws.
-
-    Raises:
-        MachineError: a draw that no machine file could have.
-    """
+    """Play the draws of one text."""
     parts = list(job.parts(replay.time_s))
     found: list[list[float]] = []
     if pool is not None:

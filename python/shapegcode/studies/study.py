@@ -93,16 +93,7 @@ def study(
 
 
 def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> None:
-    """Make the machines with the lowest and the highest value of each key, before anything is converted.
-
-    Args:
-        machine: as its file has it.
-        varied: what is varied.
-        columns: its values.
-
-    Raises:
-        MachineError: a value that a machine file could not have; it has the key, the value and the limit.
-    """
+    """Make the machines with the lowest and the highest value of each key, before anything is converted."""
     for each, column in zip(varied, columns, strict=True):
         if isinstance(each.distribution, Listed):
             ends = {toml(value): index for index, value in enumerate(column)}.values()
