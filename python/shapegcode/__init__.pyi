@@ -104,8 +104,10 @@ from shapegcode.conversion.budget import Budget as Budget
 from shapegcode.conversion.convert import convert as convert
 from shapegcode.conversion.plots import plot_tolerance as plot_tolerance
 from shapegcode.conversion.result import Conversion as Conversion
-from shapegcode.conversion.scheduled import convert_scheduled as convert_scheduled
-from shapegcode.conversion.scheduled_result import ScheduledConversion as ScheduledConversion
+from shapegcode.conversion.scheduled import (
+    ScheduledConversion as ScheduledConversion,
+    convert_scheduled as convert_scheduled,
+)
 from shapegcode.cutting.stock import Stock as Stock
 from shapegcode.cutting.tool import Tool as Tool
 from shapegcode.demos.path import path_demo as path_demo

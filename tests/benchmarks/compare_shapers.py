@@ -27,7 +27,7 @@ from shapegcode.conversion import convert as converter
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping import design, machine_bands
 from shapegcode.shaping.grid import Grid, choose_grid, make_grid
-from shapegcode.verdict.placed import Placed
+from shapegcode.verdict.figures import Placed
 
 _ROOT = Path(__file__).resolve().parents[2]
 _GOLDEN = _ROOT / "tests" / "golden" / "programs"

@@ -14,7 +14,7 @@ from command import run
 from judge import Move, interpret
 from judge.plant import response
 from judge.player import durations, play
-from shapegcode.conversion.restart_points import RestartPoint
+from shapegcode.conversion.restart import RestartPoint
 
 HEAD = "G21 G90 G17 G54\nT3 M06\nS5000 M03\nG43 H3 Z50.\nG00 X0 Y0\nZ2.\n"
 

@@ -20,8 +20,6 @@ from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
 from shapegcode.program import Program
 
-__all__ = ["BlockTable", "Breaker", "ClampedFeed", "CuttingRun", "block_table", "look_ahead_breakers"]
-
 _CUTTING, _RAPID, _DWELL = (
     kind.value for kind in (_core.BlockKind.cutting, _core.BlockKind.rapid, _core.BlockKind.dwell)
 )

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from shapegcode._core import ArgumentError
 from shapegcode.io.units import find_unit
 
-__all__ = ["KINDS", "Allowed"]
-
 KINDS = {
     "cuts": "cuts that one program has and the other has not, or that are not the same length",
     "rapids": "rapids, and moves to a reference point or in machine coordinates",

@@ -19,8 +19,6 @@ from shapegcode.program import Program
 from shapegcode.program.compensation import guard_lines
 from shapegcode.program.reading import is_program_text, program_bytes, reader_options
 
-__all__ = ["compare"]
-
 _COMPENSATED = re.compile(rb"G4[12](?!\d)", re.IGNORECASE)
 
 

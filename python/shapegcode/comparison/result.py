@@ -11,8 +11,6 @@ from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-__all__ = ["Comparison", "KindCount", "ProgramDifference"]
-
 _NOUNS = {"tools": "tool calls", "functions": "other functions", "cycles": "drilling blocks", "modal": "modal states"}
 _ALWAYS = ("rapids", "tools", "offsets")
 _SHOWN = 20

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.region_text import EmittedRegion
+from shapegcode.machine import Machine
+from shapegcode.program import Program, least_increment_mm
 from shapegcode.results.result import Xyz
 from shapegcode.shaping.grid import Grid
-
-__all__ = ["Budget", "BudgetOutcome", "GivenUp", "TextNeeds", "TransferLoad", "measure_load"]
+from shapegcode.verdict.figures import RegionVerdict
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -163,4 +166,216 @@ def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_p
         shaped.text.size - (region.text_end - region.text_begin),
         characters * bits_per_character,
         _core.busiest_per_s(durations, None, stretch),
+    )
+
+
+# A stretch of a longer period may hold fewer blocks than one of a shorter period, but hardly less than this share.
+_LEAST_FILLED = 0.5
+_LINES_NAMED = 5  # lines of regions in the one sentence
+
+
+def keepable(region: _core.Region, machine: Machine) -> bool:
+    """Whether a region's text can stand in an emitted program: absolute arc centres cannot."""
+    return machine.input.arc_centre != "absolute" or region.path.largest_sweep_rad <= 0.0
+
+
+def _residual_unit_um(region: _core.Region, machine: Machine) -> float:
+    """What residual vibration is measured by: the tolerance that does not depend on the original, µm."""
+    tolerance = machine.tolerance
+    increment_um = least_increment_mm(machine, region.exit.units) * 1e3
+    return max(tolerance.residual_floor_um, tolerance.residual_floor_increments * increment_um) or 1.0
+
+
+class WrittenText(Protocol):
+    """A text and the loads of its shaped regions, per index."""
+
+    @property
+    def size(self) -> int:
+        """Bytes of the whole text."""
+
+    @property
+    def loads(self) -> Mapping[int, TransferLoad]:
+        """In the order of the regions."""
+
+
+class Spending:
+    """The choice under a budget, and the record of what was given up.
+
+    Args:
+        budget: the limits.
+        program: what is converted.
+        machine: controller and tolerances.
+    """
+
+    def __init__(self, budget: Budget, program: Program, machine: Machine) -> None:
+        self.budget = budget
+        self.given_up: dict[int, GivenUp] = {}
+        """Regions that keep their text, per index."""
+        self._program = program
+        self._tick_s = machine.controller.interpolation_period_s
+        self._most_ticks = math.floor(machine.shaping.max_duration_s / self._tick_s + _ROUNDING)
+        self._fixed_period = machine.emission.block_period_s is not None
+        self._keepable = [keepable(region, machine) for region in program.regions]
+        self._unit_um = [_residual_unit_um(region, machine) for region in program.regions]
+        self._longer = False  # the block period is longer than it would be without the budget
+        self._before: TextNeeds | None = None
+
+    def choose_period(
+        self,
+        grid: Grid,
+        residuals_mm: Sequence[float],
+        design: Callable[[float], Grid],
+        write: Callable[[Grid], WrittenText],
+    ) -> Grid:
+        """The block period on which the most that is worth shaping is not too fast; of equals the shortest shaper."""
+        weights = [residual * 1e3 / unit for unit, residual in zip(self._unit_um, residuals_mm, strict=True)]
+        written = write(grid)
+        loads = written.loads
+        if self._fixed_period or not self._factors(loads):
+            return grid
+        ticks = measured = round(grid.block_period_s / self._tick_s)
+        best, best_loads = grid, loads
+        while self._factors(best_loads) or ticks * self._tick_s < best.shaper.duration_s:
+            # A shaper lasts a period at least: where nothing is too fast any more, a shorter one is still looked for.
+            factors = self._factors(loads)
+            ticks = max(ticks + 1, math.floor(measured * min(factors, default=1.0) * _LEAST_FILLED))
+            if ticks > self._most_ticks:
+                break
+            try:
+                longer = design(ticks * self._tick_s)
+                if not self._factors(best_loads) and longer.shaper.duration_s >= best.shaper.duration_s:
+                    continue
+                loads = write(longer).loads
+            except (_core.DesignError, _core.ProgramError):  # no shaper on this grid, or no region on it
+                continue
+            measured = ticks
+            if self._worth(longer, loads, weights) > self._worth(best, best_loads, weights):
+                best, best_loads = longer, loads
+        self._longer = best is not grid
+        if self._longer:  # else noted from the text as it is judged
+            self._before = _needs(grid, written)
+        return best
+
+    def give_up(self, grid: Grid, written: WrittenText, verdicts: Sequence[RegionVerdict]) -> bool:
+        """Choose regions that must keep their text; False if the text fits."""
+        self._before = self._before or _needs(grid, written)
+        loads = written.loads
+        played = dict(zip(loads, verdicts, strict=True))
+        chosen = {index: reason for index, load in loads.items() if (reason := self.budget.too_fast(load))}
+        for index, reason in chosen.items():
+            if not self._keepable[index]:
+                raise self._impossible(index, reason)
+        if self._longer:
+            at = f"at a block period of {grid.block_period_s * 1e3:g} ms"
+            missed = (index for index in loads if played[index].misses and self._keepable[index])
+            chosen = {index: f"{played[index].misses[0]}, {at}" for index in missed} | chosen
+        size = written.size - sum(loads[index].extra_bytes for index in chosen)
+        chosen |= self._too_large(size, {k: load for k, load in loads.items() if k not in chosen}, played)
+        for index, reason in chosen.items():
+            region = played[index]
+            self.given_up[index] = GivenUp(
+                region.lines, reason, region.residual_vibration_um.original, loads[index].extra_bytes
+            )
+        return bool(chosen)
+
+    def outcome(self, grid: Grid, written: WrittenText) -> BudgetOutcome:
+        """What the budget did, once the text fits."""
+        after = _needs(grid, written)
+        given_up = tuple(self.given_up[index] for index in sorted(self.given_up))
+        return BudgetOutcome(self.budget, self._before or after, after, grid.block_period_s, given_up)
+
+    def warning(self, grid: Grid) -> str:
+        """One sentence on what was given up; empty if nothing was."""
+        said = []
+        if self._longer and self._before is not None:
+            was, now = self._before.block_period_s * 1e3, grid.block_period_s * 1e3
+            said.append(f"the block period is {now:g} ms instead of {was:g} ms")
+        if self.given_up:
+            entries = [self.given_up[index] for index in sorted(self.given_up)]
+            lines = ", ".join("{} to {}".format(*entry.lines) for entry in entries[:_LINES_NAMED])
+            lines += f" and {len(entries) - _LINES_NAMED} more" if len(entries) > _LINES_NAMED else ""
+            stays = max(max(entry.residual_um) for entry in entries)
+            said.append(
+                f"{len(entries)} of {len(self._program.regions)} cuts are left unchanged (lines {lines}) "
+                f"and up to {stays:.1f} um of residual vibration"
+            )
+        return f"{self._program.source}: given up for the budget: {'; '.join(said)}" if said else ""
+
+    def _factors(self, loads: Mapping[int, TransferLoad]) -> list[float]:
+        """How many times too fast the regions are that are."""
+        factors = (self.budget.excess(load) for load in loads.values())
+        return [factor for factor in factors if factor > 1.0 + _ROUNDING]
+
+    def _worth(self, grid: Grid, loads: Mapping[int, TransferLoad], weights: Sequence[float]) -> tuple[float, int, int]:
+        """Gain of the regions that are not too fast, how many they are, and how short the shaper is, in ticks."""
+        slow = [index for index, load in loads.items() if not self.budget.too_fast(load)]
+        return math.fsum(weights[index] for index in slow), len(slow), -round(grid.duration_s / self._tick_s)
+
+    def _too_large(
+        self, size: int, loads: Mapping[int, TransferLoad], played: Mapping[int, RegionVerdict]
+    ) -> dict[int, str]:
+        """Regions to keep so that the text fits: least gain per byte first."""
+        limit = self.budget.max_bytes
+        if limit is None or not loads or size <= limit:
+            if limit is not None and not loads and self._program.core.size > limit:
+                raise self._too_large_error(self._program.core.size)
+            return {}
+        gain = {index: self._gain(index, played[index]) for index in loads}
+        costly = [index for index, load in loads.items() if load.extra_bytes > 0 and self._keepable[index]]
+        # Where the gain is negative, more of it per byte would be less: such regions go first, the worst before all.
+        order = sorted(costly, key=lambda k: (gain[k] / (loads[k].extra_bytes if gain[k] > 0.0 else 1.0), k))
+        kept: list[int] = []
+        for index in order:
+            if size <= limit:
+                break
+            kept.append(index)
+            size -= loads[index].extra_bytes
+        if size > limit or len(kept) == len(loads):
+            # Without a shaped region there is no header comment either.
+            return self._nothing_shaped(size, loads)
+        # What was given up for the sake of a large one may fit beside the rest.
+        for index in reversed(kept.copy()):
+            if gain[index] > 0.0 and size + loads[index].extra_bytes <= limit:
+                kept.remove(index)
+                size += loads[index].extra_bytes
+        return dict.fromkeys(kept, self._memory_reason())
+
+    def _gain(self, index: int, region: RegionVerdict) -> float:
+        """Residual vibration that shaping a region removes, of its worst axis, in units of the tolerance."""
+        both = region.residual_vibration_um
+        return (max(both.original) - max(both.emitted)) / self._unit_um[index]
+
+    def _nothing_shaped(self, size: int, loads: Mapping[int, TransferLoad]) -> dict[int, str]:
+        limit = self.budget.max_bytes
+        possible = all(self._keepable[index] for index in loads)
+        if limit is None or not possible or self._program.core.size > limit:
+            if possible:
+                raise self._too_large_error(min(size, self._program.core.size))
+            raise self._too_large_error(size, "; arcs with absolute centres cannot be left unchanged")
+        return dict.fromkeys(loads, self._memory_reason())
+
+    def _memory_reason(self) -> str:
+        return f"gains least per byte, limit {self.budget.max_bytes} bytes"
+
+    def _too_large_error(self, least: int, why: str = "") -> _core.ArgumentError:
+        return _core.ArgumentError(
+            f"{self._program.source}: needs {least} bytes at least (the original has {self._program.core.size}), "
+            f"the budget is {self.budget.max_bytes} bytes (--max-bytes){why}"
+        )
+
+    def _impossible(self, index: int, reason: str) -> _core.ArgumentError:
+        region = self._program.regions[index]
+        return _core.ArgumentError(
+            f"{self._program.source}:{region.first_line}: lines {region.first_line} to {region.last_line}: {reason}; "
+            "their arcs have absolute centres and cannot be kept as they are"
+        )
+
+
+def _needs(grid: Grid, written: WrittenText) -> TextNeeds:
+    loads = written.loads.values()
+    return TextNeeds(
+        written.size,
+        max((load.baud for load in loads), default=0.0),
+        max((load.blocks_per_second for load in loads), default=0.0),
+        grid.block_period_s,
     )

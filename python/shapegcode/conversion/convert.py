@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
 from shapegcode import _core
-from shapegcode.conversion.advice import filter_advice
-from shapegcode.conversion.benefit import most_to_gain_um
+from shapegcode.comparison.allowed import Allowed
+from shapegcode.comparison.compare import compare
+from shapegcode.conversion.aims import ToleranceCurve
 from shapegcode.conversion.budget import Budget
-from shapegcode.conversion.curve import ToleranceCurve
-from shapegcode.conversion.cuts import CutOutcome, chosen_cuts, outcome_of, tools_of_cuts
 from shapegcode.conversion.operating import at_the_control
-from shapegcode.conversion.proof import prove
 from shapegcode.conversion.rapids.shape import ShapedRapids
-from shapegcode.conversion.recommendation import Situation, recommend
-from shapegcode.conversion.restart_points import restart_points
+from shapegcode.conversion.recommendation import Situation, filter_advice, most_to_gain_um, recommend
+from shapegcode.conversion.restart import restart_points
 from shapegcode.conversion.rests import RestsOn, rests_on
-from shapegcode.conversion.result import Conversion
+from shapegcode.conversion.result import ChangeProof, Conversion
 from shapegcode.conversion.run import CutChoice, Progress, Run, Settled
+from shapegcode.conversion.tables import CutOutcome, chosen_cuts, outcome_of, tools_of_cuts
 from shapegcode.conversion.warnings import open_axes, played_warnings, text_warnings
 from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
@@ -41,8 +41,6 @@ from shapegcode.verdict.figures import (
     UsedShaper,
 )
 from shapegcode.verdict.program import rapid_vibration_um
-
-__all__ = ["convert"]
 
 
 def convert(
@@ -326,3 +324,18 @@ def _used_shaper(grid: Grid) -> UsedShaper:
         grid.per_axis_duration_s,
         following,
     )
+
+
+def prove(original: Program, emitted: Program, machine: Machine, *, rapids_shaped: bool) -> ChangeProof:
+    """Compare an emitted program with its original.
+
+    What shaping changes is allowed: blocks and feeds of cuts, calls that were expanded, the path within its tolerance,
+    which the verdict judges.
+    """
+    kinds = {"feeds", "blocks", "calls"}
+    kinds |= {"shaped-rapids"} if rapids_shaped else set()
+    kinds |= {"compensation"} if original.core.expanded_radii_mm else set()
+    found = compare(original, emitted, machine, allow=Allowed(frozenset(kinds), math.inf))
+    # Without header comments nothing says that lines of emission.* are the converter's own.
+    refused = tuple(each for each in found.refused if machine.emission.header or each.kind != "emission")
+    return ChangeProof(found.answer, found.counts, found.path_um, refused)

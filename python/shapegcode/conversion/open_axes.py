@@ -12,8 +12,6 @@ from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.simulation.simulate import simulate
 
-__all__ = ["open_axes"]
-
 
 def open_axes(program: Program | str | Path, machine: Machine) -> tuple[RestsOn, ...]:
     """Axes that may have a mode or not, by how much a usual mode would swing behind the program as it is."""

@@ -13,17 +13,14 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad
-from shapegcode.conversion.restart_points import CutRestarts, RestartPoint
+from shapegcode.conversion.restart import CutRestarts, RestartPoint
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import slowest_mode
 from shapegcode.program import Program
 from shapegcode.program.operating import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK, no_room
 from shapegcode.results.table import Column, Table
-from shapegcode.verdict.figures import PlayedFigures
-from shapegcode.verdict.placed import Placed
-
-__all__ = ["ControlNote", "at_the_control", "control_table", "restart_table"]
+from shapegcode.verdict.figures import Placed, PlayedFigures
 
 _NAMED_LINES = 4
 _SHOWN_POINTS = 12

@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TypeVar
 
-from shapegcode.conversion.curve import curve_table
-from shapegcode.conversion.cuts import CutOutcome
+from shapegcode.conversion.aims import curve_table
 from shapegcode.conversion.operating import restart_table
 from shapegcode.conversion.result import Conversion
-from shapegcode.conversion.scheduled_result import ScheduledConversion
-from shapegcode.conversion.tables import before_after_table, rests_table
+from shapegcode.conversion.scheduled import ScheduledConversion
+from shapegcode.conversion.tables import CutOutcome, before_after_table, rests_table
 from shapegcode.machine import Machine
 from shapegcode.results.made import Made
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
@@ -35,8 +34,6 @@ from shapegcode.results.page.model import (
 from shapegcode.results.result import Pair
 from shapegcode.results.table import Column, Table
 from shapegcode.verdict.figures import CaseVerdict
-
-__all__ = ["light_of", "sections_of"]
 
 N = TypeVar("N", int, float)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from shapegcode.conversion.curve import ToleranceCurve
+from shapegcode.conversion.aims import ToleranceCurve
 from shapegcode.conversion.result import Conversion
 from shapegcode.results import plot
 from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
@@ -13,8 +13,6 @@ from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["plot_tolerance", "plots_of"]
 
 
 def plots_of(conversion: Conversion) -> dict[str, Plot]:

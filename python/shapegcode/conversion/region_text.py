@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.conversion.restart_points import PLACEHOLDER, CutRestarts, RestartMark
+from shapegcode.conversion.restart import PLACEHOLDER, CutRestarts, RestartMark
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-
-__all__ = ["EmittedRegion", "NoRoomError", "RegionText", "Room"]
 
 
 class RegionText:

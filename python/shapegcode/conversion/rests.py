@@ -19,10 +19,8 @@ from shapegcode.program import Program
 from shapegcode.settings.keys import KeyValue
 from shapegcode.verdict.case_player import case_figures
 from shapegcode.verdict.cases import Case, CaseFigures, Judged, RegionLimits, judge_region
+from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge, RegionFigures
-from shapegcode.verdict.placed import Placed
-
-__all__ = ["LEAST_SHARE", "RestsOn", "UnknownAxis", "begin_rests", "rests_on", "unknown_axes"]
 
 LEAST_SHARE = 0.01
 """Of a limit: a value that moves its figure by less does not matter."""

@@ -6,20 +6,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
-from shapegcode.conversion.advice import FilterAdvice
+from shapegcode.comparison.result import KindCount, ProgramDifference
+from shapegcode.conversion.aims import ToleranceCurve, curve_table
 from shapegcode.conversion.budget import BudgetOutcome
-from shapegcode.conversion.curve import ToleranceCurve, curve_table
-from shapegcode.conversion.cuts import CutOutcome, cut_table
 from shapegcode.conversion.operating import ControlNote, control_table, restart_table
-from shapegcode.conversion.proof import ChangeProof
-from shapegcode.conversion.rapids.result import RapidsOutcome
-from shapegcode.conversion.recommendation import Grade
-from shapegcode.conversion.restart_points import RestartPoint
+from shapegcode.conversion.rapids.shape import RapidsOutcome
+from shapegcode.conversion.recommendation import FilterAdvice, Grade
+from shapegcode.conversion.restart import RestartPoint
 from shapegcode.conversion.rests import RestsOn
 from shapegcode.conversion.tables import (
     BeforeAfter,
+    CutOutcome,
     before_after_table,
     change_percent,
+    cut_table,
     percent,
     rests_table,
 )
@@ -32,15 +32,29 @@ from shapegcode.results.made import Made
 from shapegcode.results.page.model import Light, Page, Section
 from shapegcode.results.result import Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table
-from shapegcode.verdict.figures import AppliedLimits, BlockCount, PlayedFigures, UsedShaper
-from shapegcode.verdict.placed import Placed
-from shapegcode.verdict.tables import case_table
-
-__all__ = ["Conversion"]
+from shapegcode.verdict.cases import case_table
+from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, PlayedFigures, UsedShaper
 
 _VIBRATIONS = {"residual_vibration_um": "residual vibration", "peak_vibration_um": "peak vibration"}
 _LEAST_SHOWN_UM = 0.05
 _DEVIATIONS = {"max": "largest", "rms": "RMS", "gouge": "gouge", "excess": "excess"}
+
+
+@dataclass(frozen=True)
+class ChangeProof:
+    """What is unchanged in an emitted program.
+
+    Attributes:
+        answer: such as "42 of 42 rapids, 7 of 7 tool calls, 31 of 31 offsets unchanged; path within 12.3 µm".
+        counts: of each kind of which one of both programs has some.
+        path_um: largest distance of the paths of a cut, seen from either; of the command, not of the table.
+        refused: differences that shaping does not explain; none: it is proven.
+    """
+
+    answer: str
+    counts: tuple[KindCount, ...]
+    path_um: float
+    refused: tuple[ProgramDifference, ...]
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)

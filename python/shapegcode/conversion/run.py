@@ -10,14 +10,11 @@ from functools import partial
 from itertools import compress
 
 from shapegcode import _core
-from shapegcode.conversion.aims import Aims
-from shapegcode.conversion.benefit import gain_um, most_to_gain_um
-from shapegcode.conversion.budget import Budget
-from shapegcode.conversion.curve import CutCurves
+from shapegcode.conversion.aims import Aims, CutCurves
+from shapegcode.conversion.budget import Budget, Spending, keepable
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids
-from shapegcode.conversion.recommendation import benefits
+from shapegcode.conversion.recommendation import benefits, gain_um, most_to_gain_um
 from shapegcode.conversion.rests import Begun, begin_rests
-from shapegcode.conversion.spending import Spending, keepable
 from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
@@ -25,13 +22,11 @@ from shapegcode.program import Program
 from shapegcode.shaping.grid import Grid, choose_grid
 from shapegcode.verdict.ahead import cores
 from shapegcode.verdict.figures import (
+    Placed,
     RegionVerdict,
 )
 from shapegcode.verdict.judge import Judge, RegionFigures
-from shapegcode.verdict.placed import Placed
 from shapegcode.verdict.program import rapid_vibration_um, simulate_unchanged, unshaped_regions
-
-__all__ = ["CutChoice", "Run", "Settled", "Shaped"]
 
 _ATTEMPTS = 10  # each for cuts that left their tolerance, ran too fast or cost too much; few need more than two
 _PRICE_ROUNDS = 6

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.convert import convert
 from shapegcode.conversion.result import Conversion
-from shapegcode.conversion.scheduled_motion import ShapedMotion
-from shapegcode.conversion.scheduled_result import ScheduledConversion
+from shapegcode.conversion.write import filter_tolerance
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.feed.figures import feed_figures
@@ -18,12 +21,82 @@ from shapegcode.feed.load import PathLoad, load_of
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, schedule_survey
 from shapegcode.feed.survey import survey
-from shapegcode.feed.travel import OrdinaryMotion, travel_emitted
+from shapegcode.feed.travel import OrdinaryMotion, Travelled, travel_emitted
 from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
-from shapegcode.shaping.grid import choose_grid
+from shapegcode.results.result import Plot
+from shapegcode.results.table import Table
+from shapegcode.shaping.grid import Grid, choose_grid
 
-__all__ = ["convert_scheduled"]
+Vector = npt.NDArray[np.float64]
+
+
+class ShapedMotion:
+    """The motion that `convert` will make of a region: look-ahead within the contour tolerance, then the shaper.
+
+    What the emitted text does is measured afterwards (`travel_emitted`); this is what a schedule is planned with.
+    """
+
+    def __init__(self, machine: Machine, grid: Grid) -> None:
+        period = machine.controller.interpolation_period_s
+        ticks = round(grid.block_period_s / period)
+        self._period_s = period
+        model = MachineModel(machine)
+        self._limits = model.limits()
+        self._tolerance = filter_tolerance(grid, model.shaped_filter, machine.tolerance.contour_um)
+        shaper = _core.Fir([ticks * delay for delay in grid.fir.delays], list(grid.fir.taps))
+        # The emitted blocks join samples of the shaped command by straight lines.
+        self._filters = [shaper, _core.Fir.moving_average(ticks), *model.shaped.filters]
+
+    @property
+    def reach_s(self) -> float:
+        """Half of what shaper and filters last."""
+        return 0.5 * self._period_s * sum(filter_.duration_samples for filter_ in self._filters)
+
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+        """See `Mover`."""
+        profile = _core.plan_speed(path, self._limits, self._tolerance)
+        return Travelled.of(
+            _core.travel_path(path, profile, along, stations_mm, self._period_s, self._filters, window_s)
+        )
+
+
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
+class ScheduledConversion(Conversion):
+    """A program with scheduled feeds, shaped; `original` is the program with these feeds, not yet shaped.
+
+    Attributes:
+        feed_schedule: the feeds; its loads of the emitted program are those of the shaped one.
+    """
+
+    feed_schedule: FeedSchedule
+
+    @property
+    def ok(self) -> bool:
+        """Whether the shaped program keeps the machine's tolerances and the tool's limits."""
+        return super().ok and self.feed_schedule.ok
+
+    @property
+    def answer(self) -> str:
+        """The verdict on the motion and that on the cut."""
+        return f"{super().answer}; {self.feed_schedule.answer}"
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if self.within_tolerance and not self.feed_schedule.ok:
+            return f"do not run it: {self.feed_schedule.next_step}"
+        return super().next_step
+
+    def tables(self) -> list[Table]:
+        """Those of the schedule, then those of the conversion."""
+        return [*self.feed_schedule.tables(), *super().tables()]
+
+    def plots(self) -> Mapping[str, Plot]:
+        """Those of the conversion and those of the schedule."""
+        return {**super().plots(), **self.feed_schedule.plots()}
+
 
 _ROUNDS = 4
 _MORE_MARGIN = 0.005  # beyond what the last round was off by

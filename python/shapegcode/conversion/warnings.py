@@ -12,10 +12,7 @@ from shapegcode.machine.controller import Controller
 from shapegcode.machine.output import Tolerance
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.program.operating import no_room
-from shapegcode.verdict.figures import PlayedFigures
-from shapegcode.verdict.placed import Placed
-
-__all__ = ["open_axes", "played_warnings", "text_warnings"]
+from shapegcode.verdict.figures import Placed, PlayedFigures
 
 # How much worse than the original's a figure must be to be worth a warning: ratio, and size in um.
 _WORSE_RATIO, _WORSE_UM = 1.2, 5.0

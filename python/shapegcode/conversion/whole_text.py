@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from shapegcode import _core
-from shapegcode.conversion.budget import TransferLoad, measure_load
-from shapegcode.conversion.readback import read_back
+from shapegcode.conversion.budget import TransferLoad, keepable, measure_load
 from shapegcode.conversion.region_text import EmittedRegion, NoRoomError, RegionText, Room
-from shapegcode.conversion.restart_points import CutRestarts, FreeNumbers
-from shapegcode.conversion.spending import keepable
+from shapegcode.conversion.restart import CutRestarts, FreeNumbers
 from shapegcode.conversion.write import RegionWriter
+from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.shaped_program import stamp_of_machine
@@ -20,9 +22,7 @@ from shapegcode.program import Program, end_off_grid_mm, least_increment_mm
 from shapegcode.program.compensation import guard_lines, header_lines
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.ahead import Ahead, OnShare, cores
-from shapegcode.verdict.placed import Placed
-
-__all__ = ["TextWriter", "Written", "why_kept", "why_off_grid"]
+from shapegcode.verdict.figures import Placed
 
 _MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
 
@@ -309,3 +309,67 @@ def _lines(parts: Sequence[bytes]) -> int:
 def _aims(reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> dict[int, Aim]:
     """For what each region that does not keep its text is shaped."""
     return {index: (room_um[index], feed_share[index]) for index, why in enumerate(reasons) if not why}
+
+
+_LARGEST_SWEEP_RAD = math.pi / 2
+
+
+_STATE_FIELDS = (
+    "motion", "plane", "distance", "feed_mode", "units", "compensation", "length_offset",
+    "cycle", "cycle_return", "coordinate_system", "exact_stop", "feed",
+)  # fmt: skip
+
+
+def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) -> Program:
+    """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps."""
+    # Half an increment: a program may carry more digits than the controller resolves.
+    tolerance_mm = {units: 0.5 * least_increment_mm(machine, units) + 1e-9 for units in (20, 21)}
+    probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]
+    emitted = Program.from_parts(parts, machine, source="emitted program", probe_lines=probes)
+    states = emitted.core.probed
+    for index, place in enumerate(placed):
+        region = place.region
+        _compare_states(states[2 * index], region.entry, place.first_line - 1, region.incremental, tolerance_mm)
+        _compare_states(states[2 * index + 1], region.exit, place.last_line, region.incremental, tolerance_mm)
+        blocks = place.blocks(emitted)
+        _compare_ends(blocks, place, tolerance_mm)
+        if blocks.largest_sweep_rad >= _LARGEST_SWEEP_RAD:
+            raise RoundTripError(
+                f"emitted arc between lines {place.first_line} and {place.last_line} sweeps "
+                f"{math.degrees(blocks.largest_sweep_rad):.1f} degrees (limit 90)"
+            )
+    return emitted
+
+
+def _compare_states(
+    emitted: _core.ModalState,
+    original: _core.ModalState,
+    line: int,
+    incremental: bool,
+    tolerance_mm: Mapping[int, float],
+) -> None:
+    for field in _STATE_FIELDS:
+        was, now = getattr(original, field), getattr(emitted, field)
+        if was != now and not (field == "feed" and original.feed_mode == 93):
+            raise RoundTripError(f"emitted line {line}: modal {field} is {now}, the original has {was}")
+    if original.known != emitted.known:
+        raise RoundTripError(f"emitted line {line}: known axes {emitted.known}, the original has {original.known}")
+    if incremental:
+        return
+    limit = tolerance_mm[original.units]
+    for axis, known, was, now in zip("XYZ", original.known, original.position_mm, emitted.position_mm, strict=True):
+        if known and abs(was - now) > limit:
+            raise RoundTripError(f"emitted line {line}: {axis} is at {now:.6f} mm, the original at {was:.6f} mm")
+
+
+def _compare_ends(blocks: _core.Path, place: Placed, tolerance_mm: Mapping[int, float]) -> None:
+    path = place.region.path
+    travel = path.end_mm - path.start_mm
+    gap = float(np.abs((blocks.end_mm - blocks.start_mm) - travel).max())
+    # Start and end are rounded to the increment, each once.
+    limit = 2.0 * tolerance_mm[place.region.exit.units]
+    if gap > limit:
+        raise RoundTripError(
+            f"shaped blocks of lines {place.region.first_line} to {place.region.last_line} end {gap * 1e3:.2f} um off "
+            f"(limit {limit * 1e3:.2f} um)"
+        )

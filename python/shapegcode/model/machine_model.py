@@ -28,8 +28,6 @@ from shapegcode.model.modes import (
     slowest_mode,
 )
 
-__all__ = ["PLANTS", "MachineModel", "OwnFilter", "PlayingController"]
-
 PLANTS = ("modal", "feed-drive")
 """The plants that there are: modes behind an ideal servo, or motor, ball screw and table with their servo loops."""
 

@@ -13,21 +13,6 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.machine import AxisMode, Machine
 
-__all__ = [
-    "NO_OFFSET",
-    "Offset",
-    "axis_modes",
-    "damping_scale",
-    "machine_warnings",
-    "mode_tables",
-    "moving_axis",
-    "numbered_modes",
-    "region_offset",
-    "region_range_warnings",
-    "slowest_mode",
-    "still_mode",
-]
-
 Offset = tuple[float | None, float | None, float | None]
 """Machine position minus program position of X, Y, Z in mm; None where it is not known."""
 

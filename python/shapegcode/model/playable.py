@@ -10,8 +10,6 @@ from shapegcode.model.scene import scene_of
 from shapegcode.program import Program
 from shapegcode.results.page.scene import Scene
 
-__all__ = ["PlayedPrograms"]
-
 
 @dataclass(frozen=True, eq=False)
 class PlayedPrograms:

@@ -11,8 +11,6 @@ from shapegcode import _core
 from shapegcode.machine import AxisMode, Machine
 from shapegcode.model.modes import axis_modes, still_mode
 
-__all__ = ["plant_response"]
-
 _WANTED = (
     "must be a machine or a list of modes for each axis of the command, such as [machine.axes.x.modes, "
     "machine.axes.y.modes] or [[Mode(46.0, 0.02)], []]"

@@ -23,8 +23,6 @@ from shapegcode.results.page.scene import ModeLine, Scene, SceneSpectrum, Varian
 from shapegcode.results.page.spectrum import AccelerationSpectrum
 from shapegcode.results.page.thinning import PIXELS_HIGH, PIXELS_WIDE, Kept, Thinner
 
-__all__ = ["MOST_POINTS", "scene_of"]
-
 MOST_POINTS = 60_000
 """Samples of a program that a page shows, at most."""
 

@@ -7,8 +7,6 @@ from shapegcode.model.modes import axis_modes
 from shapegcode.program import Program
 from shapegcode.program.stamp import Stamp, text_mark
 
-__all__ = ["shaped_note", "shaped_warnings", "stamp_of_machine"]
-
 _WHOLE = 1e-6
 
 

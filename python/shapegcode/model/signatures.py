@@ -11,8 +11,6 @@ from typing import Any, TypeVar
 
 from shapegcode import _core
 
-__all__ = ["with_signature"]
-
 T = TypeVar("T")
 
 # What the core calls a number, and what a reader does.

@@ -19,8 +19,6 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset
 from shapegcode.program import Program, given_program
 
-__all__ = ["KINDS", "Chunk", "stream"]
-
 KINDS = tuple(kind.name for kind in sorted(_core.BlockKind.__members__.values(), key=lambda kind: kind.value))
 """Names of what `Chunk.kind` numbers."""
 

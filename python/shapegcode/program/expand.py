@@ -11,8 +11,6 @@ from shapegcode.program.compensation import refuse_zero_radius
 from shapegcode.program.program import Program
 from shapegcode.program.result import Expansion
 
-__all__ = ["expand"]
-
 
 def expand(
     program: Program | str | Path,

@@ -7,8 +7,6 @@ from pathlib import Path
 
 from shapegcode._core import ProgramError
 
-__all__ = ["available_bytes", "require_memory", "require_memory_for_lines"]
-
 _CGROUP = Path("/sys/fs/cgroup")
 _PER_LINE = 130
 """Bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)."""

@@ -7,18 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = [
-    "FEED_HOLD",
-    "FIRST_RUN",
-    "OVERRIDE",
-    "OVERRIDES",
-    "OVERRIDE_LOCKED",
-    "RESTART",
-    "SINGLE_BLOCK",
-    "Habit",
-    "no_room",
-]
-
 
 @dataclass(frozen=True)
 class Habit:

@@ -11,8 +11,6 @@ from shapegcode import _core
 from shapegcode.program.compensation import RADIUS_NOT_KNOWN
 from shapegcode.program.program import Program
 
-__all__ = ["paired_regions"]
-
 _SAME_PLACE_MM = 0.005
 
 

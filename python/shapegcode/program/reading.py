@@ -20,8 +20,6 @@ from shapegcode.settings.keys import toml
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["PROGRAM_SUFFIXES", "Reading", "is_program_text", "program_bytes", "program_loader", "reader_options"]
-
 _NO_LIMIT = 2**63
 _ANY_PROGRAM = (0, 99_999_999)
 _SHOWN_CHARACTERS = 60  # of a value in a message: a table of tools may be long

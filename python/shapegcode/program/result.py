@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Result
 
-__all__ = ["Expansion"]
-
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Expansion(Result):

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 from shapegcode import _core
 
-__all__ = ["ProgramPlace", "alone_with", "called_from", "index_of", "is_subprogram", "place_of", "programs_of"]
-
 _PLACE = re.compile(r"#([1-9][0-9]{0,8})")
 _NUMBER = re.compile(r"[Oo:]?0*([1-9][0-9]{0,7})")
 _COMMENT = re.compile(rb"\([^()\r\n]*\)")

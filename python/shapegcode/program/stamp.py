@@ -24,8 +24,6 @@ from dataclasses import dataclass
 from shapegcode import _core
 from shapegcode.program.operating import FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK
 
-__all__ = ["RAPID_MARK", "REGION_MARK", "STAMP_BEGIN", "Stamp", "judge", "judged", "stamp_of", "text_mark"]
-
 REGION_MARK = "(SHAPED)"
 """Stands before each shaped region."""
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["signs_of_turning"]
-
 _LOOKED_AT_BYTES = 65536
 _COMMENT = re.compile(rb"\([^)\n]*\)")
 _OF_A_MILL = re.compile(rb"Y\s*[-+.\d#\[]|M0*6(?!\d)")

@@ -17,8 +17,6 @@ from shapegcode import _core
 from shapegcode.io.atomic import named_errors, replaced_file
 from shapegcode.model.stream import KINDS, Chunk
 
-__all__ = ["PlayedFile", "csv_file", "npz_file"]
-
 _COPY_BYTES = 1 << 20
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same motion gives the same bytes
 

@@ -9,8 +9,6 @@ from shapegcode.model.stream import Chunk
 from shapegcode.results.result import Xyz
 from shapegcode.simulation.result import Motion
 
-__all__ = ["MotionEnvelope", "MotionRecorder"]
-
 FloatArray = npt.NDArray[np.float64]
 
 _BUCKETS = 4000

@@ -17,8 +17,6 @@ from shapegcode.simulation.result import Motion, Simulation
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_motion", "plots_of"]
-
 FloatArray = npt.NDArray[np.float64]
 
 _COMMAND, _RESPONSE = plot.COLOURS[1], plot.COLOURS[0]

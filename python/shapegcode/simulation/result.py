@@ -16,10 +16,8 @@ from shapegcode.results.json import hidden, sparse
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result, Xyz
 from shapegcode.results.table import Column, Table, xyz_columns
+from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import PlayedFigures
-from shapegcode.verdict.tables import case_table
-
-__all__ = ["Motion", "RegionRun", "ShapedFigures", "Simulation"]
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -27,8 +27,6 @@ from shapegcode.simulation.motion import MotionRecorder
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
 from shapegcode.verdict.program import judge_program
 
-__all__ = ["play_motion", "simulate"]
-
 _RULES = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 # How long behind a stop its settling time is looked for. A drive is integrated all that time.
 _SHORTEST_REST_S, _LONGEST_REST_S, _DRIVE_REST_S = 0.5, 10.0, 0.5

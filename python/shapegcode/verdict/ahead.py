@@ -9,8 +9,6 @@ from functools import partial
 from queue import SimpleQueue
 from typing import Generic, TypeVar
 
-__all__ = ["Ahead", "OnShare", "cores"]
-
 T = TypeVar("T")
 
 OnShare = Callable[[float], None]

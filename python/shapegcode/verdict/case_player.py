@@ -15,8 +15,6 @@ from shapegcode.model.modes import Offset
 from shapegcode.results.figures import Deviation
 from shapegcode.verdict.cases import ALL_MODES, Case, CaseFigures, Target
 
-__all__ = ["BLOCK_ENDS", "CasePlayer", "case_figures"]
-
 BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 """Both rules of block timing."""
 

@@ -32,13 +32,11 @@ from shapegcode.verdict.figures import (
     FeedExcess,
     FrequencyResidual,
     OverrideResidual,
+    Placed,
     PlayedFigures,
     RegionVerdict,
     worst_counted,
 )
-from shapegcode.verdict.placed import Placed
-
-__all__ = ["OVERRIDES", "Judge", "RegionFigures"]
 
 _T = TypeVar("_T")
 

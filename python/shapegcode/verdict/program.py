@@ -21,11 +21,8 @@ from shapegcode.results.result import Pair, Xyz
 from shapegcode.verdict.ahead import cores
 from shapegcode.verdict.case_player import case_figures
 from shapegcode.verdict.cases import ALL_MODES, Case, CaseFigures, stated_cases
-from shapegcode.verdict.figures import PlayedFigures
+from shapegcode.verdict.figures import Placed, PlayedFigures
 from shapegcode.verdict.judge import Judge, RegionFigures
-from shapegcode.verdict.placed import Placed
-
-__all__ = ["judge_program", "rapid_vibration_um", "simulate_unchanged", "unshaped_regions"]
 
 T = TypeVar("T")
 Vector = npt.NDArray[np.float64]

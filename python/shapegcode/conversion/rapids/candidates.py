@@ -15,8 +15,6 @@ from shapegcode.conversion.whole_text import why_off_grid
 from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program
 
-__all__ = ["NO_CUT", "Gap", "Rapid", "find_gaps"]
-
 MOVE = _core.StepKind.move
 Vector = npt.NDArray[np.float64]
 

@@ -8,8 +8,9 @@ shaper and the exact stop of the replacement. The text that holds the replacemen
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
@@ -18,22 +19,68 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget, measure_load
 from shapegcode.conversion.rapids.candidates import NO_CUT, find_gaps
-from shapegcode.conversion.rapids.gaps import NO_GAIN, Choice, OpenGap
-from shapegcode.conversion.rapids.plant import RapidPlant
-from shapegcode.conversion.rapids.result import RapidMove, RapidsOutcome
-from shapegcode.conversion.rapids.splice import original_line, splice
-from shapegcode.conversion.readback import read_back
+from shapegcode.conversion.rapids.plant import NO_GAIN, Choice, OpenGap, RapidPlant
+from shapegcode.conversion.whole_text import read_back
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.program.stamp import RAPID_MARK
-from shapegcode.results.result import Pair
+from shapegcode.results.result import Pair, Xyz
 from shapegcode.shaping.grid import Grid
+from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge
-from shapegcode.verdict.placed import Placed
 
-__all__ = ["ShapedRapids", "shape_rapids"]
+
+@dataclass(frozen=True)
+class RapidMove:
+    """A rapid that is a shaped cutting move now.
+
+    Attributes:
+        lines: of the original, first and last.
+        emitted_lines: of the emitted program.
+        time_s: until the set-points rest.
+        in_position_s: wait for in-position behind them.
+        settling_s: from the end of the set-points until the table stays within the band.
+        residual_vibration_um: largest |table - command| while the set-points rest.
+        residual_limit_um: what the emitted one is judged by.
+        misses: tolerances that it leaves; always empty: such a rapid keeps its text.
+    """
+
+    lines: tuple[int, int]
+    emitted_lines: tuple[int, int]
+    time_s: Pair[float]
+    in_position_s: Pair[float]
+    settling_s: Pair[float]
+    residual_vibration_um: Pair[Xyz[float]]
+    residual_limit_um: Xyz[float]
+    misses: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RapidsOutcome:
+    """The rapids of a program: how many are shaped moves now, why the others stay, and what that saves.
+
+    Attributes:
+        found: rapids in the program.
+        shaped: of them, shaped moves now.
+        kept: how many stay, by reason.
+        time_saved_s: by which the table is ready for the next cuts sooner, in all.
+        settle_band_um: half the width of the band in which vibration counts as having decayed.
+        blocks: shaped blocks that replace them.
+        slowed_blocks: of these, such as step an axis by more than the corner limit of the look-ahead.
+        moves: those that are shaped.
+    """
+
+    found: int
+    shaped: int
+    kept: Mapping[str, int]
+    time_saved_s: float
+    settle_band_um: float
+    blocks: int
+    slowed_blocks: int
+    moves: tuple[RapidMove, ...]
+
 
 NOTHING_SHAPED = "no cut of the program is shaped"
 OUT_OF_TOLERANCE = "misses its tolerance as shaped blocks"
@@ -243,3 +290,50 @@ def _warnings(outcome: RapidsOutcome, machine: Machine) -> list[str]:
             '(emission.prologue, for example ["G05.1Q0"]), or it slows them'
         )
     return warnings
+
+
+@dataclass(frozen=True)
+class Spliced:
+    """A text with replacements, and the places of regions and replacements in it."""
+
+    text: bytes
+    placed: list[Placed]
+    moves: list[Placed]
+
+    @property
+    def everything(self) -> list[Placed]:
+        """Both, in the order of the text."""
+        return sorted([*self.placed, *self.moves], key=lambda place: place.first_line)
+
+
+def splice(text: bytes, placed: Sequence[Placed], choices: Sequence[Choice]) -> Spliced:
+    """A text with replacements in the places of rapids."""
+    parts, at = [], 0
+    shifts = []  # (line behind which it holds, lines that were added)
+    added = 0
+    moves = []
+    for choice in choices:
+        region = choice.region
+        parts += [text[at : region.text_begin], choice.text]
+        at = region.text_end
+        first = region.first_line + added
+        moves.append(Placed(region, first, first + choice.text.count(b"\n") - 1))
+        added += choice.text.count(b"\n") - 1
+        shifts.append((region.first_line, added))
+    parts.append(text[at:])
+    lines = [line for line, _ in shifts]
+    moved = []
+    for place in placed:
+        index = bisect(lines, place.first_line)
+        shift = shifts[index - 1][1] if index else 0
+        moved.append(Placed(place.region, place.first_line + shift, place.last_line + shift))
+    return Spliced(b"".join(parts), moved, moves)
+
+
+def original_line(line: int, placed: Sequence[Placed]) -> int:
+    """Line of the original from which a kept line of the emitted text comes."""
+    index = bisect([place.first_line for place in placed], line)
+    if index:
+        before = placed[index - 1]
+        return line - before.last_line + before.region.last_line
+    return line - placed[0].first_line + placed[0].region.first_line
