@@ -144,7 +144,7 @@ def test_other_values_leave_the_defaults_what_they_are() -> None:
 
 def test_machine_never_changes_after_loading() -> None:
     machine = Machine.load("vx500")
-    with pytest.raises(ValueError, match="frozen"):
+    with pytest.raises(AttributeError, match="with_values"):
         machine.controller.block_time_s = 1  # type: ignore[misc]
 
 
@@ -559,7 +559,7 @@ def test_full_disk_behind_standard_output_is_bad_input() -> None:
     with open("/dev/full", "w") as full:
         run = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert run.returncode == 2
-    assert run.stderr == "shapegcode: No space left on device\n"
+    assert run.stderr == "shapegcode: standard output: No space left on device\n"
 
 
 def test_write_text_keeps_the_old_file_when_it_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

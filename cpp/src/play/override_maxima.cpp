@@ -95,7 +95,7 @@ void OverrideMaxima::pass(BlockPlayer player) {
     const bool ends_on_block = group + 1 < groups_.size() && groups_[group + 1].first_block == player.block();
     const double from_mm = player.along_mm();
     const std::size_t periods =
-        player.pass_block(position, ends_on_block ? groups_[group + 1].along_mm : BlockPlayer::whole_block);
+        ends_on_block ? player.pass_block(position, groups_[group + 1].along_mm) : player.pass_block(position);
     if (periods == 0) {
       continue;
     }

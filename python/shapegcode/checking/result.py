@@ -18,6 +18,7 @@ from shapegcode.results.table import Column, Table
 __all__ = ["Check", "Finding", "FindingCounts", "SerialLine", "ShortBlocks", "ShortRun", "StarvedRun"]
 
 _SHOWN_ALIKE = 5
+_SHOWN_ALARMS = 20  # with one number
 _STYLES = {"alarm": "bold red", "warning": "yellow", "note": "dim"}
 
 
@@ -232,13 +233,15 @@ class Check(Result):
         """The one thing to do next, in one sentence."""
         if self.refused:
             first = next(finding for finding in self.findings if finding.severity == "alarm")
+            if "arc_centre" in self.counts_by_code:
+                return "set input.arc_centre as the note says, and check again."
             return f"correct {first.place} first: alarms behind it may come from it."
         worst = {finding.code for finding in self.findings if finding.severity == "warning"}
         if "work_limit" in worst:
             stop = next(finding for finding in self.findings if finding.code == "work_limit")
             return f"correct {stop.place} if it is a slip; else raise the key that it names with --set."
         if "dnc_rate" in worst:
-            return "raise the baud rate or lower the feed where the serial line starves (controller.dnc_baud)."
+            return "raise the baud rate or lower the feed where the serial line is too slow (controller.dnc_baud)."
         if "program_memory" in worst:
             large = next(finding for finding in self.findings if finding.code == "program_memory")
             if "--max-bytes" in large.message:
@@ -274,10 +277,10 @@ class Check(Result):
         return [Table("", columns, shown, caption="\n".join(more))]
 
     def _first_of_each(self) -> Iterator[Finding]:
-        seen: Counter[tuple[str, str]] = Counter()
+        seen: Counter[tuple[str, str, int]] = Counter()
         for finding in self.findings:
-            kind = (finding.severity, finding.code)
+            kind = (finding.severity, finding.code, finding.alarm)
             seen[kind] += 1
             # What the control refuses is what the user came for.
-            if finding.severity == "alarm" or seen[kind] <= _SHOWN_ALIKE:
+            if seen[kind] <= (_SHOWN_ALARMS if finding.severity == "alarm" else _SHOWN_ALIKE):
                 yield finding

@@ -23,12 +23,7 @@ def add_study_arguments(parser: argparse.ArgumentParser, what: str, draws: str) 
 
 
 def load(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
-    """The file and the machine; the program and the machine then stand among what the command reads.
-
-    Raises:
-        StudyFileError, MachineError, ArgumentError: bad input.
-        OSError: a file cannot be read.
-    """
+    """The file and the machine; the program and the machine then stand among what the command reads."""
     from shapegcode.cli import runner
     from shapegcode.errors import ArgumentError
     from shapegcode.studies.study_file import load_study
@@ -46,7 +41,8 @@ def load(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Converts a program once and plays it on machines whose values are drawn as the file says: how likely it stays "
+        "Converts a program once and simulates it on machines sampled as the file says (Monte Carlo): how likely it "
+        "stays "
         "within tolerance, quantiles, and which value decides. Exit code 1 if that is less likely than at_least."
     )
     add_study_arguments(parser, "program, machine, and what is varied", "how many draws")
@@ -55,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scheduler",
         metavar="ADDRESS",
         default=None,
-        help="play on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
+        help="simulate on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
     )
     for name, what in (("ca", "the authority's certificate"), ("cert", "own certificate"), ("key", "own key")):
         parser.add_argument(f"--tls-{name}", metavar="FILE", default="", help=f"{what}, for tls:// schedulers")
@@ -66,12 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the study.
-
-    Raises:
-        StudyFileError, MachineError, ProgramError, ArgumentError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Run the study."""
     from shapegcode.batching.batch import Cluster
     from shapegcode.cli import runner
     from shapegcode.io.atomic import write_lines

@@ -17,7 +17,7 @@ from shapegcode.comparison.result import Comparison, KindCount, ProgramDifferenc
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.compensation import guard_lines
-from shapegcode.program.reading import program_bytes, reader_options
+from shapegcode.program.reading import is_program_text, program_bytes, reader_options
 
 __all__ = ["compare"]
 
@@ -27,7 +27,7 @@ _COMPENSATED = re.compile(rb"G4[12](?!\d)", re.IGNORECASE)
 def compare(
     original: Program | str | Path,
     emitted: Program | str | Path,
-    machine: Machine | None = None,
+    machine: Machine | str | Path | None = None,
     *,
     allow: Allowed | str | Iterable[str] = (),
 ) -> Comparison:
@@ -51,6 +51,7 @@ def compare(
         ProgramError: a file is no program that can be read.
         OSError: a file cannot be read.
     """
+    machine = None if machine is None else Machine.of(machine)
     allowed = allow if isinstance(allow, Allowed) else Allowed.of(allow)
     if machine is None:
         read = next((each.reading.machine for each in (original, emitted) if isinstance(each, Program)), None)
@@ -103,6 +104,8 @@ def _read(program: Program | str | Path, machine: Machine) -> tuple[Program, boo
     try:
         return Program.read(program, machine), False
     except ProgramError:
+        if is_program_text(program):
+            raise
         text = program_bytes(program, machine.controller.max_program_bytes)
         whole_lines = text[: text.rfind(b"\n") + 1]
         for kept in (text, whole_lines):

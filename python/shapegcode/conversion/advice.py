@@ -14,7 +14,7 @@ from shapegcode.verdict.judge import Judge
 
 __all__ = ["FilterAdvice", "filter_advice"]
 
-_MOSTLY = 0.7  # of the contour error of the table: the command itself errs so much
+_MOSTLY = 0.7  # of the contour error of the machine table: the command itself errs so much
 _TRIALS = (0.9, 0.7, 0.5)  # of the time constant that a rounding in proportion to it would allow
 
 
@@ -54,18 +54,7 @@ def filter_advice(
     judge: Judge,
     originals: Sequence[_core.PlaybackFigures],
 ) -> FilterAdvice | None:
-    """Whether a smaller filter of the control would do instead of shaping.
-
-    Args:
-        program: the original.
-        machine: its file says which filter acts.
-        model: of the machine.
-        judge: says what the contour tolerance is about.
-        originals: the cuts, simulated.
-
-    Returns:
-        The advice; None: the contour is within its limit, vibration is the cause, or a smaller filter is no cure.
-    """
+    """Whether a smaller filter of the control would do instead of shaping."""
     limit_um, floor_um = machine.tolerance.contour_um, machine.tolerance.residual_floor_um
     errors = [(getattr(run, judge.target).max_abs_mm * 1e3, run.command.max_abs_mm * 1e3) for run in originals]
     if not any(error > limit_um for error, _ in errors):

@@ -16,30 +16,16 @@ __all__ = ["gain_um", "most_to_gain_um"]
 
 
 def _figures_um(played: _core.PlaybackFigures) -> tuple[float, float]:
-    """Residual vibration of the worst axis, contour error of the table."""
+    """Residual vibration of the worst axis, contour error of the machine table."""
     return float(np.max(played.residual_mm)) * 1e3, played.response.max_abs_mm * 1e3
 
 
 def most_to_gain_um(original: _core.PlaybackFigures) -> float:
-    """The most that shaping can gain: what is there.
-
-    Args:
-        original: the region as programmed, played.
-
-    Returns:
-        The larger of residual vibration and contour error of the table, µm.
-    """
+    """The most that shaping can gain: what is there."""
     return max(_figures_um(original))
 
 
 def gain_um(figures: RegionFigures) -> float:
-    """What shaping gained: the larger fall of the two figures, the emitted one in the worse rule.
-
-    Args:
-        figures: the region as programmed and as emitted.
-
-    Returns:
-        In µm; 0 where nothing became better.
-    """
+    """What shaping gained: the larger fall of the two figures, the emitted one in the worse rule."""
     after = np.max([_figures_um(run) for run in figures.emitted], axis=0)
     return max(0.0, float(np.max(np.asarray(_figures_um(figures.original)) - after)))

@@ -87,7 +87,7 @@ class TransferLoad:
 
     Attributes:
         extra_bytes: size of its text less that of the original's.
-        baud: what its busiest stretch needs of the line, bit/s.
+        baud: what its section with the most blocks per second needs of the line, bit/s.
         blocks_per_second: blocks in its busiest stretch.
     """
 
@@ -102,7 +102,7 @@ class TextNeeds:
 
     Attributes:
         bytes: its size.
-        baud: what its busiest stretch needs of the line, bit/s.
+        baud: what its section with the most blocks per second needs of the line, bit/s.
         blocks_per_second: blocks in its busiest stretch.
         block_period_s: on which it is written.
     """
@@ -151,17 +151,7 @@ class BudgetOutcome:
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
-    """The load of a shaped region; a stretch lasts as long as the shaper: no transition is shorter.
-
-    Args:
-        region: of the original.
-        shaped: its replacement.
-        grid: on which it is written.
-        bits_per_character: on the serial line.
-
-    Returns:
-        Bytes, bit/s and blocks/s that it asks for.
-    """
+    """The load of a shaped region; a stretch lasts as long as the shaper: no transition is shorter."""
     durations = np.empty(shaped.blocks)
     np.concatenate(shaped.block_periods, out=durations, casting="same_kind")
     durations *= grid.block_period_s

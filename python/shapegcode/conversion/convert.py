@@ -47,7 +47,7 @@ __all__ = ["convert"]
 
 def convert(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     contour: str | None = None,
     contour_tolerance_um: float | None = None,
@@ -101,6 +101,7 @@ def convert(
             controller cannot play, a budget without a choice, lines without a cut.
         RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
     """
+    machine = Machine.of(machine)
     stated = {
         "shaping.contour": contour,
         "tolerance.contour_um": contour_tolerance_um,
@@ -272,7 +273,7 @@ def _rests_on(run: Run, settled: Settled) -> tuple[tuple[RestsOn, ...], int]:
     simulated = zip(settled.written.placed, settled.figures, settled.trackers, strict=True)
     return rests_on(
         run.judge, run.machine, list(simulated), settled.emitted, deciding, run.pool,
-        settled.begun, partial(run.on_progress, "what it rests on"),
+        settled.begun, partial(run.on_progress, "sensitivity to unverified parameters"),
     )  # fmt: skip
 
 
@@ -299,7 +300,7 @@ def _warnings(run: Run, written: Written, figures: PlayedFigures) -> list[str]:
     elif not program.regions:
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the program is unchanged")
     if not written.placed:
-        # Where something was shaped, what the verdict rests on names them.
+        # Where something was shaped, the sensitivity to unverified parameters names them.
         warnings += open_axes(program, machine)
     warnings += played_warnings(program, figures, machine, is_priced=bool(run.aims.priced))
     return warnings + text_warnings(program, written.placed, figures, machine, written.size, written.blocks)

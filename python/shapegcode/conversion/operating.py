@@ -56,20 +56,7 @@ def at_the_control(
     block_period_s: float,
     restarts: Sequence[CutRestarts],
 ) -> tuple[ControlNote, ...]:
-    """What to heed with an emitted program.
-
-    Args:
-        emitted: the program.
-        placed: its shaped regions; none: nothing to heed.
-        loads: what regions ask of line and control.
-        figures: as played.
-        model: of the machine that shall run it.
-        block_period_s: of the shaped blocks.
-        restarts: restart points of each shaped region.
-
-    Returns:
-        The notes, in the order in which one meets them.
-    """
+    """What to heed with an emitted program."""
     if not placed:
         return ()
     machine = model.machine
@@ -88,27 +75,16 @@ def at_the_control(
 
 
 def control_table(notes: Sequence[ControlNote]) -> Table:
-    """The notes as a table.
-
-    Args:
-        notes: what to heed.
-
-    Returns:
-        One row for each.
-    """
-    columns = (Column("at the control", value="topic", text=True), Column("what to heed", value="text", text=True))
+    """The notes as a table."""
+    columns = (
+        Column("at the control", value="topic", text=True),
+        Column("caution, before you run", value="text", text=True),
+    )
     return Table("", columns, notes)
 
 
 def restart_table(points: Sequence[RestartPoint]) -> Table:
-    """Restart points inside of cuts, with what must be in force before the start.
-
-    Args:
-        points: of the program.
-
-    Returns:
-        One row for each; of many those that come first.
-    """
+    """Restart points inside of cuts, with what must be in force before the start."""
     columns = (
         Column("restart", value=lambda point: f"N{point.number}", left=True, priority=0),
         Column("line", value="line", priority=0),
@@ -137,8 +113,10 @@ def _line(loads: Mapping[int, TransferLoad], machine: Machine) -> str:
     baud = max((load.baud for load in loads.values()), default=0.0)
     line = machine.controller.dnc_baud
     here = f", the line of this machine has {line}" if line > 0 else ""
-    enough = "" if line <= 0 else ": enough" if baud <= line else ": it starves (--baud fits the program to it)"
-    return f"{baud:.0f} baud or more in the busiest stretch of the cuts{here}{enough}"
+    enough = (
+        "" if line <= 0 else ": enough" if baud <= line else ": buffer underrun (--baud fits the program to the line)"
+    )
+    return f"{baud:.0f} baud or more, where the cuts have the most blocks per second{here}{enough}"
 
 
 def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_period_s: float) -> str:
@@ -216,7 +194,7 @@ def _restarts(
         yield (
             f"{count} restart point{'' if count == 1 else 's'} inside of long cuts, where the command is nearly at "
             f"rest: spindle on, tool, H and coordinate system of the list in force{switched}, go to its position from "
-            f"above, then search the N number; a start there shakes the table once, by up to {shakes_um:.0f} µm"
+            f"above, then search the N number; a start there makes the table vibrate once, by up to {shakes_um:.0f} µm"
         )
     if stops := sum(each.stops for each in restarts):
         cost_s = sum(each.stops_s for each in restarts)

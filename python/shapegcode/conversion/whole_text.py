@@ -16,13 +16,13 @@ from shapegcode.conversion.write import RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.shaped_program import stamp_of_machine
-from shapegcode.program import Program
+from shapegcode.program import Program, end_off_grid_mm, least_increment_mm
 from shapegcode.program.compensation import guard_lines, header_lines
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.ahead import Ahead, OnShare, cores
 from shapegcode.verdict.placed import Placed
 
-__all__ = ["TextWriter", "Written", "why_kept"]
+__all__ = ["TextWriter", "Written", "why_kept", "why_off_grid"]
 
 _MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
 
@@ -31,8 +31,10 @@ Aim = tuple[float, float]
 """Tolerance, µm, and share of the feed for which a region is shaped."""
 
 
-def why_kept(region: _core.Region, machine: Machine, grid: Grid) -> str:
+def why_kept(program: Program, region: _core.Region, machine: Machine, grid: Grid) -> str:
     """Why a region cannot be written as shaped blocks; empty if it can."""
+    if reason := why_off_grid(program, region, machine):
+        return reason
     longest_s = _MOST_PERIODS * grid.block_period_s
     time_s = region.path.programmed_time_s
     if time_s > longest_s:
@@ -41,6 +43,23 @@ def why_kept(region: _core.Region, machine: Machine, grid: Grid) -> str:
     least = machine.controller.minimum_feed_mm_per_min
     if slowest < least * (1 - 1e-9):
         return f"feed {slowest:g} mm/min is below controller.minimum_feed_mm_per_min = {least:g}"
+    return ""
+
+
+def why_off_grid(program: Program, region: _core.Region, machine: Machine) -> str:
+    """Why the end of a move cannot be written exactly enough for what follows in the other unit; empty if it can."""
+    if region.incremental:
+        return ""
+    units = {region.exit.units, *(each.exit.units for each in program.regions)}
+    limit_mm = 0.5 * min(least_increment_mm(machine, each) for each in units) + 1e-9
+    off_mm = end_off_grid_mm(region, least_increment_mm(machine, region.exit.units))
+    moves = zip("XYZ", region.path.end_mm, off_mm, region.path.extent_mm, region.exit.known, strict=True)
+    for axis, end_mm, off, extent_mm, is_known in moves:
+        if is_known and extent_mm > 0.0 and off > limit_mm:
+            return (
+                f"it ends at {axis} {end_mm:.5f} mm, {off * 1e3:.2f} um off what G{region.exit.units} can name; the "
+                f"program changes between G20 and G21 (limit {limit_mm * 1e3:.2f} um)"
+            )
     return ""
 
 
@@ -78,17 +97,7 @@ class Written:
     restarts: list[CutRestarts]
 
     def read_back(self, machine: Machine) -> Program:
-        """Read the text and hold it against the original; from then on it stands in the program that is given.
-
-        Args:
-            machine: whose controller reads it.
-
-        Returns:
-            The emitted program as it was read.
-
-        Raises:
-            RoundTripError: something differs, see `read_back`.
-        """
+        """Read the text and hold it against the original; from then on it stands in the program that is given."""
         for text, _ in self.texts:
             text.hand_over()
         emitted = read_back(self.parts, self.placed, machine)
@@ -121,28 +130,14 @@ class TextWriter:
         self._begun: tuple[dict[int, Aim], Ahead[EmittedRegion]] | None = None
 
     def begin(self, reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> None:
-        """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain.
-
-        Args:
-            reasons: as `write` takes them; likewise the others.
-            room_um: of each region.
-            feed_share: of each region.
-        """
+        """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain."""
         aims = _aims(reasons, room_um, feed_share)
         if len(aims) < cores():
             self._begun = aims, self._ahead(aims, lambda _done: None)
             self._begun[1].begin()
 
     def options(self, index: int, feed_ratio: float) -> _core.ShapingOptions:
-        """How a cut is shaped, but for its tolerance.
-
-        Args:
-            index: of the cut.
-            feed_ratio: of the programmed feed that it is planned with.
-
-        Returns:
-            The options of the core.
-        """
+        """How a cut is shaped, but for its tolerance."""
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         limits.feed_override = feed_ratio
         offset = self._model.offset(self._program.regions[index])
@@ -156,21 +151,7 @@ class TextWriter:
         untold: Collection[int] = (),
         on_progress: Step = lambda _done, _total: None,
     ) -> Written:
-        """The whole text.
-
-        Args:
-            reasons: why a region keeps its text, per region; empty: it is shaped.
-            room_um: deviation that its feed is planned for, per region, µm.
-            feed_share: of the programmed feed that it is planned with, per region.
-            untold: indices of kept regions that need no warning of their own.
-            on_progress: called with the moves that are shaped, and how many there are to shape.
-
-        Returns:
-            The text, and where its shaped regions stand.
-
-        Raises:
-            ProgramError: a region cannot be written.
-        """
+        """The whole text."""
         core, regions = self._program.core, self._program.regions
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
@@ -292,10 +273,10 @@ class TextWriter:
         """The warning for a region that keeps its text."""
         if not keepable(region, self._machine):
             raise self._program.region_error(
-                region, f"{reason}; its arcs have absolute centres and cannot be kept as they are"
+                region, f"{reason}; its arcs have absolute centres and cannot be left unchanged"
             )
         program = self._program
-        return f"{program.place(region.first_line)}: {program.lines(region)} kept untouched: {reason}"
+        return f"{program.place(region.first_line)}: {program.lines(region)} left unchanged: {reason}"
 
     def _opening(self, *, shapes: bool) -> bytes:
         """Header comments where something is shaped, and the guards of expanded radii."""

@@ -44,7 +44,7 @@ class Survey:
 
 def survey(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     tools: Tool | Sequence[Tool],
     stock: Stock,
     *,
@@ -70,6 +70,7 @@ def survey(
             memory.
         StockError: the stock does not suit the program.
     """
+    machine = Machine.of(machine)
     tools = [tools] if isinstance(tools, Tool) else list(tools)
     if not tools:
         raise _core.ArgumentError("no tool is given: at least one must cut")

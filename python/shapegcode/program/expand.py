@@ -16,7 +16,7 @@ __all__ = ["expand"]
 
 def expand(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     compensation: Literal["expand", "keep"] = "expand",
     program_number: int | str | None = None,
@@ -39,6 +39,7 @@ def expand(
         ArgumentError: it was read with other settings than the machine has.
         OSError: the file cannot be read.
     """
+    machine = Machine.of(machine)
     if isinstance(program, Program):
         program.require_machine(machine)
     else:

@@ -49,7 +49,7 @@ OVERRIDE_LOCKED = Habit(
 OVERRIDE_ANY = Habit(
     "override",
     "BLOCKS OF ONE DURATION FOR ANY FEED OVERRIDE",
-    "blocks of one duration: a turned feed override stretches all alike; least vibration stays at 100 %",
+    "blocks of one duration: another feed override scales all of them alike; vibration is lowest at 100 %",
 )
 OVERRIDES = {"ask": OVERRIDE, "lock": OVERRIDE_LOCKED, "any": OVERRIDE_ANY}
 """By `emission.override`."""
@@ -63,7 +63,8 @@ SINGLE_BLOCK = Habit(
 FEED_HOLD = Habit(
     "feed hold",
     "AFTER FEED HOLD GO ON AT 100 PCT",
-    "feed hold is safe and may shake the machine once, since the control brakes by its own rule; cycle start goes on",
+    "feed hold is safe; the machine may vibrate once, since the control decelerates in its own way; "
+    "cycle start resumes the program",
 )
 RESTART = Habit(
     "restart",
@@ -79,12 +80,5 @@ FIRST_RUN = Habit(
 
 
 def no_room(room_bytes: int) -> str:
-    """What to do with a shaped program that the memory of the control does not hold.
-
-    Args:
-        room_bytes: of the memory.
-
-    Returns:
-        The ways in words, the best one first.
-    """
+    """What to do with a shaped program that the memory of the control does not hold."""
     return f"convert the original with --max-bytes {room_bytes}; or memory card, data server or drip feed (DNC)"

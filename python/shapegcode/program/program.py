@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.memory import require_memory_for_lines
-from shapegcode.program.reading import Reading, program_bytes
+from shapegcode.program.reading import Reading, is_program_text, program_bytes
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
 from shapegcode.program.turning import signs_of_turning
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 MM_PER_INCH = 25.4
 _KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
-_ARC_OFF_RADIUS = "off its radius"
+ARC_OFF_RADIUS = "off its radius"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,7 @@ class Program:
     def read(
         cls,
         path: str | Path,
-        machine: Machine | None = None,
+        machine: Machine | str | Path | None = None,
         *,
         program_number: int | str | None = None,
         expand_compensation: bool = True,
@@ -60,8 +61,8 @@ class Program:
         Programs that it calls are looked for in the file, beside it, and in `input.program_folders`.
 
         Args:
-            path: the file.
-            machine: whose controller reads it.
+            path: the file; a string of several lines is the program's text itself.
+            machine: whose controller reads it, its file or its built-in name.
             program_number: which program of a file that holds several: its O number, or an address as in
                 `shapegcode.program.several`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
@@ -76,7 +77,15 @@ class Program:
         """
         from shapegcode.machine import Machine
 
-        machine = machine or Machine.load("vx500")
+        machine = Machine.of(machine or "vx500")
+        if is_program_text(path):
+            return cls.from_text(
+                str(path),
+                machine,
+                program_number=program_number,
+                expand_compensation=expand_compensation,
+                collect_alarms=collect_alarms,
+            )
         return cls.from_text(
             program_bytes(path, machine.controller.max_program_bytes),
             machine,
@@ -91,7 +100,7 @@ class Program:
     def from_text(
         cls,
         text: bytes | str,
-        machine: Machine | None = None,
+        machine: Machine | str | Path | None = None,
         *,
         source: str = "<text>",
         emitted: bool = False,
@@ -126,7 +135,7 @@ class Program:
         """
         from shapegcode.machine import Machine
 
-        machine = machine or Machine.load("vx500")
+        machine = Machine.of(machine or "vx500")
         data = text.encode() if isinstance(text, str) else text
         require_memory_for_lines(data, source)
         if not emitted and (turning := signs_of_turning(data)) is not None:
@@ -339,15 +348,35 @@ def _read(data: bytes, source: str, reading: Reading, folder: Path | None, numbe
     try:
         core = _core.read_program(data, options)
     except ProgramError as error:
-        hint = _absolute_centre_hint(data, options) if _ARC_OFF_RADIUS in str(error) else ""
+        hint = _absolute_centre_hint(data, options) if ARC_OFF_RADIUS in str(error) else ""
         raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
-    return Program(core, source, reading, data if core.expanded else None, folder, number)
+    # The core leaves the byte-order mark out too.
+    whole = data.removeprefix(codecs.BOM_UTF8) if core.expanded else None
+    return Program(core, source, reading, whole, folder, number)
 
 
 def least_increment_mm(machine: Machine, units: int) -> float:
     """Least increment of the words of a program in G20 or G21, mm."""
     controller = machine.controller
     return controller.least_increment_inch * MM_PER_INCH if units == 20 else controller.least_increment_mm
+
+
+_ON_INCREMENT = 1e-6  # increments: so near to one a position is on it
+
+
+def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
+    """How far the end of a region lies from the nearest position that its words can name.
+
+    A program that changes between G20 and G21, or that has more digits than the control resolves, may end elsewhere.
+    """
+    off = [abs(each / increment_mm - round(each / increment_mm)) for each in map(float, region.path.end_mm)]
+    return [each * increment_mm if each > _ON_INCREMENT else 0.0 for each in off]
+
+
+def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
+    """Which axes rest through a whole region where none of its words leads: nothing may be written of them."""
+    off_mm = end_off_grid_mm(region, increment_mm)
+    return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 
 
 def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:
@@ -369,12 +398,7 @@ def _absolute_centre_hint(text: bytes, options: _core.ReaderOptions) -> str:
 
 
 def given_program(program: Program | str | Path, machine: Machine) -> Program:
-    """A program as it is, or read from its file as the controller of `machine` would.
-
-    Raises:
-        ArgumentError: it was read with other settings than the machine has.
-        ProgramError, OSError: see :meth:`Program.read`.
-    """
+    """A program as it is, or read from its file as the controller of `machine` would."""
     if not isinstance(program, Program):
         return Program.read(program, machine)
     program.require_machine(machine)

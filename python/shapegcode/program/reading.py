@@ -13,13 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
+from shapegcode.io.data_file import open_file
 from shapegcode.program.memory import require_memory
 from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["PROGRAM_SUFFIXES", "Reading", "program_bytes", "program_loader", "reader_options"]
+__all__ = ["PROGRAM_SUFFIXES", "Reading", "is_program_text", "program_bytes", "program_loader", "reader_options"]
 
 _NO_LIMIT = 2**63
 _ANY_PROGRAM = (0, 99_999_999)
@@ -62,14 +63,7 @@ class Reading:
     called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
     def options(self, folders: Sequence[Path]) -> _core.ReaderOptions:
-        """Settings with which the core reads a text so.
-
-        Args:
-            folders: where called programs are looked for, before `input.program_folders`.
-
-        Returns:
-            The options of the core.
-        """
+        """Settings with which the core reads a text so."""
         options = reader_options(
             self.machine,
             emitted=self.emitted,
@@ -86,14 +80,7 @@ class Reading:
         return options
 
     def differences(self, machine: Machine) -> list[str]:
-        """Settings with which another machine would read the text otherwise.
-
-        Args:
-            machine: the other one.
-
-        Returns:
-            Each with both values; none where both machines read alike.
-        """
+        """Settings with which another machine would read the text otherwise."""
         if machine is self.machine:
             return []
         unused = {"input.arc_centre"} if self.emitted else set()
@@ -129,6 +116,11 @@ def _shown(value: object) -> str:
     return text if len(text) <= _SHOWN_CHARACTERS else f"{text[:_SHOWN_CHARACTERS]}..."
 
 
+def is_program_text(given: object) -> bool:
+    """Whether a string is the text of a program and not the name of a file: it has several lines."""
+    return isinstance(given, str) and ("\n" in given or "\r" in given)
+
+
 def reader_options(
     machine: Machine,
     *,
@@ -137,18 +129,7 @@ def reader_options(
     expand_compensation: bool = True,
     collect_alarms: bool = False,
 ) -> _core.ReaderOptions:
-    """Settings with which the core reads a program of this machine.
-
-    Args:
-        machine: whose controller reads the text.
-        emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
-        probe_lines: ascending line numbers behind which the modal state is kept.
-        expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
-        collect_alarms: go on behind an alarm.
-
-    Returns:
-        The options of the core.
-    """
+    """Settings with which the core reads a program of this machine."""
     options = _core.ReaderOptions()
     options.calculator_decimal_point = machine.controller.calculator_decimal_point
     options.absolute_arc_centres = machine.input.arc_centre == "absolute" and not emitted
@@ -236,22 +217,10 @@ PROGRAM_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".
 
 
 def program_bytes(path: str | Path, most: int) -> bytes:
-    """Content of a program file.
-
-    Args:
-        path: the file.
-        most: bytes that are of use to the caller.
-
-    Returns:
-        Its bytes, no more than one beyond `most`: of a file without an end neither.
-
-    Raises:
-        ProgramError: the memory would not hold what is read of it.
-        OSError: the file cannot be read; it names the file, which a failed read() alone does not.
-    """
+    """Content of a program file."""
     try:
-        with Path(path).open("rb") as file:
-            size = min(os.fstat(file.fileno()).st_size, most + 1)  # 0 of what is no file
+        with open_file(path) as file:
+            size = min(os.fstat(file.fileno()).st_size, most + 1)
             require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
             return file.read(most + 1)
     except OSError as error:
@@ -259,15 +228,7 @@ def program_bytes(path: str | Path, most: int) -> bytes:
 
 
 def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[str, bytes] | None]:
-    """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix.
-
-    Args:
-        folders: where to look, in this order.
-        most: bytes of it that are of use, see `program_bytes`.
-
-    Returns:
-        A function of the O number: name and content of the file, None where there is none.
-    """
+    """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix."""
 
     def load(number: int) -> tuple[str, bytes] | None:
         for folder in folders:

@@ -1,4 +1,4 @@
-"""What every result says of itself: whether it is good, what to heed, what to do next; figures, tables, pictures.
+"""What every result says of itself: whether it is good, its cautions, what to do next; figures, tables, pictures.
 
 The same fields give JSON, table, picture and page. A result's pictures are drawn by the module `plots` beside it, which
 is loaded when somebody asks for them.
@@ -96,14 +96,7 @@ class Outcome:
         raise NotImplementedError
 
     def next_step_after(self, file: str) -> str:
-        """The one thing to do next once a file was written with it.
-
-        Args:
-            file: name of it.
-
-        Returns:
-            One sentence; that of `next_step` unless it would ask for the file.
-        """
+        """The one thing to do next once a file was written with it."""
         del file
         return self.next_step
 
@@ -130,17 +123,7 @@ class Outcome:
         return {}
 
     def save_plots(self, folder: str | Path) -> list[str]:
-        """Write every picture as PNG and SVG into a folder, which is made where it is missing.
-
-        Args:
-            folder: where to; made where it is missing.
-
-        Returns:
-            The files written.
-
-        Raises:
-            OSError: the folder cannot be made or a file not be written.
-        """
+        """Write every picture as PNG and SVG into a folder, which is made where it is missing."""
         from shapegcode.results.plot import save_all
 
         return save_all(self.plots(), folder)

@@ -49,15 +49,7 @@ class CoreFigures:
 
 
 def same_fields(first: Any, second: Any) -> bool:
-    """Whether two dataclasses of one class hold the same data: arrays by value, NaN like NaN; handles are no data.
-
-    Args:
-        first: a result, or a part of one.
-        second: the other one.
-
-    Returns:
-        True where nothing that is data differs; fields that are not compared count as none.
-    """
+    """Whether two dataclasses of one class hold the same data: arrays by value, NaN like NaN; handles are no data."""
     return all(_same(getattr(first, each.name), getattr(second, each.name)) for each in fields(first) if each.compare)
 
 
@@ -124,7 +116,7 @@ _HANDLES = frozenset(
     if isinstance(kind, type) and vars(kind).get("__eq__") is None and not issubclass(kind, BaseException)
 )
 _IN_RESULTS = (  # beside what only the core makes
-    _core.Region, _core.ModalState, _core.CornerCut, _core.Material, _core.MillingForce, _core.EndMill,
+    _core.Region, _core.ModalState, _core.Material, _core.MillingForce, _core.EndMill,
     _core.FeedStretch, _core.CuttingCoefficients, _core.ToolBeam, _core.FeedLimits,
 )  # fmt: skip
 for _kind in _HANDLES:

@@ -87,7 +87,7 @@ def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
         "what the file states. Comments are for people and never read. Older files have neither form: the first",
         "words of their comments count (`# measured ...`), with a warning; `shapegcode machine show FILE",
         "--write-origins` writes the table into the file. `machine show` counts the origins, and a verdict ends",
-        "with those values that it rests on and that nobody measured.",
+        "with those that it depends on and that are unverified.",
         "",
         "A default marked **assumed** is not known for real controllers in general: look it up or measure",
         "it. The FANUC column names the parameter that corresponds to a key; numbers differ between series,",

@@ -30,25 +30,11 @@ class Distribution:
     known: bool | None = None
 
     def at(self, shares: Unit) -> list[object]:
-        """The values below which these shares of all lie.
-
-        Args:
-            shares: 0 to 1, (n,).
-
-        Returns:
-            A value for each.
-        """
+        """The values below which these shares of all lie."""
         raise NotImplementedError
 
     def levels(self, most: int) -> list[object]:
-        """A few values that stand for all, for a grid.
-
-        Args:
-            most: how many at most.
-
-        Returns:
-            Values in the middle of equal shares.
-        """
+        """A few values that stand for all, for a grid."""
         return self.at((np.arange(most) + 0.5) / most)
 
     @property

@@ -15,24 +15,16 @@ _SWINGS_UM = 0.005  # an axis that nowhere reaches this has no column
 
 
 def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table:
-    """What every case leaves, whether it counts, and which one decides.
-
-    Args:
-        cases: as played.
-        worst: the one that decides; None: no case counts.
-
-    Returns:
-        The table.
-    """
+    """What every case leaves, whether it counts, and which one decides."""
     columns = (
-        Column("case", value=lambda case: unbroken(case.name), text=True),
+        Column("condition", value=lambda case: unbroken(case.name), text=True),
         *(
             Column(axis.upper(), value=f"residual_um.{axis}", digits=2)
             for axis in "xyz"
             if any(case.residual_um[axis] >= _SWINGS_UM for case in cases)
         ),
         Column("command", value=lambda case: _micrometres(case.contour_error_um.command)),
-        Column("table", value=lambda case: _micrometres(case.contour_error_um.response)),
+        Column("resp.", value=lambda case: _micrometres(case.contour_error_um.response)),
         Column("s", value=lambda case: "-" if case.time_s is None else f"{case.time_s:.2f}"),
         Column("of limit", value=lambda case: _share(case.share_of_limit)),
         Column("verdict", value=lambda case: _verdict(case) + (" <- worst" if case is worst else ""), left=True),
@@ -40,23 +32,16 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
     shown = sum(not case.counts for case in cases)
     brackets = "; those in brackets are only shown" if shown else ""
     return Table(
-        "cases of the verdict: residual X Y Z, contour error of command and table, µm",
+        "operating conditions: residual X Y Z, contour error of command and response, µm",
         columns,
         cases,
-        caption=f"{len(cases) - shown} of {len(cases)} cases count{brackets} ([verdict])",
+        caption=f"{len(cases) - shown} of {len(cases)} operating conditions count{brackets} ([verdict])",
         row_style=lambda case: _style(case, case is worst),
     )
 
 
 def unbroken(text: str) -> str:
-    """Keep a number on the line of its unit.
-
-    Args:
-        text: of a cell.
-
-    Returns:
-        The text with no-break spaces.
-    """
+    """Keep a number on the line of its unit."""
     return _NUMBER.sub(rf"\1{NO_BREAK}\2", text)
 
 

@@ -123,7 +123,10 @@ void Reader::subprogram_call(const ParsedBlock& block) {
     return word.letter == 'P' || word.letter == 'L' || is_m(word, 98) || is_m(word, 198);
   });
   if (repeats > 0) {
-    enter(number, {}, false, static_cast<int>(repeats), column, block.text());
+    MacroArguments called;
+    called.program = number;
+    called.repeats = static_cast<int>(repeats);
+    enter(called, false, column, block.text());
   }
 }
 
@@ -171,7 +174,7 @@ void Reader::macro_call(const ParsedBlock& block, std::string_view raw, int g_te
   }
   if (g_tenths == 650) {
     if (arguments.repeats > 0) {
-      enter(arguments.program, arguments, true, arguments.repeats, 1, block.text());
+      enter(arguments, true, 1, block.text());
     }
     return;
   }
@@ -195,11 +198,11 @@ void Reader::bound_call(const ParsedBlock& block, std::string_view raw) {
     return;
   }
   // The program does not name what it calls: a message has to say who does.
-  const auto call = [&](std::int64_t number, const MacroArguments& arguments, bool macro, const Word& word,
-                        const char* key) {
+  const auto call = [&](std::int64_t number, MacroArguments arguments, bool macro, const Word& word, const char* key) {
     const std::string by = fmt::format(" that {} calls ({})", block.text_of(word), key);
     const std::uint32_t column = macro ? word.column : 1;
-    if (enter(number, arguments, macro, arguments.repeats, column, block.text(), by)) {
+    arguments.program = number;
+    if (enter(arguments, macro, column, block.text(), by)) {
       frames_.back().by_code = true;
     }
   };
@@ -248,7 +251,7 @@ void Reader::modal_calls() {
   }
   const ModalCall& call = modal_calls_[modal_calls_.size() - 1 - inside];
   if ((moved_ || call.every_block) && call.arguments.repeats > 0) {
-    if (enter(call.arguments.program, call.arguments, true, call.arguments.repeats, 1, "")) {
+    if (enter(call.arguments, true, 1, "")) {
       frames_.back().modal = true;
     }
   }
@@ -281,8 +284,9 @@ ProgramUnit* Reader::lookup(std::int64_t number) {
   return unit;
 }
 
-bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool macro, int repeats, std::uint32_t column,
-                   std::string_view text, const std::string& by) {
+bool Reader::enter(const MacroArguments& arguments, bool macro, std::uint32_t column, std::string_view text,
+                   const std::string& by) {
+  const std::int64_t number = arguments.program;
   ProgramUnit* unit = lookup(number);
   const bool shut = unit != nullptr && is_shut(number);
   if (shut && text.empty()) {
@@ -330,7 +334,7 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
   frame.unit = unit;
   frame.place = unit->first;
   frame.macro = macro;
-  frame.repeats = repeats;
+  frame.repeats = arguments.repeats;
   frame.arguments = arguments;
   frames_.push_back(std::move(frame));
   return true;

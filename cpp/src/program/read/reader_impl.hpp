@@ -122,8 +122,8 @@ class Reader {
   void macro_call(const ParsedBlock& block, std::string_view raw, int g_tenths);
   void bound_call(const ParsedBlock& block, std::string_view raw);
   void modal_calls();
-  bool enter(std::int64_t number, const MacroArguments& arguments, bool macro, int repeats, std::uint32_t column,
-             std::string_view text, const std::string& by = {});  // false: the call was kept as it stands
+  bool enter(const MacroArguments& arguments, bool macro, std::uint32_t column, std::string_view text,
+             const std::string& by = {});  // false: the call was kept as it stands
   ProgramUnit* lookup(std::int64_t number);
   void leave();
   void put_without(const ParsedBlock& block, const std::function<bool(const Word&)>& left_out);

@@ -43,7 +43,7 @@ CHANNELS: Mapping[str, Channel] = {
     ),
     "vibration": Channel("vibration", "µm", "Distance of the table from where the control wants it at that instant."),
     "speed": Channel("speed", "mm/min", "Speed of the command; corners and short blocks are slow."),
-    "acceleration": Channel("acceleration", "m/s²", "Acceleration of the command: what shakes the machine."),
+    "acceleration": Channel("acceleration", "m/s²", "Acceleration of the command: what excites the vibration modes."),
     "block_s": Channel("time per block", "s", "How long the block under the tool takes: what is slow shows bright."),
     "force": Channel("force", "N", "Cutting force, or force of the motors where the plant has drives."),
 }
@@ -143,13 +143,6 @@ def packed(scene: Scene) -> tuple[dict[str, Any], str]:
 
     Numbers are 16-bit ranks between the least and the largest value of their column (`low`, `high`), stored as
     differences modulo 65536 (`u2d`); samples, lines and blocks are 32-bit differences (`i4d`).
-
-    Args:
-        scene: to pack.
-
-    Returns:
-        A head for JSON, which says of every column at which byte it begins, how many numbers it has, of which kind and
-        between which limits; and the bytes, compressed by gzip, in base64.
     """
     body = bytearray()
 
