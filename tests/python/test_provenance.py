@@ -88,10 +88,115 @@ frequency_hz = 2  # second
         "axes.z.modes": "rigid",
     }
     changed = with_remarks(text, lambda key, remark: f"<{remark}>" if remark else "")
-    assert (
-        with_remarks(changed, lambda key, remark: re.sub("[<>]", "", remark)).replace("'  # close", "'# close") == text
-    )
-    assert tomllib.loads(changed) == tomllib.loads(text)
+    again = with_remarks(changed, lambda key, remark: re.sub("[<>]", "", remark)).replace("'  # close", "'# close")
+    assert again.partition("\n\n[origin]")[0] + "\n" == text
+    data = tomllib.loads(changed)
+    assert data.pop("origin")["axes"] == {
+        "x": {"value": "stated: <close>", "unset": "stated: <not known>",
+              "modes": {"2": {"frequency_hz": "stated: <second>"}}},
+        "z": {"modes": "stated: <rigid>"},
+    }  # fmt: skip
+    assert data == tomllib.loads(text)
+
+
+AXES = "".join(
+    f"[axes.{axis}]\nmax_feed_mm_per_min = 1e4\nrapid_mm_per_min = 2e4\nmax_acceleration_mm_s2 = 3e3\n"
+    for axis in "xyz"
+)
+FEED = "axes.x.max_feed_mm_per_min"
+
+
+@pytest.mark.parametrize(
+    ("word", "origin", "unmeasured"),
+    [
+        ("measured: tap of 3 May", "measured", False),
+        ("parameters", "dump", False),
+        ("inherited: from VX500", "inherited", True),
+        ("assumed", "assumed", True),
+        ("choice", "choice", False),
+        ("stated: measured? no", "file", False),
+    ],
+)
+def test_an_origin_is_stated_as_data(word: str, origin: str, unmeasured: bool) -> None:
+    table = f'name = "m"\n{AXES}[origin]\n{FEED} = "{word}"\n'
+    inline = f'name = "m"\n{AXES}'.replace("= 1e4", f'= {{ value = 1e4, origin = "{word}" }}', 1)
+    for text in (table, inline, table.replace(f"[origin]\n{FEED}", "[origin.axes.x]\nmax_feed_mm_per_min")):
+        machine = sg.Machine.from_toml(text)
+        assert (machine.axes.x.max_feed_mm_per_min, machine.origin_warning) == (1e4, "")
+        (value,) = (each for each in machine.values() if each.key == FEED)
+        assert (value.origin, value.unmeasured) == (origin, unmeasured)
+        for written in (machine.to_toml(), machine.to_toml(short=True)):
+            assert origins(sg.Machine.from_toml(written))[FEED] == origin
+
+
+def test_comments_say_nothing_where_origins_are_data() -> None:
+    text = f'name = "m"\n{AXES}'.replace("= 1e4", "= 1e4  # measured").replace("= 2e4", "= 2e4  # measured? no")
+    described = text.replace("[axes.x]", 'description = """\n[axes.x]\nrapid_mm_per_min = 1  # measured\n"""\n[axes.x]')
+    for each in (described, described + f'[origin]\n{FEED} = "assumed"\n'):
+        machine = sg.Machine.from_toml(each)
+        new = "[origin]" in each
+        found = origins(machine)
+        assert (found[FEED], found["axes.y.max_feed_mm_per_min"]) == (("assumed", "file") if new else ("measured",) * 2)
+        assert found["axes.x.rapid_mm_per_min"] == ("file" if new else "assumed")
+        assert bool(machine.origin_warning) != new
+        assert "rapid_mm_per_min = 20000.0  # measured\n" not in machine.to_toml()
+    guessed = sg.Machine.from_toml(text.replace("# measured", "# guess", 1))
+    assert origins(guessed)[FEED] == "assumed"
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (f'{FEED} = "guess"', 'origin.axes.x.max_feed_mm_per_min = "guess": must be measured, parameters'),
+        (f'{FEED} = "measured? no"', "must be measured, parameters"),
+        (f"{FEED} = 3", "must be measured, parameters"),
+        ('axes.x.modes.1.frequency_hz = "measured"', "no such key of this machine"),
+    ],
+)
+def test_a_wrong_origin_is_an_error_with_its_line(line: str, message: str) -> None:
+    with pytest.raises(sg.MachineError) as wrong:
+        sg.Machine.from_toml(f'name = "m"\n{AXES}[origin]\n{line}\n', "m.toml")
+    assert str(wrong.value).startswith("m.toml:15: origin.axes.x.")
+    assert message in str(wrong.value)
+    with pytest.raises(sg.MachineError, match=r"^m\.toml:3: origin\.axes\.x\.max_feed"):
+        sg.Machine.from_toml(f'name = "m"\n{AXES}'.replace("1e4", '{ value = 1e4, origin = "?" }', 1), "m.toml")
+
+
+def test_an_older_file_is_rewritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "old.toml"
+    old = f'name = "m"\n{AXES}'.replace("= 1e4", "= 1e4  # measured: by me", 1).replace("= 2e4", "= 2e4  # FANUC 1420")
+    file.write_text(old)
+    assert main(["machine", "show", str(file)]) == 0
+    assert "--write-origins" in capsys.readouterr().out
+    part = tmp_path / "part.nc"
+    part.write_text("%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X2.F600\nM30\n%\n")
+    main(["time", str(part), "-m", str(file)])
+    assert f"shapegcode machine show {file} --write-origins" in capsys.readouterr().err
+    assert main(["machine", "show", str(file), "--write-origins"]) == 0
+    new = file.read_text()
+    assert new.startswith(old)
+    assert tomllib.loads(new)["origin"]["axes"]["x"] == {
+        "max_feed_mm_per_min": "measured: by me", "rapid_mm_per_min": "parameters: FANUC 1420",
+    }  # fmt: skip
+    assert origins(sg.Machine.load(file)) == origins(sg.Machine.from_toml(old))
+    capsys.readouterr()
+    main(["time", str(part), "-m", str(file)])
+    assert "write-origins" not in capsys.readouterr().err
+    assert main(["machine", "show", str(file), "--write-origins"]) == 0
+    assert file.read_text() == new
+
+
+def test_an_update_moves_the_origins_with_the_modes() -> None:
+    text = sg.Machine.load("vx500").to_toml(short=True)
+    two = update_modes(text, "x", [identified(47.0), identified(90.0)], source="tap", keep_modes="y").text
+    one = update_modes(two, "x", [identified(90.5)], source="tap")
+    modes = tomllib.loads(one.text)["origin"]["axes"]["x"]["modes"]
+    assert list(modes) == ["1"]
+    assert modes["1"]["frequency_hz"] == "measured: 95 %: 90.4095 ... 90.5905"
+    # A value with its origin beside it is written into the table first.
+    inline = f'name = "m"\n{AXES}'.replace("= 1e4", '= { value = 1e4, origin = "measured" }', 1)
+    machine = update_modes(inline, "y", [identified(50.0)], source="tap").machine
+    assert (origins(machine)[FEED], machine.axes.x.max_feed_mm_per_min) == ("measured", 1e4)
 
 
 def test_init_inherits_what_was_measured_on_the_built_in_machine(tmp_path: Path) -> None:
@@ -222,6 +327,7 @@ def test_a_tap_on_x_does_not_keep_the_mode_of_another_machine_in_y(started: Path
     assert (rigid.machine.axes.y.modes, rigid.machine.axes.y.rigid, rigid.machine.axes.z.rigid) == ((), True, True)
     assert origins(rigid.machine)["axes.x.modes.1.frequency_hz"] == "measured"
     before, after = tomllib.loads(text), tomllib.loads(rigid.text)
+    assert (before.pop("origin")["axes"]["y"]["modes"]["1"], after.pop("origin")["axes"]["y"]) != ({}, {})
     for axis, table in (("x", before), ("x", after), ("y", before)):
         table["axes"][axis].pop("modes")
     for axis in "yz":
@@ -263,11 +369,14 @@ def test_rigid_changes_nothing_else(name: str, end: str) -> None:
     text = sg.Machine.builtin_text(name).replace("\n", end)
     update = update_modes(text, "x", [identified(47.0)], source="tap", rigid="yz")
     plain = update_modes(text, "x", [identified(47.0)], source="tap")
-    wanted = tomllib.loads(plain.text)
+    wanted, found = tomllib.loads(plain.text), tomllib.loads(update.text)
+    said, here = (each.pop("origin")["axes"] for each in (wanted, found))
+    assert here["x"] == said["x"]
+    assert [here[axis]["rigid"] for axis in "yz"] == ["stated: decided: no mode of it counts"] * 2
     for axis in "yz":
         wanted["axes"][axis].pop("modes", None)
         wanted["axes"][axis]["rigid"] = True
-    assert tomllib.loads(update.text) == wanted
+    assert found == wanted
     assert set(re.findall(r"\r?\n", update.text)) == {end}
 
 

@@ -50,7 +50,7 @@ def test_answers_become_a_short_file_that_says_why(tmp_path: Path) -> None:
     """What was answered stands in it, what nobody said is a default or marked as assumed."""
     said = answered(tmp_path)
     text = (tmp_path / "m.toml").read_text()
-    assert len(text.splitlines()) < 45
+    assert len(text.partition("[origin]")[0].splitlines()) < 45
     data = tomllib.loads(text)
     assert data["axes"]["z"]["rapid_mm_per_min"] == 18000.0
     assert data["axes"]["x"]["modes"] == [{"frequency_hz": 46.0, "damping_ratio": 0.02}]
@@ -89,7 +89,9 @@ def test_init_writes_the_short_form_of_the_same_machine(name: str, tmp_path: Pat
         assert run(tmp_path, "machine", "init", name, "-o", f"m{len(words)}.toml", *words).returncode == 0
     short, full = (sg.Machine.load(tmp_path / f"m{count}.toml") for count in (0, 1))
     assert short == full
-    lines = [len((tmp_path / f"m{count}.toml").read_text().splitlines()) for count in (0, 1)]
+    texts = [(tmp_path / f"m{count}.toml").read_text().partition("[origin]") for count in (0, 1)]
+    lines = [len(text.splitlines()) for text, _, _ in texts]
+    assert len(texts[0][2]) < len(texts[1][2])
     assert lines[0] < lines[1] / 4
     ours, theirs = ({value.key: value for value in each.values()} for each in (short, full))
     for key, value in ours.items():
@@ -362,7 +364,7 @@ def test_schemas_for_editors_take_real_files_and_refuse_wrong_ones(kind: str, tm
     model, files = MODELS[kind]
     done = run(tmp_path, "machine", "schema", kind)
     found = json.loads(done.stdout)
-    assert found == toml_schema(model, f"{kind} file of shapegcode")
+    assert found == toml_schema(model, f"{kind} file of shapegcode", origins=kind == "machine")
     jsonschema.Draft202012Validator.check_schema(found)
     for file in files:
         data = tomllib.loads((ROOT / file).read_text())
@@ -377,7 +379,7 @@ def test_schemas_for_editors_take_real_files_and_refuse_wrong_ones(kind: str, tm
 def test_the_schema_takes_what_is_written_and_documented(tmp_path: Path) -> None:
     """The file of a dialogue, short and full forms, the first example of the manual; not a value beyond its limit."""
     answered(tmp_path)
-    found = toml_schema(sg.Machine, "")
+    found = toml_schema(sg.Machine, "", origins=True)
     example = re.search(r"```toml\n(.*?)```", (ROOT / "docs" / "reference" / "machine.md").read_text(), re.DOTALL)
     assert example is not None
     sg.Machine.from_toml(example[1], "example")
@@ -385,8 +387,15 @@ def test_the_schema_takes_what_is_written_and_documented(tmp_path: Path) -> None
     for text in ((tmp_path / "m.toml").read_text(), machine.to_toml(), example[1]):
         data = tomllib.loads(text)
         jsonschema.validate(data, found)
-        data["axes"]["x"]["rapid_mm_per_min"] = 0
-        with pytest.raises(jsonschema.ValidationError, match="exclusive"):
+        limits = data["axes"]["x"]
+        limits["rapid_mm_per_min"] = {"value": limits["rapid_mm_per_min"], "origin": "measured: stopwatch"}
+        jsonschema.validate(data, found)
+        for wrong in (0, {"value": 1e4, "origin": "guess"}, {"value": 1e4}):
+            limits["rapid_mm_per_min"] = wrong
+            with pytest.raises(jsonschema.ValidationError, match=r"exclusive|guess|valid under any|required"):
+                jsonschema.validate(data, found)
+        limits["rapid_mm_per_min"], data["origin"] = 1e4, {"axes.x.rapid_mm_per_min": "guess"}
+        with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(data, found)
 
 

@@ -18,6 +18,7 @@ import shapegcode as sg
 from command import run
 from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.revive import MODULES
+from test_feed_schedule import ALLOWANCE, CORNER, tool
 
 NO_UNIT = "%\nO1\nG17G90G94\nG0X0Y0Z0\nG1X2.F600\nG3X4.Y2.R2.\nG1Y4.\nG0Z5.\nM30\n%\n"
 UNITS = "power_on.units"
@@ -102,9 +103,9 @@ RESULTS: dict[str, Callable[[], sg.Result]] = {
     "study": lambda: sg.study(
         sg.Program.from_text(SHAPED), METRIC, {"axes.x.modes.1.frequency_hz": sg.uniform(45, 47)}, n=2
     ),
-    "corner_demo": sg.corner_demo,
-    "shaper_demo": sg.shaper_demo,
-    "tap_demo": sg.tap_demo,
+    "schedule_feed": lambda: sg.schedule_feed(
+        sg.Program.from_text(CORNER), METRIC, tool(), sg.Stock.from_toml(ALLOWANCE)
+    ),
 }
 
 

@@ -87,6 +87,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="convert this program, and rank the unverified parameters by how far each changes its verdict",
     )
+    show.add_argument(
+        "--write-origins",
+        action="store_true",
+        help="write where the values come from as a table [origin] into the file: of an older one, whose comments say "
+        "it, or of values with an origin beside them",
+    )
     add_result_arguments(show)
 
     diff = actions.add_parser(
@@ -176,10 +182,34 @@ def _show(args: argparse.Namespace) -> int:
     from shapegcode.machine.description_result import describe_machine
 
     runner.check_files(args)
+    if args.write_origins:
+        _write_origins(args.machine)
     found = replace(describe_machine(args.machine), source=args.machine)
     if args.input is not None:
         found = _ranked(found, args)
     return runner.finish(found, args, tables=found.tables(everything=args.verbose))
+
+
+def _write_origins(name: str) -> None:
+    """Write where the values of a machine file come from as a table into it; everything else stays.
+
+    Raises:
+        ArgumentError: a built-in machine.
+        MachineError, OSError: the file is bad, or cannot be read or written.
+    """
+    from pathlib import Path
+
+    from shapegcode.identification.update import check_updatable
+    from shapegcode.io.atomic import write_text
+    from shapegcode.machine import Machine
+    from shapegcode.settings.remarks import with_origin_table
+
+    check_updatable(name)
+    text = Path(name).read_bytes().decode("utf-8")
+    mark = "\ufeff" if text.startswith("\ufeff") else ""
+    new = with_origin_table(text.removeprefix(mark))
+    Machine.from_toml(new, name)
+    write_text(name, mark + new)
 
 
 def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescription:
@@ -239,7 +269,9 @@ def file_schema(kind: str) -> str:
 
     title = f"{kind} file of shapegcode"
     models: dict[str, type[TomlTable]] = {"machine": Machine, "tool": Tool, "stock": Stock}
-    return to_text(study_schema(title) if kind == "study" else toml_schema(models[kind], title))
+    if kind == "study":
+        return to_text(study_schema(title))
+    return to_text(toml_schema(models[kind], title, origins=kind == "machine"))
 
 
 def _schema(args: argparse.Namespace) -> int:

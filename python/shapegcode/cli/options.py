@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -99,6 +100,8 @@ def load_machine(args: argparse.Namespace) -> Machine:
     from shapegcode.machine import Machine
 
     machine = Machine.load(args.machine)
+    if machine.origin_warning:
+        print(f"warning: {args.machine}: {machine.origin_warning}".replace("FILE", args.machine), file=sys.stderr)
     values = {}
     for assignment in args.set:
         key, sign, text = assignment.partition("=")

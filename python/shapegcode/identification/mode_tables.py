@@ -25,7 +25,7 @@ from shapegcode.settings.edit import (
     take_tail,
 )
 from shapegcode.settings.keys import toml
-from shapegcode.settings.remarks import remarks_of
+from shapegcode.settings.remarks import remarks_of, with_origin_table
 
 __all__ = ["ModeTables"]
 
@@ -62,6 +62,7 @@ class ModeTables:
         Raises:
             ArgumentError: modes or axis are written in a way in which they cannot be edited.
         """
+        text = with_origin_table(text)
         self.newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
         self._last_end = "" if text.endswith("\n") else self.newline
         self.document = parse_exactly(text + self._last_end, file)
@@ -72,12 +73,15 @@ class ModeTables:
         self.name = f"axes.{self.axis}.modes"
         self.old: list[dict[str, Any]] = list(self.data["axes"][self.axis].get("modes", []))
         self.expected: list[dict[str, Any]] = []
-        self._rigid_remark = remarks_of(text).get(f"axes.{axis}.rigid", "")
+        self._remarks = remarks_of(text)
+        self._said: dict[int, dict[str, str]] = {}
+        """Of a table, by its identity: where the values that were put into it come from."""
         self.home = self._axis_table()
         self.tables: list[Table] = next(
             (item.body for key, item in self.home.value.body if isinstance(item, AoT) and _is_modes(key, item)),
             [],
         )
+        self._before = list(self.tables)
         if len(self.tables) != len(self.old):
             raise ArgumentError(
                 f"{self.file}: the modes of the {self.axis.upper()} axis are written inline; write each as a table "
@@ -125,11 +129,11 @@ class ModeTables:
         said = self.data["axes"][self.axis].get("rigid")
         if said:
             self.notes.append("it was said to be rigid: that is taken back")
-        if said or (said is False and self._rigid_remark.startswith("assumed")):
+        if said or (said is False and self._remarks.get(f"axes.{self.axis}.rigid", "").startswith("assumed")):
             self._say_rigid(False, "a mode was measured")
         text = self.document.as_string()
         self._check(text)
-        return text.removesuffix(self._last_end)
+        return self._with_origins(text, [*stay, *added])
 
     def make_rigid(self) -> str:
         """The text without modes of the axis, which is said to be rigid.
@@ -147,9 +151,24 @@ class ModeTables:
         self._say_rigid(True, "decided: no mode of it counts")
         text = self.document.as_string()
         self._check(text, rigid=True)
-        return text.removesuffix(self._last_end)
+        return self._with_origins(text, [])
+
+    def _with_origins(self, text: str, tables: Sequence[Table]) -> str:
+        """The new text with the origins of the modes where they are now."""
+        found = {key: remark for key, remark in self._remarks.items() if not key.startswith(self.name)}
+        before = {id(table): number for number, table in enumerate(self._before, start=1)}
+        for number, table in enumerate(tables, start=1):
+            was = before.get(id(table))
+            held = self.old[was - 1].keys() if was else set()
+            stem = f"{self.name}.{was}."
+            old = {key.removeprefix(stem): said for key, said in self._remarks.items() if key.startswith(stem)}
+            gone = held - table.keys()
+            said = {key: remark for key, remark in old.items() if key not in gone} | self._said.get(id(table), {})
+            found |= {f"{self.name}.{number}.{key}": remark for key, remark in said.items() if remark}
+        return with_origin_table(text, found)
 
     def _say_rigid(self, rigid: bool, remark: str) -> None:
+        self._remarks[f"axes.{self.axis}.rigid"] = remark
         self._put(self.home.value.body, {"rigid": (rigid, remark)})
 
     def _old_tables(
@@ -215,6 +234,7 @@ class ModeTables:
                 entries[:] = [entry for entry in entries if entry[0] is None or entry[0].key != key]
                 self.notes.append(f"removed {key} = {toml(old[key])}: a decay without force gives no mass")
         self._put(entries, values)
+        self._said[id(table)] = {key: remark for key, (_, remark) in values.items()}
         self.expected.append(
             {key: value for key, value in old.items() if key not in _KEYS}
             | {key: old[key] for key in ("frequency_uncertainty_percent",) if key in old}
@@ -267,6 +287,7 @@ class ModeTables:
         lines = ["[[modes]]", *(_line(key, value, remark) for key, (value, remark) in values.items())]
         (_, tables), *_ = tomlkit.parse("".join(line + self.newline for line in lines)).body
         assert isinstance(tables, AoT)
+        self._said[id(tables.body[0])] = {key: remark for key, (_, remark) in values.items()}
         return tables.body[0]
 
     def _tell_sum(self, modes: Sequence[IdentifiedMode]) -> None:

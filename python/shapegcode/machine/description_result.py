@@ -45,7 +45,7 @@ class MachineDescription(Result):
     Attributes:
         machine: the tables of the machine file, defaults as well.
         keys: every value by its dotted key, in the order of the file.
-        warnings: none.
+        warnings: that its origins are read from comments, as older files have them.
         program: for which the values that nobody measured were ranked; None: for none.
         matters: those of them that move its verdict, the furthest first.
         source: file of the machine, or its name, where that is known.
@@ -192,4 +192,5 @@ def describe_machine(machine: Machine | str | Path) -> MachineDescription:
     """
     loaded = machine if isinstance(machine, Machine) else Machine.load(machine)
     keys = {value.key: value for value in loaded.values()}
-    return MachineDescription(loaded.model_dump(mode="json"), keys)
+    warnings = (loaded.origin_warning,) if loaded.origin_warning else ()
+    return MachineDescription(loaded.model_dump(mode="json"), keys, warnings)

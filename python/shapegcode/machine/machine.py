@@ -30,9 +30,18 @@ from shapegcode.settings import change
 from shapegcode.settings.describe import values_of, write_short_toml, write_toml
 from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
-from shapegcode.settings.problems import KeyProblem
+from shapegcode.settings.problems import KeyProblem, line_of
 from shapegcode.settings.reference import documentation
-from shapegcode.settings.remarks import DEFAULT, inherited, remarks_of, with_remarks
+from shapegcode.settings.remarks import (
+    DEFAULT,
+    ORIGIN_TEXT,
+    inherited,
+    origin_of,
+    remark_of,
+    remarks_in_comments,
+    take_origins,
+    with_remarks,
+)
 
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
 _VARIABLE = re.compile(r"#\d+")
@@ -134,6 +143,7 @@ class Machine(TomlTable):
         return self
 
     _remarks: dict[str, str] = PrivateAttr(default_factory=dict)
+    _origins_in_comments: bool = PrivateAttr(default=False)
 
     def __eq__(self, other: object) -> bool:
         """Whether the values are the same, wherever they come from."""
@@ -149,6 +159,16 @@ class Machine(TomlTable):
     def remarks(self) -> Mapping[str, str]:
         """What stands behind the values in the file, by dotted key: where they come from."""
         return self._remarks
+
+    @property
+    def origin_warning(self) -> str:
+        """What to do about a file of the old form, whose comments say where values come from; empty: nothing."""
+        if not self._origins_in_comments:
+            return ""
+        return (
+            "where its values come from is read from comments, as files before [origin] have it: "
+            "shapegcode machine show FILE --write-origins writes it as a table"
+        )
 
     def all_remarks(self) -> dict[str, str]:
         """The remarks with one for every default: what is written down looks like a statement, and it stays one.
@@ -312,8 +332,21 @@ class Machine(TomlTable):
         Raises:
             MachineError: wrong keys or values; every problem is listed.
         """
-        machine = validated(cls, data, source, text, MachineError)
-        machine._remarks = remarks_of(text)
+        plain, stated = take_origins(data)
+        machine = validated(cls, plain, source, text, MachineError)
+        if stated is None:
+            machine._remarks = remarks_in_comments(text)
+            machine._origins_in_comments = any(origin_of(said) != "file" for said in machine._remarks.values())
+            return machine
+        keys = {value.key: value.value for value in machine.values()}
+        problems = [
+            Problem(f"origin.{key}", toml(said), limit, line_of(f"origin.{key}", text) or line_of(key, text))
+            for key, said in stated.items()
+            if (limit := _wrong_origin(key, said, keys))
+        ]
+        if problems:
+            raise MachineError(source, tuple(problems))
+        machine._remarks = {key: remark_of(said) for key, said in stated.items()}
         return machine
 
     @staticmethod
@@ -393,6 +426,18 @@ class Machine(TomlTable):
     def values(self) -> list[KeyValue]:
         """Every key with its value and origin, in the order of the file."""
         return list(values_of(self, remarks=self._remarks))
+
+
+def _wrong_origin(key: str, said: object, keys: Mapping[str, str]) -> str:
+    """What an origin must be; empty: it is so."""
+    if key not in keys and not any(key.startswith(f"{each}.") and keys[each].startswith("{") for each in keys):
+        return "no such key of this machine (modes count from 1): take the line out"
+    if isinstance(said, str) and re.match(ORIGIN_TEXT, said):
+        return ""
+    return (
+        "must be measured, parameters (of the control), inherited, assumed, choice, default or stated; a note may "
+        'follow: "measured: tap of 3 May"'
+    )
 
 
 _OF_A_MACHINE = ("axes.", "controller.", "times.", "power_on.", "feed_control.")

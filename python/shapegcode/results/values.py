@@ -116,7 +116,7 @@ _HANDLES = frozenset(
     if isinstance(kind, type) and vars(kind).get("__eq__") is None and not issubclass(kind, BaseException)
 )
 _IN_RESULTS = (  # beside what only the core makes
-    _core.Region, _core.ModalState, _core.CornerCut, _core.Material, _core.MillingForce, _core.EndMill,
+    _core.Region, _core.ModalState, _core.Material, _core.MillingForce, _core.EndMill,
     _core.FeedStretch, _core.CuttingCoefficients, _core.ToolBeam, _core.FeedLimits,
 )  # fmt: skip
 for _kind in _HANDLES:

@@ -18,7 +18,7 @@ from shapegcode.settings.keys import (
     table_type,
     toml,
 )  # fmt: skip
-from shapegcode.settings.remarks import origin_of
+from shapegcode.settings.remarks import origin_lines, origin_of
 
 _LINE_WIDTH = 110
 
@@ -105,6 +105,7 @@ class _TomlWriter:
 
     def __init__(self, remarks: dict[str, str]) -> None:
         self._remarks = remarks
+        self._said: dict[str, str] = {}
         self._lines: list[str] = []
 
     def write(self, machine: TomlTable) -> str:
@@ -117,7 +118,18 @@ class _TomlWriter:
         self._table(machine, "")
         if self._remarks:
             raise KeyError(f"remarks for unknown keys: {', '.join(sorted(self._remarks))}")
+        return self._text()
+
+    def _text(self) -> str:
+        if said := origin_lines(self._said):
+            self._lines += [*([""] if self._lines[-1] else []), *said]
         return "\n".join(self._lines).rstrip("\n") + "\n"
+
+    def _add(self, line: str, key: str, remark: str) -> None:
+        """A line, its remark as the comment behind it: for people, what counts is the table of the origins."""
+        if remark:
+            self._said[key] = remark
+        self._lines.append(f"{line}  # {remark}" if remark else line)
 
     def _comment(self, text: str) -> None:
         self._lines += textwrap.wrap(
@@ -159,16 +171,14 @@ class _TomlWriter:
         unit = f" [{info.unit}]" if info.unit and info.unit != "1" else ""
         fanuc = f" (FANUC parameter {info.fanuc})" if info.fanuc else ""
         self._comment(f"{meaning}{unit}{fanuc}.")
-        remark = self._remarks.pop(key, "")
         line = f"# {name} = ..." if value is None else f"{name} = {toml(value)}"
-        self._lines.append(f"{line}  # {remark}" if remark else line)
+        self._add(line, key, self._remarks.pop(key, ""))
 
     def _list(self, key: str, field: FieldInfo, item: type[TomlTable], tables: tuple[TomlTable, ...]) -> None:
         if not tables:
             self._lines.append("")
             self._comment(f"{key}: {field.description}.")
-            remark = self._remarks.pop(key, "")
-            self._lines.append(f"# [[{key}]]" + (f"  # {remark}" if remark else ""))
+            self._add(f"# [[{key}]]", key, self._remarks.pop(key, ""))
             self._lines += [f"# {name} = ..." for name, inner in item.model_fields.items() if inner.is_required()]
         for number, table in enumerate(tables, start=1):
             self._head(f"[[{key}]]", (item.__doc__ or "").rstrip(".") if number == 1 else "")
@@ -183,7 +193,7 @@ class _ShortWriter(_TomlWriter):
         self._comment(_SHORT_HEAD)
         self._lines.append("")
         self._table(machine, "")
-        return "\n".join(self._lines).rstrip("\n") + "\n"
+        return self._text()
 
     def _table(self, table: TomlTable, prefix: str) -> None:
         """Head and keys of a table alone where something is left of it."""
@@ -193,9 +203,8 @@ class _ShortWriter(_TomlWriter):
             if (isinstance(value, TomlTable) and not isinstance(value, InlineTable)) or item_type(field):
                 below.append((f"{prefix}{name}", field, value))
             elif self._is_told(f"{prefix}{name}", table, name, field):
-                remark = self._remarks.get(f"{prefix}{name}", "")
                 line = f"# {name} = ..." if value is None else f"{name} = {toml(value)}"
-                self._lines.append(f"{line}  # {remark}" if remark else line)
+                self._add(line, f"{prefix}{name}", self._remarks.get(f"{prefix}{name}", ""))
         for key, field, value in below:
             if item_type(field):
                 self._short_list(key, value)
@@ -216,7 +225,7 @@ class _ShortWriter(_TomlWriter):
     def _short_list(self, key: str, tables: tuple[TomlTable, ...]) -> None:
         remark = self._remarks.get(key, "")
         if not tables and remark:
-            self._lines.append(f"# [[{key}]]  # {remark}")
+            self._add(f"# [[{key}]]", key, remark)
         for number, table in enumerate(tables, start=1):
             self._short_table(f"[[{key}]]", table, f"{key}.{number}.")
 

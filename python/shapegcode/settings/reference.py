@@ -12,27 +12,36 @@ _EXAMPLE = """\
 name = "VMC-3"
 
 [axes.x]
-max_feed_mm_per_min = 12000.0  # manual
-rapid_mm_per_min = 24000.0  # manual
-max_acceleration_mm_s2 = 3000.0  # assumed: 0.3 g, usual for a machining centre
+max_feed_mm_per_min = 12000.0
+rapid_mm_per_min = 24000.0
+max_acceleration_mm_s2 = 3000.0
 
 [[axes.x.modes]]
-frequency_hz = 46.0  # measured: tap test
-damping_ratio = 0.02  # measured: tap test
+frequency_hz = 46.0
+damping_ratio = 0.02
 
 [axes.y]
-max_feed_mm_per_min = 12000.0  # manual
-rapid_mm_per_min = 24000.0  # manual
-max_acceleration_mm_s2 = 3000.0  # assumed: 0.3 g, usual for a machining centre
+max_feed_mm_per_min = 12000.0
+rapid_mm_per_min = 24000.0
+max_acceleration_mm_s2 = 3000.0
 
 [axes.z]
-max_feed_mm_per_min = 12000.0  # manual
-rapid_mm_per_min = 18000.0  # manual
-max_acceleration_mm_s2 = 3000.0  # assumed: 0.3 g, usual for a machining centre
-rigid = true  # decided: nothing of it was seen in the tap test
+max_feed_mm_per_min = 12000.0
+rapid_mm_per_min = 18000.0
+max_acceleration_mm_s2 = 3000.0
+rigid = true
 
 [controller]
-dnc_baud = 9600  # the line that feeds programs
+dnc_baud = 9600  # a comment is for people
+
+[origin]
+axes.x.max_acceleration_mm_s2 = "assumed: 0.3 g, usual for a machining centre"
+axes.x.modes.1.frequency_hz = "measured: tap test"
+axes.x.modes.1.damping_ratio = "measured: tap test"
+axes.y.max_acceleration_mm_s2 = "assumed: 0.3 g, usual for a machining centre"
+axes.z.max_acceleration_mm_s2 = "assumed: 0.3 g, usual for a machining centre"
+axes.z.rapid_mm_per_min = "parameters: FANUC 1420"
+axes.z.rigid = "stated: nothing of it was seen in the tap test"
 """
 
 
@@ -71,10 +80,14 @@ def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
         "both are checked as the file is. Modes count from 1 in every key (`machine show`, `--set`, `with_values`,",
         "`study`, `optimize`): `axes.x.modes.1.frequency_hz` is the first mode of X, `axes.x.modes.0` an error.",
         "",
-        "Where a value comes from stands behind it, and its first words count: `# measured ...`, `# FANUC 1622`",
-        "(of the control's dump), `# from VX500: ...` (inherited from another machine), `# assumed ...`,",
-        "`# choice` (a property of no machine); anything else is what the file states. `machine show` counts",
-        "them, and a verdict ends with those that it depends on and that are unverified.",
+        "Where a value comes from (its provenance) stands in the table `[origin]`, by its key, or beside it:",
+        '`frequency_hz = { value = 46.2, origin = "measured" }`. The text begins with `measured`, `parameters`',
+        "(of the control), `inherited` (from another machine), `assumed`, `choice` (a property of no machine),",
+        '`default` or `stated`, and a note may follow: `"measured: tap of 3 May"`. A value without an origin is',
+        "what the file states. Comments are for people and never read. Older files have neither form: the first",
+        "words of their comments count (`# measured ...`), with a warning; `shapegcode machine show FILE",
+        "--write-origins` writes the table into the file. `machine show` counts the origins, and a verdict ends",
+        "with those that it depends on and that are unverified.",
         "",
         "A default marked **assumed** is not known for real controllers in general: look it up or measure",
         "it. The FANUC column names the parameter that corresponds to a key; numbers differ between series,",

@@ -1,21 +1,42 @@
-"""Where the values of a file come from: the comment behind each value says it, and its first words count.
+"""Where the values of a machine file come from: the table ``[origin]``, each text begins with a word.
 
-    frequency_hz = 46.2   # measured, 95 %: 46.1 ... 46.3
-    time_constant_s = 0.1 # FANUC 1622, 1610
-    block_time_s = 0.005  # from VX500: paper 000
-    rapid_path = "linear" # assumed
+    [origin]
+    axes.x.modes.1.frequency_hz = "measured, 95 %: 46.1 ... 46.3"
+    controller.time_constant_s = "parameters: FANUC 1622, 1610"
+    controller.block_time_s = "inherited: from VX500: paper 000"
 
-So an origin stands where people see it beside its value, and needs no second table.
+Or beside the value: ``frequency_hz = { value = 46.2, origin = "measured" }``. A comment is for people and says nothing;
+only in files without either form, as they were written before, the first words of the comments count.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-__all__ = ["DEFAULT", "MEASURED", "Origin", "inherited", "open_brackets", "origin_of", "remarks_of", "with_remarks"]
+import tomlkit
+from tomlkit.items import AoT, InlineTable, Table
+
+__all__ = [
+    "DEFAULT",
+    "MEASURED",
+    "ORIGIN",
+    "ORIGIN_TEXT",
+    "Origin",
+    "inherited",
+    "open_brackets",
+    "origin_lines",
+    "origin_of",
+    "remark_of",
+    "remarks_in_comments",
+    "remarks_of",
+    "take_origins",
+    "with_origin_table",
+    "with_remarks",
+]
 
 Origin = Literal["measured", "dump", "inherited", "assumed", "choice", "file", "default"]
 """Of a value: measured on this machine; read from the control's dump; taken over from another machine; assumed; a
@@ -27,11 +48,26 @@ MEASURED = "measured"
 DEFAULT = "default"
 """The remark of a default that was written into a file."""
 
+ORIGIN = "origin"
+"""Name of the table, and of the key beside an inline value."""
+
+_WORDS: dict[Origin, str] = {
+    "measured": "measured",
+    "dump": "parameters",
+    "inherited": "inherited",
+    "assumed": "assumed",
+    "choice": "choice",
+    "default": "default",
+    "file": "stated",
+}
+ORIGIN_TEXT = rf"^({'|'.join(_WORDS.values())})($|: .|, .| \(.)"
+"""What the text of an origin begins with; a note may follow."""
+
 _BEGINNINGS: tuple[tuple[str, Origin], ...] = (
-    (r"measured\b|95 %:|half of the 95 %", "measured"),
-    (r"FANUC \S", "dump"),
-    (r"from \S", "inherited"),
-    (r"assumed\b|not known|not measured|.*\b(?:not measured|is assumed)$", "assumed"),
+    (r"measured\b(?!\?)|95 %:|half of the 95 %", "measured"),
+    (r"parameters\b|FANUC \S", "dump"),
+    (r"inherited\b|from \S", "inherited"),
+    (r"assumed\b|guess|estimate|measured\?|not known|not measured|.*\b(?:not measured|is assumed)$", "assumed"),
     (r"choice\b", "choice"),
     (r"default\b", "default"),
 )
@@ -80,49 +116,165 @@ class _Line:
     remark: str
 
 
+def take_origins(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """The tables of a file without what they say of where values come from, and that.
+
+    Args:
+        data: as TOML gives it.
+
+    Returns:
+        The plain tables, and by dotted key what is stated (checked by nobody); None where neither form is used.
+    """
+    found: dict[str, Any] = {}
+    inline: dict[str, Any] = {}
+    plain = {name: _plain(value, name, inline) for name, value in data.items() if name != ORIGIN}
+    if ORIGIN in data:
+        _flatten(data[ORIGIN], "", found)
+    return plain, found | inline if ORIGIN in data or inline else None
+
+
+def _plain(value: Any, key: str, inline: dict[str, Any]) -> Any:
+    if isinstance(value, list):
+        return [_plain(each, f"{key}.{number}", inline) for number, each in enumerate(value, start=1)]
+    if not isinstance(value, Mapping):
+        return value
+    if value.keys() == {"value", ORIGIN}:
+        inline[key] = value[ORIGIN]
+        return value["value"]
+    return {name: _plain(each, f"{key}.{name}", inline) for name, each in value.items()}
+
+
+def _flatten(value: Any, key: str, found: dict[str, Any]) -> None:
+    if not isinstance(value, Mapping):
+        found[key or ORIGIN] = value
+        return
+    for name, each in value.items():
+        _flatten(each, f"{key}.{name}" if key else name, found)
+
+
+def remark_of(stated: str) -> str:
+    """The remark that an origin in a file states: without the word where the note says the same.
+
+    Args:
+        stated: the word and a note.
+
+    Returns:
+        The remark; `origin_of` gives the origin of it.
+    """
+    word, _, note = stated.partition(": ")
+    return note if note and origin_of(note) == origin_of(word) else stated
+
+
+def _stated(remark: str) -> str:
+    word = _WORDS[origin_of(remark)]
+    found = re.match(ORIGIN_TEXT, remark)
+    return remark if found and found[1] == word else f"{word}: {remark}"
+
+
 def remarks_of(text: str) -> dict[str, str]:
-    """The remarks of a file.
+    """Where the values of a file come from.
+
+    Args:
+        text: TOML of a file that loads.
+
+    Returns:
+        Per dotted key (tables of a list count from 1) its remark; keys without one are left out.
+    """
+    stated = take_origins(tomllib.loads(text))[1]
+    return remarks_in_comments(text) if stated is None else {key: remark_of(said) for key, said in stated.items()}
+
+
+def remarks_in_comments(text: str) -> dict[str, str]:
+    """What stands behind the values of a file that has neither form of origins.
 
     Args:
         text: TOML of the plain layout ``[table]`` / ``key = value``.
 
     Returns:
-        Per dotted key (tables of a list count from 1) what stands behind its value; keys without a remark are left out.
+        As `remarks_of`.
     """
     return {line.key: line.remark for _, line in _lines(text) if line is not None and line.remark}
 
 
-def with_remarks(text: str, change: Callable[[str, str], str]) -> str:
-    """A file with other remarks; everything else stays byte for byte.
+def origin_lines(remarks: Mapping[str, str]) -> list[str]:
+    """The table of the origins.
 
     Args:
-        text: TOML of the plain layout.
-        change: called with dotted key and remark; gives the new remark, empty for none.
+        remarks: by dotted key.
+
+    Returns:
+        Its lines; none without remarks.
+    """
+    lines = [f"{key} = {tomlkit.string(_stated(remark)).as_string()}" for key, remark in remarks.items() if remark]
+    return [f"[{ORIGIN}]  # where values come from: {', '.join(_WORDS.values())}", *lines] if lines else []
+
+
+def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> str:
+    """A file with its origins in a table at its end; the rest stays byte for byte, but for values with an origin.
+
+    Args:
+        text: TOML of a file that loads.
+        remarks: by dotted key; None: those that it has.
 
     Returns:
         The text.
     """
+    remarks = remarks_of(text) if remarks is None else remarks
+    document = tomlkit.parse(text)
+    if take_origins(document)[1] is not None:
+        document.pop(ORIGIN, None)
+        _unwrap(document)
+        text = document.as_string()
+    newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
+    table = "".join(line + newline for line in origin_lines(remarks))
+    return text.rstrip("\r\n") + 2 * newline + table if table else text
+
+
+def _unwrap(table: Any) -> None:
+    for name, item in list(table.items()):
+        if isinstance(item, InlineTable) and item.keys() == {"value", ORIGIN}:
+            table[name] = item["value"]
+        elif isinstance(item, AoT):
+            for each in item.body:
+                _unwrap(each)
+        elif isinstance(item, Table) or (not isinstance(item, InlineTable) and isinstance(item, Mapping)):
+            _unwrap(item)
+
+
+def with_remarks(text: str, change: Callable[[str, str], str]) -> str:
+    """A file whose values come from elsewhere; comments that said the same as an origin follow it.
+
+    Args:
+        text: TOML of a file that loads.
+        change: called once with each dotted key and remark; gives the new remark, empty for none.
+
+    Returns:
+        The text, with a table of its origins; everything else stays byte for byte.
+    """
+    old = remarks_of(text)
+    new = {key: change(key, remark) for key, remark in old.items()}
     lines = []
     for raw, line in _lines(text):
-        new = "" if line is None else change(line.key, line.remark)
-        if line is None or new == line.remark:
+        if line is None or line.remark != old.get(line.key, "") or new.get(line.key, "") == line.remark:
             lines.append(raw)
             continue
-        body = raw.rstrip("\r\n")
-        lines.append(body[: line.end].rstrip() + (f"  # {new}" if new else "") + raw[len(body) :])
-    return "".join(lines)
+        body, said = raw.rstrip("\r\n"), new[line.key]
+        lines.append(body[: line.end].rstrip() + (f"  # {said}" if said else "") + raw[len(body) :])
+    return with_origin_table("".join(lines), new)
 
 
 def _lines(text: str) -> Iterator[tuple[str, _Line | None]]:
     """Every line with its end, and what it says of a key; None for every other line."""
     table, counts, inside = "", dict[str, int](), 0
-    for raw in text.splitlines(keepends=True):
+    texts = _lines_of_long_texts(text)
+    for number, raw in enumerate(text.splitlines(keepends=True)):
         line = raw.rstrip("\r\n")
-        if inside:
+        if number in texts:
+            yield raw, None
+        elif inside:
             inside += open_brackets(line)
             yield raw, None
-            continue
-        if header := _HEADER.fullmatch(line):
+        elif header := _HEADER.fullmatch(line):
             table = re.sub(r"\s*\.\s*", ".", header[2])
             if header[1] == "[[":
                 counts[table] = counts.get(table, 0) + 1
@@ -141,6 +293,19 @@ def _lines(text: str) -> Iterator[tuple[str, _Line | None]]:
             yield raw, _Line(key, end.end(), line[end.end() :].lstrip("# ").rstrip())
         else:
             yield raw, None
+
+
+_TEXT = re.compile(r"""(\"{3}(?:\\.|[^\\])*?\"{3,5}|'{3}.*?'{3,5})|"(?:\\.|[^"\\\n])*"|'[^'\n]*'|#[^\n]*""", re.DOTALL)
+
+
+def _lines_of_long_texts(text: str) -> set[int]:
+    """Lines, from 0, of texts in three quotes: nothing in them is a key or a comment."""
+    found: set[int] = set()
+    for match in _TEXT.finditer(text):
+        if match[1]:
+            first = text.count("\n", 0, match.start())
+            found.update(range(first, first + match[0].count("\n") + 1))
+    return found
 
 
 def open_brackets(line: str) -> int:

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, get_origin
 
-from shapegcode.settings.keys import TomlTable, facts, item_type, table_type
+from shapegcode.settings.keys import InlineTable, TomlTable, facts, item_type, table_type
+from shapegcode.settings.remarks import ORIGIN, ORIGIN_TEXT
 
 __all__ = ["keys_schema", "toml_schema"]
 
 
-def toml_schema(model: type[TomlTable], title: str) -> dict[str, Any]:
+def toml_schema(model: type[TomlTable], title: str, *, origins: bool = False) -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a file.
 
     Args:
         model: the table that the file is read as.
         title: of the schema.
+        origins: the file may say where its values come from.
 
     Returns:
         The schema; descriptions have the unit and the numbers of the FANUC parameters. What depends on several keys
@@ -25,7 +27,32 @@ def toml_schema(model: type[TomlTable], title: str) -> dict[str, Any]:
     for table in (found, *found.get("$defs", {}).values()):
         for entry in table.get("properties", {}).values():
             _describe(entry)
+    if origins:
+        _allow_origins(model, found, found.get("$defs", {}))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found | {"title": title}
+
+
+def _allow_origins(model: type[TomlTable], found: dict[str, Any], defs: dict[str, Any]) -> None:
+    """A table of origins, and beside each value its own; such a value is only checked when the file is read."""
+    defs["Origin"] = {"type": "string", "pattern": ORIGIN_TEXT, "description": "where the value comes from"}
+    stated = {"$ref": "#/$defs/Origin"}
+    defs["Origins"] = {"type": "object", "additionalProperties": {"anyOf": [stated, {"$ref": "#/$defs/Origins"}]}}
+    both = {"value": {}, ORIGIN: stated}
+    defs["WithOrigin"] = {"type": "object", "properties": both, "required": [*both], "additionalProperties": False}
+    beside = {"$ref": "#/$defs/WithOrigin"}
+    tables = {model: found}
+    while tables:
+        table, entry = tables.popitem()
+        for name, field in table.model_fields.items():
+            below = table_type(field)
+            if below is not None and not issubclass(below, InlineTable):
+                tables[below] = defs[below.__name__]
+                continue
+            value = entry["properties"][name]
+            if beside not in value.get("anyOf", ()):
+                said = {key: value.pop(key) for key in ("description", "default") if key in value}
+                entry["properties"][name] = {"anyOf": [*value.get("anyOf", [value]), beside]} | said
+    found["properties"][ORIGIN] = {"$ref": "#/$defs/Origins", "description": "where values come from, by key"}
 
 
 def keys_schema(model: type[TomlTable], value: dict[str, Any], kind: str, defs: dict[str, Any]) -> dict[str, Any]:
