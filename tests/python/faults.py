@@ -73,9 +73,9 @@ def sound(done: Done, *parts: str, code: int = 2) -> None:
 def changed(seed: bytes, draw: random.Random) -> bytes:
     """A valid file with something wrong in it: bits, bytes, pieces, numbers, its end."""
     data = bytearray(seed)
-    for _ in range(draw.choice((1, 1, 1, 2, 4, 16))):
+    for _ in range(draw.choice((1, 1, 1, 1, 2, 8))):
         at, end = draw.randrange(len(data) + 1), draw.randrange(len(data) + 1)
-        match draw.randrange(8):
+        match draw.choices(range(8), (3, 2, 1, 1, 2, 6, 1, 1))[0]:
             case 0 if data:
                 data[min(at, len(data) - 1)] ^= 1 << draw.randrange(8)
             case 1:
@@ -99,7 +99,22 @@ def changed(seed: bytes, draw: random.Random) -> bytes:
 
 
 _SIZES = (0, 1, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0xFFFFFFFE, 255, 65536, 1 << 24)
-_NUMBERS = (b"9" * 400, b"1" * 5000, b"-1", b"1e308", b"1e999", b"nan", b"-0", b"0x1", b"\xc2\xb2", b"", b"1.2.3")
+_NUMBERS = (
+    b"9" * 400,
+    b"1" * 5000,
+    b"-1",
+    b"1e308",
+    b"1e999",
+    b"nan",
+    b"-0",
+    b"0",
+    b"7",
+    b"12.5",
+    b"0x1",
+    b"\xc2\xb2",
+    b"",
+    b"1.2.3",
+)
 _PIECES = (
     b"\0",
     b"\xff\xfe",

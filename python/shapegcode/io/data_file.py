@@ -75,13 +75,12 @@ def open_file(path: str | Path) -> BinaryIO:
 def read_file(path: str | Path, most: int = _MAX_BYTES) -> bytes:
     """The bytes of a regular file."""
     with open_file(path) as file:
+        if os.fstat(file.fileno()).st_size > most:
+            raise OSError(errno.EFBIG, f"more than {most} bytes: no more is read at once", str(path))
         try:
-            data = file.read(most + 1)
+            return file.read()
         except OSError as error:
             raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
-    if len(data) > most:
-        raise OSError(errno.EFBIG, f"more than {most} bytes: no more is read at once", str(path))
-    return data
 
 
 class DataFile:

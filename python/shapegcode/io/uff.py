@@ -86,6 +86,8 @@ class UffFile:
             raise RecordError(
                 f"{self.path}: dataset {index + 1} (type {self.types[index]}) cannot be read: {error}"
             ) from error
+        if self.types[index] == 58 and "data" not in found:
+            raise RecordError(f"{self.path}: dataset {index + 1} holds no values: it is damaged")
         return found
 
     def channels(self) -> list[_Channel]:

@@ -14,10 +14,10 @@ from shapegcode.errors import MachineError, Problem
 
 __all__ = ["Dump", "Entry", "read_dump"]
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_NUMBER = r"[-+]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})"
 _RECORD = re.compile(r"N\s*(\d{1,6})\s*(Q\d+)?\s*(.*)", re.ASCII)
-_VALUE = re.compile(rf"(?:([LAST])\s*(\d+)\s*)?([PMI])\s*({_NUMBER})\s*", re.ASCII)
-_VALUES = re.compile(rf"(?:(?:[LAST]\s*\d+\s*)?[PMI]\s*{_NUMBER}\s*)+", re.ASCII)
+_VALUE = re.compile(rf"(?:([LAST])\s*(\d{{1,4}})\s*)?([PMI])\s*({_NUMBER})\s*", re.ASCII)
+_VALUES = re.compile(rf"(?:(?:[LAST]\s*\d{{1,4}}\s*)?[PMI]\s*{_NUMBER}\s*)+", re.ASCII)
 
 
 @dataclass(frozen=True)
