@@ -128,11 +128,7 @@ def _assumed(machine: Machine, fact: ControllerFact) -> float | str | None:
 
 
 def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine, dict[str, str]]:
-    """The machine with everything that is known, and a remark for each key that was set.
-
-    Raises:
-        MachineError: the values do not go with others of the machine file.
-    """
+    """The machine with everything that is known, and a remark for each key that was set."""
     data = machine.model_dump(exclude_none=True)
     remarks: dict[str, str] = {}
     for_all: dict[str, list[ControllerFact]] = defaultdict(list)

@@ -47,17 +47,7 @@ class ServoLog:
 
 
 def parse_units(text: str) -> tuple[float, float]:
-    """Read ``TIME,LENGTH``, for example ``ms,um``: the factors to s and mm.
-
-    Args:
-        text: of the option ``--units``.
-
-    Returns:
-        Factors to s and to mm.
-
-    Raises:
-        ArgumentError: a unit is not known.
-    """
+    """Read ``TIME,LENGTH``, for example ``ms,um``: the factors to s and mm."""
     units = [find_unit(word) for word in text.split(",")]
     if [unit and unit.measures for unit in units] != ["time", "displacement"]:
         raise ArgumentError(
@@ -138,20 +128,7 @@ def _length_units(table: TextTable, columns: _Columns) -> list[float]:
 
 
 def read_log(path: Path, units: tuple[float, float] | None = None) -> ServoLog:
-    """Read a servo log.
-
-    Args:
-        path: CSV with a header; delimiter, decimal comma, lines above the header and a row of units are found out.
-        units: factors to s and mm; None: from the header (``time_ms``, ``X [um]``), else a time step from 0.02 to 50 ms
-            and mm.
-
-    Returns:
-        Times in s, commanded and actual positions in mm.
-
-    Raises:
-        ArgumentError: what is wrong, with file, line, value and limit.
-        OSError: the file cannot be read.
-    """
+    """Read a servo log."""
     table = TextTable(path)
     columns = _columns(table)
     values = table.numbers(columns.used, _FEWEST_ROWS)

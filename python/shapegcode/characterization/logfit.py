@@ -26,18 +26,7 @@ _Interval = tuple[float, float]  # a value and its half-width
 
 
 def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:
-    """Fit everything that the logs hold.
-
-    Args:
-        tests: what the programs did, by name.
-        logs: the record of each test that was logged, by name.
-
-    Returns:
-        One fact for each quantity, known or not.
-
-    Raises:
-        ArgumentError: a log is not that of its test.
-    """
+    """Fit everything that the logs hold."""
     bend = bend_samples(list(logs.values()))
     parts = {name: parts_of(log, tests[name], bend) for name, log in logs.items()}
     facts = LogFacts()

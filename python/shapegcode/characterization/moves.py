@@ -78,19 +78,7 @@ class PartLog:
 
 
 def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
-    """Cut a log into the parts of its test.
-
-    Args:
-        log: the record.
-        test: what the program did.
-        bend: of :func:`bend_samples`, for all logs of the control.
-
-    Returns:
-        The parts in the order of the test.
-
-    Raises:
-        ArgumentError: an axis is missing, or the motion does not have as many parts or moves as the test.
-    """
+    """Cut a log into the parts of its test."""
     wanted = [part for part in test.parts if part.pattern != "pause"]
     for part in wanted:
         if np.isnan(log.command_mm[0, AXES.index(part.axis)]):
@@ -177,18 +165,7 @@ def fit_shape(
     low: Sequence[float],
     high: Sequence[float],
 ) -> ShapeFit:
-    """Fit one curve to all moves of a there-and-back part, laid over each other at their middles.
-
-    Args:
-        log: the part.
-        share: share of the way at times after the start, from parameters in s.
-        guess: the parameters to begin with.
-        low: their lower bounds.
-        high: their upper bounds.
-
-    Returns:
-        The curve, its times in s and how well it fits.
-    """
+    """Fit one curve to all moves of a there-and-back part, laid over each other at their middles."""
     from scipy.optimize import least_squares
 
     middles = log.middles_s()
@@ -231,15 +208,7 @@ def fit_shape(
 
 
 def line_slope(log: PartLog, settle_s: float) -> tuple[float, float] | None:
-    """Mean speed in mm/s of the way out, and its 95 % half-width; None if too little of it is steady.
-
-    Args:
-        log: the part.
-        settle_s: how long the smoothing lasts; so much is left out at both ends.
-
-    Returns:
-        Speed and half-width in mm/s, or None.
-    """
+    """Mean speed in mm/s of the way out, and its 95 % half-width; None if too little of it is steady."""
     top = int(np.argmax(log.way_mm))
     begin = int(np.argmax(log.way_mm > max(8.0 * log.noise_mm, 0.003)))
     first, last = log.times_s[begin] + settle_s, log.times_s[top] - settle_s

@@ -38,11 +38,7 @@ class AirBox:
 
     @classmethod
     def parse(cls, text: str) -> AirBox:
-        """Read ``X0:X1,Y0:Y1,Z0:Z1`` in mm from the start point, for example ``0:100,-50:50,0:20``.
-
-        Raises:
-            ArgumentError: not of this form, or the start point is not inside.
-        """
+        """Read ``X0:X1,Y0:Y1,Z0:Z1`` in mm from the start point, for example ``0:100,-50:50,0:20``."""
         number = r"([-+]?\d+(?:\.\d*)?)"
         found = re.fullmatch(",".join([rf"\s*{number}:{number}\s*"] * 3), text)
         if not found:
@@ -154,11 +150,7 @@ def steps(part: Part) -> Iterator[Step]:
 
 
 def check(test: AirTest, box: AirBox) -> None:
-    """Make sure that a test stays inside the box and ends where it began.
-
-    Raises:
-        ArgumentError: it does not; the message names the axis, the place and the limit.
-    """
+    """Make sure that a test stays inside the box and ends where it began."""
     at = dict.fromkeys(AXES, 0.0)
     for part in test.parts:
         index = AXES.index(part.axis)

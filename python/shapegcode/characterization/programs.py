@@ -64,16 +64,7 @@ def write_characterization_tests(
 
 
 def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
-    """The program of a test: incremental, no spindle, no reference point, no tool change, written out.
-
-    Args:
-        test: what to do.
-        box: said in the header.
-        machine: for the least increment and the expected time.
-
-    Returns:
-        The program.
-    """
+    """The program of a test: incremental, no spindle, no reference point, no tool change, written out."""
     step = machine.controller.least_increment_mm
     shared = test.name.startswith("override")  # one program, run at several overrides
     title = "OVERRIDE" if shared else test.name.upper().replace("_", "-")
@@ -126,16 +117,7 @@ def _feed(value: float) -> str:
 
 
 def readme_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
-    """Instructions for the operator.
-
-    Args:
-        tests: what was written.
-        machine: for the expected times.
-        box: where the tests move.
-
-    Returns:
-        The text in Markdown.
-    """
+    """Instructions for the operator."""
     timing = ControllerTiming.of(machine)
     watch = [test for test in tests if test.kind == "stopwatch"]
     logs = [test for test in tests if test.kind == "log"]

@@ -45,19 +45,7 @@ def fit_timed_rapids(
     overhead: tuple[float, float],
     wait: tuple[float, float],
 ) -> str:
-    """Time constant and bell time of an axis' rapids.
-
-    Args:
-        facts: what is found goes there.
-        axis: X, Y or Z.
-        timed: its rapids.
-        period: interpolation period, s; None: not known.
-        overhead: what the stopwatch sees besides the program, s, with its half-width.
-        wait: in-position time after exact stops, s, with its half-width.
-
-    Returns:
-        How the times contradict each other, in words; empty: they do not.
-    """
+    """Time constant and bell time of an axis' rapids."""
     names = (f"rapid time constant {axis}", f"rapid bell time {axis}")
     if len(timed) < 2:
         for name in names:
@@ -114,16 +102,7 @@ def _ramp(facts: Facts, axis: str, ramps: Array, likely: Array) -> None:
 def _bell(
     facts: Facts, axis: str, total: float, wait: tuple[float, float], ends: tuple[float, float], slack: float
 ) -> None:
-    """The bell time is what comes after the motion, without the wait for in-position.
-
-    Args:
-        facts: what is found goes there.
-        axis: X, Y or Z.
-        total: bell and in-position time together, s.
-        wait: in-position time with its half-width, s.
-        ends: of the interval of the bell time, s.
-        slack: how well the wait and the mean time are known, s.
-    """
+    """The bell time is what comes after the motion, without the wait for in-position."""
     name, key = f"rapid bell time {axis}", f"controller.rapid_bell_time_s.{axis.lower()}"
     low, high = ends
     bell = total - wait[0]

@@ -97,12 +97,7 @@ class FilledSheet:
 
 
 def read_sheet(path: Path) -> FilledSheet:
-    """Read ``RESULTS.toml``; a log test without a name takes ``<test>.csv`` beside the file, if it is there.
-
-    Raises:
-        FileError: what is wrong, with file, line, value and limit.
-        OSError: the file cannot be read.
-    """
+    """Read ``RESULTS.toml``; a log test without a name takes ``<test>.csv`` beside the file, if it is there."""
     text = read_text(path, FileError)
     sheet = validated(_SheetTable, parsed(text, str(path), FileError), str(path), text, FileError)
     logs: dict[str, Path] = {}
@@ -134,16 +129,7 @@ def _test(name: str, table: _TestTable) -> AirTest:
 
 
 def sheet_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
-    """The file to fill in.
-
-    Args:
-        tests: what was written.
-        machine: for the expected times.
-        box: said in the head.
-
-    Returns:
-        The text in TOML.
-    """
+    """The file to fill in."""
     timing = ControllerTiming.of(machine)
     lines = [
         f"# Results of the characterization tests of {machine.name}; box from the start point, mm: {box}",

@@ -73,14 +73,7 @@ class _Fit:
 
 
 def fit_stopwatch(results: FilledSheet) -> WatchFacts:
-    """Fit everything that the stopwatch times hold.
-
-    Args:
-        results: the filled-in file; tests without times are left out.
-
-    Returns:
-        What is known, each with its interval.
-    """
+    """Fit everything that the stopwatch times hold."""
     rows = _rows(results)
     facts = WatchFacts()
     exponential = _shape(rows, facts)

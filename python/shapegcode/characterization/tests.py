@@ -118,18 +118,7 @@ class _Maker:
 
 
 def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
-    """The tests for a machine: those for a stopwatch first, then the shorter ones for a servo log.
-
-    Args:
-        machine: gives the least increment, the largest feeds and the rapid rates.
-        box: where the tests may move.
-
-    Returns:
-        The tests.
-
-    Raises:
-        ArgumentError: the box or the feeds are too small for the tests.
-    """
+    """The tests for a machine: those for a stopwatch first, then the shorter ones for a servo log."""
     make = _Maker(machine, box)
     tests: list[AirTest] = []
 

@@ -86,16 +86,7 @@ def _rapid_s(part: Part, timing: ControllerTiming) -> float:
 
 
 def part_time_s(part: Part, timing: ControllerTiming, override: float = 1.0) -> float:
-    """Duration of one part in s.
-
-    Args:
-        part: the moves.
-        timing: the controller.
-        override: feed override, 1 = 100 %.
-
-    Returns:
-        The duration in s.
-    """
+    """Duration of one part in s."""
     if part.pattern == "pause":
         return part.dwell_s
     if part.pattern == "rapid":

@@ -94,21 +94,7 @@ class CoefficientFit:
 def fit_coefficients(
     data: MeanForces, tool: CutTool, axial_depth_mm: float, *, thickness: Thickness = "mean", edge: bool = False
 ) -> CoefficientFit:
-    """Fit k1(t) and k2(t), and if asked the edge forces.
-
-    Args:
-        data: mean forces; at several radial depths or feeds.
-        tool: the end mill.
-        axial_depth_mm: of all of them.
-        thickness: the chip thickness that the power laws are of, "mean" of the engagement or "local".
-        edge: with edge forces.
-
-    Returns:
-        The coefficients with their intervals, in N and mm.
-
-    Raises:
-        ArgumentError: too few forces, chips too alike to tell the exponents, forces that no cut gives (sign or axes).
-    """
+    """Fit k1(t) and k2(t), and if asked the edge forces."""
     count = 6 if edge else 4
     chip = chips_mm(tool, axial_depth_mm, data)
     _check(data, chip, count, edge)

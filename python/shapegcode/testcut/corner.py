@@ -22,18 +22,7 @@ _MARGIN_REVS = 4.0
 
 
 def fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResult:
-    """Lay measured resultants over the expected ones.
-
-    Args:
-        cut: the test cut.
-        measured: sampled records by the number of their pass, from 1.
-
-    Returns:
-        How the two agree, and where.
-
-    Raises:
-        ArgumentError: a record does not fit the cut.
-    """
+    """Lay measured resultants over the expected ones."""
     passes = {number: _pass(cut, number, record) for number, record in measured.items()}
     first = passes[min(passes)]
     seen = _inside(cut, first.number, first.record.x_mm) & ~first.record.chatter

@@ -167,16 +167,7 @@ def _drawn(
     *,
     met: Edge | None = None,
 ) -> CutDesign:
-    """The design of measuring passes over one edge.
-
-    Args:
-        given: tool, spindle, axial depth.
-        edge: to be milled before each pass.
-        stock_mm: length of the stock along X.
-        passes: name and blocks of each.
-        about: figures of this kind of cut.
-        met: the edge that the round tool leaves; None: the same.
-    """
+    """The design of measuring passes over one edge."""
     kinds = {TaperDetails: "taper", CornerDetails: "corner", IntervalDetails: "interval"}
     warnings = []
     if isinstance(about, CornerDetails) and about.deeper_than_corner is not None:
@@ -218,12 +209,7 @@ def _measuring_pass(
 
 
 def _corner_feeds(given: CutConditions, radial_depth_mm: Array) -> Array:
-    """Feeds at which the mean resultant is that of the first depth (paper 001, eq. 7), mm/min.
-
-    Args:
-        given: tool, spindle, axial depth, feed of the first depth.
-        radial_depth_mm: (n,).
-    """
+    """Feeds at which the mean resultant is that of the first depth (paper 001, eq. 7), mm/min."""
     tool = given.cut_tool()
     law = ForceLaw(tool, tool.cutting, given.spindle, given.axial_depth_mm)
     met = straight_engagement(tool, radial_depth_mm, up=given.up)
@@ -243,11 +229,7 @@ def _blocks(x_mm: Array, feed: Array, interval_mm: float, begin: float, end: flo
 
 
 def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[Array, Array]:
-    """Distance along the corner's path from the beginning of S2 on, and the radial depth until it is constant again.
-
-    Raises:
-        ArgumentError: not a corner, or none that changes the radial depth.
-    """
+    """Distance along the corner's path from the beginning of S2 on, and the radial depth until it is constant again."""
     allowance, rough, finish = sizes
     before = 2.0 * (rough + finish)
     cut = _core.CornerCut(given.tool.radius_mm, rough, finish, allowance, before_mm=before, after_mm=before)

@@ -31,17 +31,7 @@ class Engagement:
 
 
 def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: Array, *, up: bool) -> Engagement:
-    """Engagement of a pass where the tool's axis is at each X, exact for the straight pieces of its edge.
-
-    Args:
-        tool: the end mill.
-        measuring: the pass.
-        x_mm: (n,) positions of the tool's axis.
-        up: up milling, the material on the left.
-
-    Returns:
-        Angles in rad and depths in mm at each X.
-    """
+    """Engagement of a pass where the tool's axis is at each X, exact for the straight pieces of its edge."""
     radius = tool.radius_mm
     edge_x, edge_y = np.array(measuring.edge_x_mm), np.array(measuring.edge_height_mm)
     x = np.asarray(x_mm, dtype=np.float64)

@@ -40,11 +40,7 @@ class ForceLaw:
     """A tool with coefficients at a spindle speed and an axial depth."""
 
     def __init__(self, tool: CutTool, law: CuttingLaw, spindle_rev_per_min: float, axial_depth_mm: float) -> None:
-        """Make the tables of the core.
-
-        Raises:
-            ArgumentError: a tool or coefficients that the core refuses.
-        """
+        """Make the tables of the core."""
         mill = _core.EndMill(tool.diameter_mm, tool.flutes, math.radians(tool.helix_deg), list(tool.runout_mm))
         self._force = _core.MillingForce(mill, law.core(), spindle_rev_per_min)
         self._depth = axial_depth_mm
@@ -95,16 +91,7 @@ class Expected:
 
 
 def expected(cut: TestCut, measuring: MeasuringPass, law: CuttingLaw | None = None) -> Expected:
-    """Forces along a pass at its commanded feeds.
-
-    Args:
-        cut: the test cut.
-        measuring: the pass.
-        law: coefficients; None: those known before.
-
-    Returns:
-        The forces in N at each place.
-    """
+    """Forces along a pass at its commanded feeds."""
     count = math.ceil((measuring.end_mm - measuring.start_mm) / _STEP_MM) + 1
     x = np.linspace(measuring.start_mm, measuring.end_mm, count)
     met = engagement(cut.tool, measuring, x, up=cut.up)

@@ -28,18 +28,7 @@ _FEEDS = 40
 
 
 def fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> IntervalResult:
-    """Decide from the measured resultant at which interval the controller follows the commanded feeds.
-
-    Args:
-        cut: the test cut.
-        measured: sampled records by the number of their pass, from 1.
-
-    Returns:
-        The shortest interval that is followed, and the figures of each.
-
-    Raises:
-        ArgumentError: a record does not fit the cut.
-    """
+    """Decide from the measured resultant at which interval the controller follows the commanded feeds."""
     records = {number: _placed(cut, number, record) for number, record in measured.items()}
     found = sorted((_followed(cut, number, record) for number, record in records.items()), key=lambda p: p.interval_mm)
     good: float | None = None

@@ -16,17 +16,7 @@ _LARGEST_CORRELATION = 0.95
 
 
 def noise_of(left: Array, predicted: Array, revolutions: Array, robust: Array) -> Array:
-    """Standard deviation of each value: a constant and a share of the value, as the residuals show them.
-
-    Args:
-        left: (n, k) what the fit leaves of k kinds of values.
-        predicted: (n, k) values of the fit.
-        revolutions: (n,) how many each is the mean of.
-        robust: (n, k) weights from 0 to 1 that keep outliers from widening it.
-
-    Returns:
-        Standard deviations, in the unit of the values.
-    """
+    """Standard deviation of each value: a constant and a share of the value, as the residuals show them."""
     found = np.empty_like(left)
     many = revolutions / float(np.mean(revolutions))
     for k in range(left.shape[1]):
@@ -57,16 +47,7 @@ def _not_negative(matrix: Array, right: Array) -> tuple[float, float]:
 
 
 def neighbour_correlation(scaled: Array, group: npt.NDArray[np.intp], outlier: npt.NDArray[np.bool_]) -> float:
-    """Correlation of neighbours within each group, of what the fit leaves; not below 0.
-
-    Args:
-        scaled: (n, k) residuals over their standard deviations.
-        group: (n,) number of the group.
-        outlier: (n,) rows that do not count.
-
-    Returns:
-        The correlation, 0 to 1.
-    """
+    """Correlation of neighbours within each group, of what the fit leaves; not below 0."""
     pairs = (group[1:] == group[:-1]) & ~outlier[1:] & ~outlier[:-1]
     if pairs.sum() < 8:
         return 0.0

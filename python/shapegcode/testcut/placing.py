@@ -70,17 +70,7 @@ class PlacedRecord:
 
 
 def _spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
-    """Spindle speed from the lines of a record at the revolution, the teeth, and their multiples.
-
-    Args:
-        force_n: (n, 2) samples within the cut.
-        period_s: between two of them.
-        commanded: in rev/min; within 5 % of it the speed is looked for.
-        flutes: of the tool.
-
-    Returns:
-        Speed in rev/min, and whether the record tells it: if it does not, the commanded one.
-    """
+    """Spindle speed from the lines of a record at the revolution, the teeth, and their multiples."""
     count = len(force_n)
     turns = count * period_s * commanded / _PER_MINUTE
     if turns < _FEWEST_FOR_SPEED:
@@ -107,21 +97,7 @@ def _spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: in
 
 
 def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, hoped: Expected) -> PlacedRecord:
-    """Take offset and drift off a sampled record of one pass, and find the place of each sample.
-
-    Args:
-        record: with time, or with a position (then the commanded feeds give the time).
-        cut: the test cut.
-        measuring: which pass was recorded.
-        hoped: forces that are expected along it.
-
-    Returns:
-        The forces in N with their places in mm.
-
-    Raises:
-        ArgumentError: too few samples per revolution, no air before or after the cut, no cut, or a cut whose length
-            does not fit the description.
-    """
+    """Take offset and drift off a sampled record of one pass, and find the place of each sample."""
     time, moved = _clock(record, measuring, cut.kind)
     period = float(time[-1] - time[0]) / (len(time) - 1)
     turn = _PER_MINUTE / cut.spindle_rev_per_min

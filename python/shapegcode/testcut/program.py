@@ -57,15 +57,7 @@ def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> C
 
 
 def program_text(design: CutDesign, number: int = 7101) -> str:
-    """The program of a test cut.
-
-    Args:
-        design: what to cut.
-        number: of the program, O.
-
-    Returns:
-        The program.
-    """
+    """The program of a test cut."""
     writer = _Writer(design)
     lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})"]
     lines += [f"({line})" for line in writer.head()]

@@ -95,19 +95,7 @@ def _columns(table: TextTable) -> dict[str, tuple[int, float]]:
 
 
 def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
-    """Read measured forces.
-
-    Args:
-        path: CSV with a header (delimiter and decimal comma are found out); units in the header, else s, mm, N, N m.
-        on: "workpiece": what a dynamometer under the work piece measures; "tool": forces on the tool.
-
-    Returns:
-        The forces in N, and their times in s where the file has them.
-
-    Raises:
-        ArgumentError: what was found and what is needed, with file and line.
-        OSError: the file cannot be read.
-    """
+    """Read measured forces."""
     path = Path(path)
     table = TextTable(path)
     columns = _columns(table)

@@ -57,20 +57,7 @@ class _Reduced:
 def fit_taper(
     cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: Thickness = "mean", edge: bool = False
 ) -> TaperResult:
-    """Fit the coefficients of the cutting force to records of a test cut.
-
-    Args:
-        cut: the test cut, as its side file describes it.
-        measured: records by the number of their pass, from 1: sampled ones, or means over whole revolutions.
-        thickness: chip thickness of the power laws, "mean" of the engagement or "local".
-        edge: with edge forces.
-
-    Returns:
-        The coefficients with their intervals, and how well they fit.
-
-    Raises:
-        ArgumentError: a record that does not fit the cut, or forces that do not tell the coefficients.
-    """
+    """Fit the coefficients of the cutting force to records of a test cut."""
     law = cut.tool.cutting
     sampled = any(_samples(cut, number, record) >= FEWEST_SAMPLES for number, record in measured.items())
     for _ in range(_ROUNDS if sampled else 1):

@@ -151,17 +151,7 @@ def family_of(name: str) -> LookAhead:
 def fitted_model(
     machine: Machine, family: LookAhead, values: Mapping[str, float], rapid_mm_per_s: float
 ) -> _core.ControllerModel:
-    """The controller that a family and its numbers describe.
-
-    Args:
-        machine: for everything else.
-        family: the rule.
-        values: of its parameters, in mm, s and rad.
-        rapid_mm_per_s: rapid rate of every axis; NaN: the machine's.
-
-    Returns:
-        The core's model.
-    """
+    """The controller that a family and its numbers describe."""
     model = controller_model(machine)
     limits = _core.MotionLimits()
     limits.law = getattr(_core.AccelerationLaw, family.law)
@@ -192,16 +182,7 @@ def fitted_model(
 
 
 def machine_values(family: LookAhead, values: Mapping[str, float], rapid_mm_per_s: float) -> dict[str, object]:
-    """The same as values of the machine file, by dotted key.
-
-    Args:
-        family: the rule.
-        values: of its parameters, in mm, s and rad.
-        rapid_mm_per_s: rapid rate of every axis; NaN: it stays.
-
-    Returns:
-        Values by key; None takes a key out.
-    """
+    """The same as values of the machine file, by dotted key."""
     corner = dict.fromkeys("xyz", 0.0)
     found: dict[str, object] = {
         "controller.motion": family.motion,

@@ -21,27 +21,12 @@ _KNOWN = 4.0  # an interval that reaches so far from its value to both sides tel
 
 
 def feeds_of(run: ObservedRun) -> list[tuple[float, float]]:
-    """Feed overrides of a run.
-
-    Args:
-        run: observed.
-
-    Returns:
-        (ratio, lines that were cut at it).
-    """
+    """Feed overrides of a run."""
     return [(each.feed_override, each.lines[1] - each.lines[0]) for each in run.stretches]
 
 
 def usual_value(runs: Sequence[ObservedRun], values: Callable[[ObservedRun], Sequence[tuple[float, float]]]) -> float:
-    """The value that held for the longest part.
-
-    Args:
-        runs: observed.
-        values: (value, how much it counts) of one.
-
-    Returns:
-        The value; 1 without any.
-    """
+    """The value that held for the longest part."""
     held: dict[float, float] = defaultdict(float)
     for run in runs:
         for value, weight in values(run):
@@ -52,17 +37,7 @@ def usual_value(runs: Sequence[ObservedRun], values: Callable[[ObservedRun], Seq
 def learned_machine(
     machine: Machine, motion: MotionFit, functions: FunctionFit, runs: Sequence[ObservedRun]
 ) -> tuple[Machine, dict[str, str], list[LearnedNumber], list[str]]:
-    """The machine with what was learned.
-
-    Args:
-        machine: whose file gets it.
-        motion: fitted.
-        functions: fitted.
-        runs: that both were fitted to.
-
-    Returns:
-        The machine; a remark for each key that was set; the numbers with their intervals; what the runs do not tell.
-    """
+    """The machine with what was learned."""
     source = f"logs of {len(runs)} runs"
     values = machine_values(motion.family, motion.values, motion.rapid_mm_per_s)
     values.update(_function_values(functions, runs))

@@ -70,17 +70,7 @@ class _Span:
 def whole_model(
     machine: Machine, motion: MotionFit, values: dict[str, float], last_tool_in_spindle: bool
 ) -> _core.ControllerModel:
-    """The controller with motion and functions.
-
-    Args:
-        machine: for everything else.
-        motion: fitted.
-        values: of functions by name.
-        last_tool_in_spindle: see `FunctionFit`.
-
-    Returns:
-        The core's model.
-    """
+    """The controller with motion and functions."""
     model = fitted_model(machine, motion.family, motion.values, motion.rapid_mm_per_s)
     model.program_start_s = values.get("start", 0.0)
     model.tool_change_s = values.get("tool change", 0.0)
@@ -95,15 +85,7 @@ def whole_model(
 
 
 def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float]]:
-    """The table of a spindle's time: none up to a speed, in proportion above.
-
-    Args:
-        values: of functions by name.
-        name: "spindle start" or "spindle stop".
-
-    Returns:
-        (speed in 1/min, s), empty where it takes no time.
-    """
+    """The table of a spindle's time: none up to a speed, in proportion above."""
     slope, begin = values.get(name, 0.0), values.get(f"{name} from", 0.0)
     if slope <= 1e-6:
         return []
@@ -112,16 +94,7 @@ def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float
 
 
 def fit_functions(runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> FunctionFit:
-    """Least squares over the stretches between cuts, robust against what an operator does there.
-
-    Args:
-        runs: of the machine.
-        motion: fitted to their sections.
-        machine: for everything else.
-
-    Returns:
-        Times of functions, none below 0.
-    """
+    """Least squares over the stretches between cuts, robust against what an operator does there."""
     spans = [span for run in runs for span in _spans(run)]
     names = _names(runs)
     fits = [_fit(spans, names, motion, machine, kept) for kept in ((False, True) if _returns(runs) else (False,))]

@@ -52,20 +52,7 @@ def fit_motion(
     thorough: bool = True,
     on_step: Callable[[], None] | None = None,
 ) -> MotionFit:
-    """Least misfit over the numbers of a family: the simplex search of Nelder and Mead, begun anew from where it ended.
-
-    Args:
-        clocks: sections.
-        family: the rule.
-        machine: for everything else.
-        rapid_mm_per_s: rapid rate; NaN: the machine's.
-        seen: numbers that the logs show directly, in the unit of the fit; the fit stays close to them.
-        thorough: search in many places; else in fewer, which is enough to compare families.
-        on_step: called now and then.
-
-    Returns:
-        The fit.
-    """
+    """Least misfit over the numbers of a family: Nelder-Mead, restarted from where it ended."""
     from scipy.optimize import minimize
 
     parameters = family.parameters
@@ -118,14 +105,6 @@ def parameter_intervals(
 
     From the derivatives of what stretches of some seconds take; the scatter is that of the sections, each of which
     counts as one (a sandwich of clusters), so that an error of the model is in it.
-
-    Args:
-        fit: the fit.
-        clocks: sections that it was made from.
-        machine: for everything else.
-
-    Returns:
-        Least and largest value by name; (low, high) of the family where the runs do not tell.
     """
     names = [parameter.name for parameter in fit.family.parameters]
     stretches = [_stretches(clock) for clock in clocks]

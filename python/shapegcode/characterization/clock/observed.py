@@ -76,20 +76,7 @@ class ObservedRun:
 
 
 def observe(entry: RunEntry, log: RunLog, played: PlayedProgram, machine: Machine) -> ObservedRun:
-    """Lay a log beside its program.
-
-    Args:
-        entry: of the file of runs.
-        log: one run.
-        played: its program.
-        machine: with which the program was read.
-
-    Returns:
-        When each line began, and the overrides.
-
-    Raises:
-        RecordError: they do not belong together; the message says why.
-    """
+    """Lay a log beside its program."""
     notes = list(log.notes)
     time_s, line = _lines(entry, log, played, notes)
     _compare_tools(entry, log, played, notes)
@@ -154,11 +141,7 @@ def _lines(entry: RunEntry, log: RunLog, played: PlayedProgram, notes: list[str]
 
 
 def _compare_tools(entry: RunEntry, log: RunLog, played: PlayedProgram, notes: list[str]) -> None:
-    """The tools that the log names must be those that the program calls there; numbers of another kind are noted.
-
-    Raises:
-        RecordError: it names tools that the program calls elsewhere.
-    """
+    """The tools that the log names must be those that the program calls there; numbers of another kind are noted."""
     if log.tool is None:
         return
     called = {int(tool) for tool in played.tools if tool >= 0}
@@ -201,11 +184,7 @@ def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
 
 
 def _is_whole(run: ObservedRun, starts: FloatArray, notes: list[str]) -> bool:
-    """Whether the log begins where the program does.
-
-    Raises:
-        RecordError: the log says that the program is completed, and much of it was not run.
-    """
+    """Whether the log begins where the program does."""
     begin, total_s = starts[run.line], float(starts[-1])
     known = np.flatnonzero(np.isfinite(begin))
     if not len(known) or run.log.duration_s is None:
@@ -223,11 +202,7 @@ def _is_whole(run: ObservedRun, starts: FloatArray, notes: list[str]) -> bool:
 
 
 def _require_same(run: ObservedRun, starts: FloatArray) -> None:
-    """The way that the program goes between the reported lines must take time where the log says that it did.
-
-    Raises:
-        RecordError: it does not: the log is of another program.
-    """
+    """The way that the program goes between the reported lines must take time where the log says that it did."""
     begin = starts[run.line]
     known = np.isfinite(begin) & ~run.played.function[run.line]
     if known.sum() < _LEAST_BLOCKS:

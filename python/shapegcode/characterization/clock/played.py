@@ -50,14 +50,7 @@ class PlayedProgram:
     sections: tuple[tuple[int, int], ...]
 
     def starts(self, model: _core.ControllerModel) -> FloatArray:
-        """When the lines begin on a model.
-
-        Args:
-            model: of the controller.
-
-        Returns:
-            (line_count + 2,) s, NaN for a line that takes no time; the last entry is the end of the program.
-        """
+        """When the lines begin on a model."""
         timed = _core.time_program(self.program.core, model, True)
         found = np.full(self.line_count + 2, np.nan)
         # A line may hold several moves: its first one counts.
@@ -94,14 +87,7 @@ class PlayedProgram:
 
 
 def played_program(program: Program) -> PlayedProgram:
-    """What the clock needs of a program.
-
-    Args:
-        program: what was read; lines count as its plain text does.
-
-    Returns:
-        Feeds, rapids and functions by line.
-    """
+    """What the clock needs of a program."""
     core = program.core
     count = core.line_count
     feed = np.full(count + 2, np.nan)

@@ -19,14 +19,7 @@ _MOST_RUNS = 20
 
 
 def plots_of(found: LearnedClock) -> dict[str, Plot]:
-    """Its pictures by name.
-
-    Args:
-        found: what was learned.
-
-    Returns:
-        What draws each picture, by the name of its file without ending; none without a whole run.
-    """
+    """Its pictures by name."""
     return {"clock": partial(plot_clock, found)} if any(run.measured_s for run in found.runs) else {}
 
 

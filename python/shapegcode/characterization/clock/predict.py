@@ -19,15 +19,7 @@ _READING_S = 0.35  # what two readings may hide
 
 
 def predicted_starts(run: ObservedRun, model: _core.ControllerModel) -> FloatArray:
-    """(line_count + 2,) When each line begins, s; the last entry is the end.
-
-    Args:
-        run: whose overrides hold.
-        model: of the controller; its overrides are set.
-
-    Returns:
-        Times since the start key.
-    """
+    """(line_count + 2,) When each line begins, s; the last entry is the end."""
     model.rapid_override = run.rapid_override
     model.feed_override = 1.0
     starts = line_starts(run.played, model)
@@ -47,16 +39,7 @@ def predicted_starts(run: ObservedRun, model: _core.ControllerModel) -> FloatArr
 
 
 def holds_of(run: ObservedRun, starts: FloatArray) -> list[tuple[float, float, str]]:
-    """Where a run stood still though no program asks for it.
-
-    Args:
-        run: observed.
-        starts: predicted.
-
-    Returns:
-        (begin in s, length in s, in words): what the log calls a hold, rapids held by their override, and readings that
-        are so much further apart than the program and the scatter of what lies between cuts explain.
-    """
+    """Where a run stood still though no program asks for it."""
     found = [(begin, length, "hold") for begin, length in run.log.holds]
     found = [_not_covered(run, starts, hold) for hold in (*found, *_held_rapids(run))]
     found = [hold for hold in found if hold[1] > _READING_S]
@@ -113,16 +96,7 @@ def _not_covered(run: ObservedRun, starts: FloatArray, hold: tuple[float, float,
 def shares_of(
     run: ObservedRun, starts: FloatArray, holds: list[tuple[float, float, str]]
 ) -> tuple[tuple[LearnedShare, ...], tuple[LearnedShare, ...]]:
-    """A run by tool, and by kind of motion.
-
-    Args:
-        run: observed.
-        starts: predicted.
-        holds: of it; they are taken out of what was measured.
-
-    Returns:
-        One share for each tool in the order of use; cuts, and what lies between them.
-    """
+    """A run by tool, and by kind of motion."""
     end_s = run.duration_s
     if end_s is None:
         return (), ()

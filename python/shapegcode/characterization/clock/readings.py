@@ -57,15 +57,7 @@ class Stretch:
 
 
 def line_numbers(log: RunLog, played: PlayedProgram) -> IntArray:
-    """Lines of the text from what the log counts.
-
-    Args:
-        log: one run.
-        played: its program.
-
-    Returns:
-        (n,) line of each value of `log.block`; 0: none.
-    """
+    """Lines of the text from what the log counts."""
     value = np.asarray(log.block.value, dtype=np.int64)
     if log.block_counts == "line":
         return value
@@ -78,31 +70,14 @@ def line_numbers(log: RunLog, played: PlayedProgram) -> IntArray:
 
 
 def lines_at(signal: Signal, log: RunLog, played: PlayedProgram) -> IntArray:
-    """Line that was reported when a value came.
-
-    Args:
-        signal: with the values.
-        log: one run.
-        played: its program.
-
-    Returns:
-        (m,) of `signal`, 0 before the first, at most one behind the last line of the program.
-    """
+    """Line that was reported when a value came."""
     line = line_numbers(log, played)
     at = np.searchsorted(log.block.time_s, signal.time_s, side="right") - 1
     return np.clip(np.where(at >= 0, line[np.maximum(at, 0)], 0), 0, played.line_count + 1)
 
 
 def held_longest(signal: Signal, end_s: float | None) -> float:
-    """The value that a signal had for the longest time.
-
-    Args:
-        signal: with at least one value.
-        end_s: of the run; None: its last value.
-
-    Returns:
-        The value.
-    """
+    """The value that a signal had for the longest time."""
     held: dict[float, float] = defaultdict(float)
     until = np.append(signal.time_s[1:], end_s if end_s is not None else signal.time_s[-1])
     for value, begin, end in zip(signal.value, signal.time_s, until, strict=True):
@@ -111,19 +86,7 @@ def held_longest(signal: Signal, end_s: float | None) -> float:
 
 
 def feed_unit(entry: RunEntry, log: RunLog, played: PlayedProgram) -> float:
-    """The unit of the logged feed: as stated, else the one in which steady cuts run as programmed.
-
-    Args:
-        entry: of the file of runs.
-        log: one run.
-        played: its program.
-
-    Returns:
-        mm/s of one unit; NaN: there is no feed, or too little of it.
-
-    Raises:
-        RecordError: no unit makes the feeds those of the program.
-    """
+    """The unit of the logged feed: as stated, else the one in which steady cuts run as programmed."""
     if log.feed is None or len(log.feed) < LEAST_READINGS:
         return math.nan
     line = lines_at(log.feed, log, played)
@@ -149,14 +112,7 @@ def feed_unit(entry: RunEntry, log: RunLog, played: PlayedProgram) -> float:
 
 
 def steady_value(values: FloatArray) -> float | None:
-    """Where values heap up.
-
-    Args:
-        values: feeds over the programmed ones.
-
-    Returns:
-        The middle of the largest heap; None: there is none.
-    """
+    """Where values heap up."""
     ordered = np.sort(values)
     upto = np.searchsorted(ordered, ordered + _FEED_BIN, side="right")
     count = upto - np.arange(len(ordered))
@@ -168,18 +124,7 @@ def steady_value(values: FloatArray) -> float | None:
 
 
 def stretches_of(entry: RunEntry, log: RunLog, played: PlayedProgram, unit: float, notes: list[str]) -> list[Stretch]:
-    """Feed override of each section: what steady cuts show, else what is stated, else that of the run, else 1.
-
-    Args:
-        entry: of the file of runs.
-        log: one run.
-        played: its program.
-        unit: mm/s of one unit of the logged feed.
-        notes: gets what was found.
-
-    Returns:
-        One stretch for each section of the program.
-    """
+    """Feed override of each section: what steady cuts show, else what is stated, else that of the run, else 1."""
     ratio = np.empty(0)
     line = np.empty(0, dtype=np.int64)
     if log.feed is not None and math.isfinite(unit):
@@ -217,13 +162,6 @@ def _step_of(values: FloatArray) -> float:
 
 
 def as_dialled(ratio: float) -> float:
-    """As a dial has it: whole percents where they are within what a reading means.
-
-    Args:
-        ratio: as it was read.
-
-    Returns:
-        Ratio.
-    """
+    """As a dial has it: whole percents where they are within what a reading means."""
     whole = round(ratio, 2)
     return whole if abs(ratio - whole) < 0.002 else round(ratio, 4)

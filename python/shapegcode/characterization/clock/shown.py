@@ -23,14 +23,7 @@ _DIALS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.05)  # where a dial of rapids usually sta
 
 
 def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
-    """What the feeds shown in arcs say of the largest acceleration across the path: v²/r where v is below the feed.
-
-    Args:
-        runs: of the machine.
-
-    Returns:
-        mm/s²; NaN: no arc was run below its feed often enough.
-    """
+    """What the feeds shown in arcs say of the largest acceleration across the path: v²/r where v is below the feed."""
     found: list[FloatArray] = []
     for run in runs:
         log, played = run.log, run.played
@@ -58,12 +51,6 @@ def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
 
     A rate shows as the highest feed that returns again and again. Where runs show several, the highest one, or one that
     a usual place of the dial makes of it, is the machine's.
-
-    Args:
-        runs: of the machine.
-
-    Returns:
-        The rate in mm/s (NaN: no log shows one), and the runs with their overrides.
     """
     shown = {id(run): _shown_rate(run) for run in runs}
     plateaus = [plateau for plateau, _ in shown.values() if math.isfinite(plateau)]
@@ -81,15 +68,7 @@ def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
 
 
 def with_override(run: ObservedRun, rate_mm_per_s: float) -> ObservedRun:
-    """A run with the override of its rapids: as stated, else as its rapids show it, else 1.
-
-    Args:
-        run: observed.
-        rate_mm_per_s: of the machine; NaN: not known.
-
-    Returns:
-        The same run.
-    """
+    """A run with the override of its rapids: as stated, else as its rapids show it, else 1."""
     if math.isfinite(run.rapid_override):
         return run
     plateau = _shown_rate(run)[0]

@@ -102,15 +102,7 @@ def section_residuals(clocks: Sequence[SectionClock], model: _core.ControllerMod
 
 
 def misfit(clocks: Sequence[SectionClock], model: _core.ControllerModel) -> float:
-    """How badly a model keeps the time of sections: every program counts alike, outliers (holds) count to a limit.
-
-    Args:
-        clocks: sections.
-        model: of the controller; its overrides are set.
-
-    Returns:
-        Weighted root mean squares over stretches of all lengths, s.
-    """
+    """How badly a model keeps the time of sections: every program counts alike, outliers (holds) count to a limit."""
     square: dict[int, FloatArray] = {}
     count: dict[int, FloatArray] = {}
     for clock, residual in zip(clocks, section_residuals(clocks, model), strict=True):

@@ -63,19 +63,7 @@ def fit_drive(
     start: LagFit,
     tell: Callable[[], None] = lambda: None,
 ) -> DriveFit:
-    """Fit the drive.
-
-    Args:
-        commands: of each stretch, (n,).
-        actuals: the same.
-        use: which samples of each stretch count.
-        period_s: between samples.
-        start: the servo lag of the same record.
-        tell: called after each start.
-
-    Returns:
-        The best of several starts.
-    """
+    """Fit the drive."""
     from scipy.optimize import least_squares
 
     problem = _DriveProblem(commands, actuals, use, period_s)

@@ -31,17 +31,6 @@ def lag_intervals(
 
     The interval is that of least squares with as many independent samples as the autocorrelation of what is left
     allows, and never narrower than what the fits to the halves differ by.
-
-    Args:
-        fit: to all samples.
-        halves: the fits to each half.
-        trace: that was fitted.
-        use: which samples of each stretch count.
-        period_s: between samples.
-
-    Returns:
-        Lag at constant speed, dead time, position gain, feed-forward; unknown where the interval is wider than half of
-        the value.
     """
 
     def model(values: FloatArray) -> FloatArray:

@@ -51,32 +51,14 @@ def rms(values: FloatArray) -> float:
 
 
 def delayed(way: FloatArray, samples: float) -> FloatArray:
-    """A command some samples later: joined by straight lines, at constant speed before its first sample.
-
-    Args:
-        way: (n,) command.
-        samples: by how many, 0 or more.
-
-    Returns:
-        (n,) the same, later.
-    """
+    """A command some samples later: joined by straight lines, at constant speed before its first sample."""
     at = np.arange(len(way)) - samples
     found: FloatArray = np.interp(at, np.arange(len(way)), way)
     return np.where(at < 0.0, way[0] + at * (way[1] - way[0]), found)
 
 
 def lag_way(way: FloatArray, gain_per_s: float, period_s: float, late: float = 0.0) -> FloatArray:
-    """Error of a first-order lag without feed-forward (f = 0), exact for set-points joined by straight lines.
-
-    Args:
-        way: (n,) command; at its first speed for long before.
-        gain_per_s: K.
-        period_s: between samples.
-        late: how many samples later the command reaches the lag, 0 or more, not whole as a rule.
-
-    Returns:
-        (n,) command, as late, less position; times 1 − f it is that of `ServoLag`.
-    """
+    """Error of a first-order lag without feed-forward (f = 0), exact for set-points joined by straight lines."""
     from scipy.signal import lfilter
 
     kept = math.exp(-gain_per_s * period_s)
@@ -131,18 +113,7 @@ def fit_lag(
     *,
     dead_time: bool,
 ) -> LagFit:
-    """Fit dead time, gain, feed-forward and offset.
-
-    Args:
-        commands: of each stretch, (n,).
-        actuals: the same.
-        use: which samples of each stretch count.
-        period_s: between samples.
-        dead_time: whether there is one; else τ = 0.
-
-    Returns:
-        The best of several starts, with the error that it has in every sample.
-    """
+    """Fit dead time, gain, feed-forward and offset."""
     from scipy.optimize import minimize, minimize_scalar
 
     problem = _LagProblem(commands, [r - x for r, x in zip(commands, actuals, strict=True)], use, period_s)

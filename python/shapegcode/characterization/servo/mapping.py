@@ -13,19 +13,7 @@ __all__ = ["learned", "machine_axes"]
 
 
 def machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> dict[str, int]:
-    """Which axes of a log are X, Y and Z of the machine.
-
-    Args:
-        record: the log.
-        axes: by the letter, such as "X=1,Y=6,Z=2"; None: by their names, and none at all where an axis that is called
-            X, Y or Z turns: then the labels are not true.
-
-    Returns:
-        Rank in the record by letter, "x" to "z".
-
-    Raises:
-        ArgumentError: an axis that the log does not have, or two of that name.
-    """
+    """Which axes of a log are X, Y and Z of the machine."""
     if axes is None:
         named = {each.name.partition("(")[2].rstrip(")") or each.name: rank for rank, each in enumerate(record.axes)}
         found = {
@@ -55,19 +43,7 @@ def machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> d
 def learned(
     machine: Machine, axes: Sequence[ServoAxis], places: Mapping[str, int]
 ) -> tuple[Machine, dict[str, float], list[str]]:
-    """The machine with gain and feed-forward of the axes that tell them.
-
-    Args:
-        machine: whose file gets them.
-        axes: what the log says.
-        places: rank of X, Y and Z among them, by letter.
-
-    Returns:
-        The machine, its keys that were set with their values, and what does not follow.
-
-    Raises:
-        MachineError: the values do not go with others of the machine file.
-    """
+    """The machine with gain and feed-forward of the axes that tell them."""
     written: dict[str, float] = {}
     remarks: dict[str, list[str]] = {}
     warnings: list[str] = []

@@ -19,14 +19,7 @@ _OWN, _OURS = "control: contour deviation", "left by our model, not fitted there
 
 
 def plots_of(found: ServoFit) -> dict[str, Plot]:
-    """Its pictures by name.
-
-    Args:
-        found: what the log says.
-
-    Returns:
-        What draws each picture, by the name of its file without ending.
-    """
+    """Its pictures by name."""
     return {"servo": partial(plot_servo, found)} if any(axis.models for axis in found.axes) else {}
 
 

@@ -26,15 +26,6 @@ def torque_friction(
     """Friction over mass from the torque, which the models of the position loop do not see.
 
     The torque is T_c sign(v) + J a + T_v v + T_0, of the command as late as the axis lags; what is told is T_c/J.
-
-    Args:
-        trace: of the axis.
-        lag: of it, which says how late it is.
-        uses: which samples of each stretch count: those of both halves, and all.
-        period_s: between samples.
-
-    Returns:
-        The fit to all with the range of the three fits; nothing where no torque was recorded.
     """
     if trace.torque is None:
         return ()
