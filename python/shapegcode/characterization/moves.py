@@ -19,15 +19,7 @@ from shapegcode.characterization.log import ServoLog
 from shapegcode.characterization.plan import AXES, AirTest, Part
 from shapegcode.errors import ArgumentError
 
-__all__ = [
-    "PartLog",
-    "ShapeFit",
-    "fit_shape",
-    "lagged_share",
-    "line_slope",
-    "parts_of",
-    "smoothed_share",
-]
+__all__ = ["PartLog", "ShapeFit", "fit_shape", "lagged_share", "line_slope", "parts_of", "smoothed_share"]
 
 Array = npt.NDArray[np.float64]
 _PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s

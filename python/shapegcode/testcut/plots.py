@@ -87,10 +87,7 @@ def plot_coefficients(result: TaperResult, ax: Axes | None = None) -> Axes:
         ("before", result.cut.tool.cutting, _MEASURED, "--"),
         ("fitted", result.cutting, _EXPECTED, "-"),
     ):
-        curves = (
-            law.specific_n_per_mm2 * chip**law.specific_exponent,
-            law.ratio * chip**law.ratio_exponent,
-        )
+        curves = (law.specific_n_per_mm2 * chip**law.specific_exponent, law.ratio * chip**law.ratio_exponent)
         for panel, curve in zip(panels, curves, strict=True):
             panel.plot(1e3 * chip, curve, style, color=colour, label=name)
     for panel, label in zip(panels, ("k1 in N/mm²", "k2"), strict=True):

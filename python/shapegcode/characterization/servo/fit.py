@@ -145,12 +145,7 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
         trace.deviation,
         best.rest,
     )
-    return _with(
-        base,
-        models=models,
-        parameters=parameters,
-        curves=curves,
-    )
+    return _with(base, models=models, parameters=parameters, curves=curves)
 
 
 def _alike(trace: ServoTrace) -> str:

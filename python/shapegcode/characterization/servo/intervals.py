@@ -21,11 +21,7 @@ _EFFECTIVE = "of a first-order loop that lags alike; the control's setting may b
 
 
 def lag_intervals(
-    fit: LagFit,
-    halves: Sequence[LagFit],
-    trace: ServoTrace,
-    use: Sequence[npt.NDArray[np.bool_]],
-    period_s: float,
+    fit: LagFit, halves: Sequence[LagFit], trace: ServoTrace, use: Sequence[npt.NDArray[np.bool_]], period_s: float
 ) -> tuple[ServoEstimate, ...]:
     """Parameters of a servo lag behind a dead time, with 95 % intervals.
 

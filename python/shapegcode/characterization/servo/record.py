@@ -167,15 +167,7 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
         unit = "deg" if turns else "mm"
         name = f"{axis.number} ({axis.name})" if axis.name != str(axis.number) else axis.name
         axes.append(
-            ServoTrace(
-                name,
-                unit,
-                cut(capture.time_s),
-                cut(command),
-                cut(actual),
-                other("CONT_DEV"),
-                other("TORQUE"),
-            )
+            ServoTrace(name, unit, cut(capture.time_s), cut(command), cut(actual), other("CONT_DEV"), other("TORQUE"))
         )
     return _checked(ServoRecord(capture.source, capture.cycle_s, tuple(axes), tuple(notes)))
 
