@@ -76,14 +76,6 @@ from shapegcode.characterization.runs_file import (
     RunsFile as RunsFile,
     load_runs as load_runs,
 )
-from shapegcode.characterization.servo.fit import fit_servo as fit_servo
-from shapegcode.characterization.servo.plots import plot_servo as plot_servo
-from shapegcode.characterization.servo.record import (
-    ServoRecord as ServoRecord,
-    ServoTrace as ServoTrace,
-    read_servo_record as read_servo_record,
-)
-from shapegcode.characterization.servo.result import ServoAxis as ServoAxis, ServoFit as ServoFit
 from shapegcode.checking.check import (
     check as check,
     check_text as check_text,
@@ -154,6 +146,14 @@ from shapegcode.identification.plots import (
     plot_traces as plot_traces,
 )
 from shapegcode.identification.result import Identification as Identification
+from shapegcode.identification.servo.fit import fit_servo as fit_servo
+from shapegcode.identification.servo.plots import plot_servo as plot_servo
+from shapegcode.identification.servo.record import (
+    ServoRecord as ServoRecord,
+    ServoTrace as ServoTrace,
+    read_servo_record as read_servo_record,
+)
+from shapegcode.identification.servo.result import ServoAxis as ServoAxis, ServoFit as ServoFit
 from shapegcode.identification.update import MachineUpdate as MachineUpdate, update_machine as update_machine
 from shapegcode.io.edge_capture import (
     EdgeAxis as EdgeAxis,

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode.characterization.facts import CUTTING_SUM, ControllerFact, combine, mean
-from shapegcode.characterization.log import parse_units, read_log
 from shapegcode.characterization.logfit import fit_logs
 from shapegcode.characterization.result import Characterisation
 from shapegcode.characterization.sheet import SHEET, FilledSheet, read_sheet
 from shapegcode.characterization.stopwatch import fit_stopwatch
 from shapegcode.errors import ArgumentError
+from shapegcode.io.servo_log import parse_units, read_log
 from shapegcode.machine import Machine
 
 __all__ = ["characterize"]

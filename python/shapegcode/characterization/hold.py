@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.characterization.log import ServoLog
+from shapegcode.io.servo_log import ServoLog
 
 __all__ = ["bend_samples", "held_samples", "ticks"]
 

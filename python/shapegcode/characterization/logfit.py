@@ -9,12 +9,12 @@ import numpy as np
 
 from shapegcode.characterization.facts import PERIODS_S, ControllerFact, mean
 from shapegcode.characterization.hold import bend_samples, held_samples
-from shapegcode.characterization.log import ServoLog
 from shapegcode.characterization.moves import PartLog, line_slope, parts_of
 from shapegcode.characterization.plan import AXES, AirTest
 from shapegcode.characterization.servofit import fit_servo
 from shapegcode.characterization.shapefit import LogFacts, fit_cutting, fit_rapids
 from shapegcode.characterization.timing import whole_periods
+from shapegcode.io.servo_log import ServoLog
 
 __all__ = ["fit_logs"]
 

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.characterization.hold import ticks
-from shapegcode.characterization.log import ServoLog
 from shapegcode.characterization.plan import AXES, AirTest, Part
 from shapegcode.errors import ArgumentError
+from shapegcode.io.servo_log import ServoLog
 
 __all__ = ["PartLog", "ShapeFit", "fit_shape", "lagged_share", "line_slope", "parts_of", "smoothed_share"]
 

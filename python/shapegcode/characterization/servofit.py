@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from shapegcode.characterization.facts import Facts
 from shapegcode.characterization.hold import held_samples
-from shapegcode.characterization.log import ServoLog
 from shapegcode.characterization.plan import AXES
-from shapegcode.characterization.servo.lag import lag_way
+from shapegcode.identification.servo.models import lag_way
+from shapegcode.io.servo_log import ServoLog
 
 Array = npt.NDArray[np.float64]
 _SERVO_SLACK = 0.02

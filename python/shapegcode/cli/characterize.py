@@ -126,8 +126,8 @@ def _runs(args: argparse.Namespace, machine: Machine) -> int:
 
 
 def _servo(args: argparse.Namespace, machine: Machine) -> int:
-    from shapegcode.characterization.servo.fit import fit_servo
     from shapegcode.cli import runner
+    from shapegcode.identification.servo.fit import fit_servo
 
     with runner.progress(f"fitting {args.servo}", args) as bar:
         found = fit_servo(

@@ -60,7 +60,7 @@ MODULES: Mapping[str, str] = {
     "Recommendation": "shaping.result",
     "Reports": "results.report_result",
     "ScheduledConversion": "conversion.scheduled_result",
-    "ServoFit": "characterization.servo.result",
+    "ServoFit": "identification.servo.result",
     "ShaperDemo": "demos.shaper",
     "Simulation": "simulation.result",
     "TapDemo": "demos.tap",

@@ -14,8 +14,6 @@ from shapegcode.io.columns import Label, Meaning, read_label, unit_of, words_of
 from shapegcode.io.table import TextTable
 from shapegcode.io.units import factor_between, find_unit, units_of
 
-__all__ = ["ServoLog", "parse_units", "read_log"]
-
 Array = npt.NDArray[np.float64]
 _ACTUAL = {"act", "actual", "fb", "feedback", "fbk", "measured", "meas", "ist", "real"}
 _TIME = {"time", "t", "timestamp", "zeit"}
@@ -26,19 +24,12 @@ _SHORTEST_S, _LONGEST_S = 2e-5, 0.05
 
 @dataclass(frozen=True)
 class ServoLog:
-    """One record.
+    """One record."""
 
-    Attributes:
-        file: where it was read.
-        times_s: time of each row, from 0 on.
-        command_mm: shape (n, 3), commanded X, Y, Z; NaN for an axis that was not recorded.
-        actual_mm: the same for actual positions; None if none was recorded.
-    """
-
-    file: str
-    times_s: Array
-    command_mm: Array
-    actual_mm: Array | None
+    file: str  # where it was read
+    times_s: Array  # time of each row, from 0 on
+    command_mm: Array  # shape (n, 3), commanded X, Y, Z; NaN for an axis that was not recorded
+    actual_mm: Array | None  # the same for actual positions; None if none was recorded
 
     @property
     def sampling_s(self) -> float:
