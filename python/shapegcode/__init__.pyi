@@ -57,24 +57,10 @@ from shapegcode.batching.result import (
     BatchRow as BatchRow,
 )
 from shapegcode.characterization.characterize import characterize as characterize
-from shapegcode.characterization.clock.learn import learn_clock as learn_clock
-from shapegcode.characterization.clock.plots import plot_clock as plot_clock
-from shapegcode.characterization.clock.result import (
-    FamilyScore as FamilyScore,
-    LearnedClock as LearnedClock,
-    LearnedNumber as LearnedNumber,
-    LearnedRun as LearnedRun,
-    LearnedShare as LearnedShare,
-)
 from shapegcode.characterization.programs import write_characterization_tests as write_characterization_tests
 from shapegcode.characterization.result import (
     Characterisation as Characterisation,
     CharacterisationTests as CharacterisationTests,
-)
-from shapegcode.characterization.runs_file import (
-    RunEntry as RunEntry,
-    RunsFile as RunsFile,
-    load_runs as load_runs,
 )
 from shapegcode.checking.check import (
     check as check,
@@ -278,6 +264,20 @@ from shapegcode.testcut.result import (
     CornerResult as CornerResult,
     IntervalResult as IntervalResult,
     TaperResult as TaperResult,
+)
+from shapegcode.timing.calibration.calibrate import learn_clock as learn_clock
+from shapegcode.timing.calibration.plots import plot_clock as plot_clock
+from shapegcode.timing.calibration.result import (
+    FamilyScore as FamilyScore,
+    LearnedClock as LearnedClock,
+    LearnedNumber as LearnedNumber,
+    LearnedRun as LearnedRun,
+    LearnedShare as LearnedShare,
+)
+from shapegcode.timing.calibration.runs_file import (
+    RunEntry as RunEntry,
+    RunsFile as RunsFile,
+    load_runs as load_runs,
 )
 from shapegcode.timing.cycle_time import cycle_time as cycle_time
 from shapegcode.timing.plots import plot_time as plot_time

@@ -20,9 +20,9 @@ import numpy as np
 
 import shapegcode as sg
 from shapegcode._core import SegmentKind
-from shapegcode.characterization.clock.learn import learn_clock
 from shapegcode.demos.evidence import STUDIES, Study, evidence_demo, nist_folder, nist_runs, study_of
 from shapegcode.results import plot
+from shapegcode.timing.calibration.calibrate import learn_clock
 from shapegcode.timing.cycle_time import cycle_time
 
 if TYPE_CHECKING:

@@ -11,13 +11,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from shapegcode.characterization.clock.learn import learn_clock
 from shapegcode.cli import main
 from shapegcode.demos import evidence
 from shapegcode.demos.evidence import EvidenceDemo, Study, nist_folder, nist_runs, statements, study_of
 from shapegcode.machine import Machine
 from shapegcode.results import plot as canvas
 from shapegcode.results.json import schema
+from shapegcode.timing.calibration.calibrate import learn_clock
 
 
 def published(program: str) -> list[float]:

@@ -112,9 +112,9 @@ def _check_options(args: argparse.Namespace) -> None:
 
 
 def _runs(args: argparse.Namespace, machine: Machine) -> int:
-    from shapegcode.characterization.clock.learn import learn_clock
-    from shapegcode.characterization.runs_file import load_runs
     from shapegcode.cli import runner
+    from shapegcode.timing.calibration.calibrate import learn_clock
+    from shapegcode.timing.calibration.runs_file import load_runs
 
     file = load_runs(args.runs)
     read = [str(path) for entry in file.entries for path in (entry.program, *entry.logs)]

@@ -8,13 +8,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, ClassVar
 
-from shapegcode.characterization.clock.learn import learn_clock
-from shapegcode.characterization.clock.result import TOLERANCE_PERCENT, LearnedClock, LearnedRun, LearnedShare
-from shapegcode.characterization.runs_file import RunEntry, RunsFile
 from shapegcode.demos.result import Demonstration, Statement, compared, stated
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.table import Column, Table
+from shapegcode.timing.calibration.calibrate import learn_clock
+from shapegcode.timing.calibration.result import TOLERANCE_PERCENT, LearnedClock, LearnedRun, LearnedShare
+from shapegcode.timing.calibration.runs_file import RunEntry, RunsFile
 
 __all__ = [
     "STUDIES",

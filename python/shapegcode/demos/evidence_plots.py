@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from shapegcode.characterization.clock.result import TOLERANCE_PERCENT
 from shapegcode.demos.evidence import TOOL_PERCENT, EvidenceDemo
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
+from shapegcode.timing.calibration.result import TOLERANCE_PERCENT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

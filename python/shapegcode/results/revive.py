@@ -47,7 +47,7 @@ MODULES: Mapping[str, str] = {
     "FeedSchedule": "feed.result",
     "Identification": "identification.result",
     "IntervalResult": "testcut.result",
-    "LearnedClock": "characterization.clock.result",
+    "LearnedClock": "timing.calibration.result",
     "MachineDifference": "machine.difference_result",
     "MachineSetup": "setup.result",
     "MachineDescription": "machine.description_result",

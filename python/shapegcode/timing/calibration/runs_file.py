@@ -22,8 +22,6 @@ from shapegcode.settings.keys import Positive, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem, line_of
 
-__all__ = ["RunEntry", "RunsFile", "load_runs"]
-
 Use = Literal["fit", "test"]
 _HEAD_BYTES = 4096
 _Path = Annotated[str, Strict(), Field(min_length=1)]
