@@ -8,16 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from shapegcode.characterization.facts import CUTTING_SUM, ControllerFact, combine, mean
-from shapegcode.characterization.logfit import fit_logs
-from shapegcode.characterization.result import Characterisation
-from shapegcode.characterization.sheet import SHEET, FilledSheet, read_sheet
+from shapegcode.characterization.log_fit import fit_logs
+from shapegcode.characterization.programs import SHEET, FilledSheet, read_sheet
+from shapegcode.characterization.result import CUTTING_SUM, Characterisation, ControllerFact, combine, mean
 from shapegcode.characterization.stopwatch import fit_stopwatch
 from shapegcode.errors import ArgumentError
 from shapegcode.io.servo_log import parse_units, read_log
 from shapegcode.machine import Machine
-
-__all__ = ["characterize"]
 
 _ORDER = (
     "interpolation period",
