@@ -238,20 +238,17 @@ from shapegcode.studies.plots import (
 from shapegcode.studies.result import MachineStudy as MachineStudy
 from shapegcode.studies.study import study as study
 from shapegcode.studies.study_file import load_study as load_study
-from shapegcode.testcut.conditions import (
-    CornerShape as CornerShape,
-    CutConditions as CutConditions,
-)
 from shapegcode.testcut.cut import (
     TestCut as TestCut,
     read_test_cut as read_test_cut,
 )
-from shapegcode.testcut.cuts import (
+from shapegcode.testcut.design import (
+    CornerShape as CornerShape,
+    CutConditions as CutConditions,
     corner_cut as corner_cut,
     interval_cut as interval_cut,
     taper_cut as taper_cut,
 )
-from shapegcode.testcut.design_result import CutDesign as CutDesign
 from shapegcode.testcut.fit import fit_test_cut as fit_test_cut
 from shapegcode.testcut.plots import (
     plot_coefficients as plot_coefficients,
@@ -262,6 +259,7 @@ from shapegcode.testcut.plots import (
 from shapegcode.testcut.program import write_test_cut as write_test_cut
 from shapegcode.testcut.result import (
     CornerResult as CornerResult,
+    CutDesign as CutDesign,
     IntervalResult as IntervalResult,
     TaperResult as TaperResult,
 )

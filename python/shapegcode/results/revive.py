@@ -38,7 +38,7 @@ MODULES: Mapping[str, str] = {
     "Comparison": "comparison.result",
     "CornerDemo": "demos.corner",
     "CornerResult": "testcut.result",
-    "CutDesign": "testcut.design_result",
+    "CutDesign": "testcut.result",
     "CycleTime": "timing.result",
     "CycleTimeDemo": "demos.cycle_time",
     "Demonstration": "demos.result",

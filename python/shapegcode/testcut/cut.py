@@ -18,20 +18,6 @@ from pydantic import Field, TypeAdapter, ValidationError
 from shapegcode import _core
 from shapegcode.errors import ArgumentError
 
-__all__ = [
-    "COEFFICIENTS",
-    "CornerDetails",
-    "CutTool",
-    "CuttingLaw",
-    "DeeperStretch",
-    "Deepest",
-    "IntervalDetails",
-    "MeasuringPass",
-    "TaperDetails",
-    "TestCut",
-    "read_test_cut",
-]
-
 Array = npt.NDArray[np.float64]
 _FORMAT = "shapegcode test cut 1"
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

@@ -14,8 +14,6 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 
-__all__ = ["Edge", "left_edge", "on_increments", "reduced", "tool_path", "unrolled_edge"]
-
 Array = npt.NDArray[np.float64]
 
 _GRID_MM = 0.004
@@ -25,15 +23,10 @@ _MOVED = 9  # increments
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """A line of points, ascending in X; straight between them, and beyond the ends on as at the ends.
+    """A line of points, ascending in X; straight between them, and beyond the ends on as at the ends."""
 
-    Attributes:
-        x_mm: (n,) at least 2.
-        height_mm: (n,).
-    """
-
-    x_mm: Array
-    height_mm: Array
+    x_mm: Array  # (n,) at least 2
+    height_mm: Array  # (n,)
 
     def at(self, x_mm: Array) -> Array:
         """Height at each X."""

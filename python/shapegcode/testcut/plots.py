@@ -15,8 +15,6 @@ from shapegcode.testcut.result import CornerResult, IntervalResult, TaperResult
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_coefficients", "plot_corner", "plot_interval", "plot_taper", "plots_of"]
-
 _MEASURED, _EXPECTED, _LAGGING = plot.GREY, plot.COLOURS[0], plot.COLOURS[1]
 
 

@@ -13,10 +13,8 @@ from shapegcode.io.atomic import write_text
 from shapegcode.program.operating import OVERRIDE
 from shapegcode.results.json import to_text
 from shapegcode.testcut.cut import CornerDetails, MeasuringPass
-from shapegcode.testcut.design_result import CutDesign
 from shapegcode.testcut.edges import Edge, on_increments, tool_path
-
-__all__ = ["program_text", "write_test_cut"]
+from shapegcode.testcut.result import CutDesign
 
 _SKIM_MM = 0.2
 _ROUGH_SHARE = 0.1  # of the diameter: largest radial depth of the cuts that mill the edge
