@@ -44,7 +44,7 @@ SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 .PHONY: help demo test test-all lint bench bench-full bench-realtime coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
-        build-packages test-packages package dev tidy tidy-all release plain sanitize clang wheel stub-check \
+        build-packages test-packages package dev tidy tidy-all release plain sanitize threads clang wheel stub-check \
         test-all-core test-all-python test-linuxcnc fuzz-parameters fuzz-merge
 
 help:
@@ -53,6 +53,7 @@ help:
 	@echo 'make test-all  slow tests, sanitizers, the plain build, clang-tidy of everything and the book as well'
 	@echo 'make test-linuxcnc  the HAL component in LinuxCNC'"'"'s own simulation (installs linuxcnc-uspace); part of test-all'
 	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all'
+	@echo 'make threads  the controller with a thread for each of its parts, under ThreadSanitizer; part of test-all'
 	@echo 'make coverage  lines of C++ and Python that `make test` runs'
 	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter; bench-full: with all repetitions'
 	@echo 'make bench-realtime  MotionController: step(), push(), a loop of 1 ms, drift; options: REALTIME="--help"'
@@ -95,6 +96,7 @@ test-all:
 test-all-core:
 	$(MAKE) plain
 	$(MAKE) sanitize
+	$(MAKE) threads
 	$(MAKE) clang
 	$(MAKE) tidy-all
 
@@ -256,6 +258,12 @@ sanitize: test-packages
 	cmake --preset $@
 	cmake --build --preset $@
 	ctest --preset $@
+
+# The controller with a thread for each of its parts, under ThreadSanitizer.
+threads: test-packages .venv/.runtime
+	$(CONFIGURE_RELEASE)
+	cmake --build --preset release --target thread_tests
+	TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/thread_tests
 
 # Clang's warnings, with the extension module: compiled only.
 clang: .venv/.runtime

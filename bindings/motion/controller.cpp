@@ -23,8 +23,8 @@ namespace shapegcode::bindings {
 namespace {
 
 using AxisLimit = std::optional<std::variant<double, Vector3>>;
-using AxisShaper = std::variant<Shaper, Fir>;
-using AnyShaper = std::optional<std::variant<Shaper, Fir, std::vector<AxisShaper>, FollowingFir>>;
+using AxisShaper = std::variant<Shaper, Fir, Mode>;
+using AnyShaper = std::optional<std::variant<Shaper, Fir, Mode, std::vector<AxisShaper>, FollowingFir>>;
 
 void limit_axes(Vector3& limits, const AxisLimit& given) {
   if (!given) return;
@@ -34,6 +34,7 @@ void limit_axes(Vector3& limits, const AxisLimit& given) {
 
 Fir fir_of(const AxisShaper& shaper, double period_s) {
   if (const auto* design = std::get_if<Shaper>(&shaper)) return to_fir(*design, period_s);
+  if (const auto* mode = std::get_if<Mode>(&shaper)) return to_fir(zv_on_grid(*mode, period_s), period_s);
   return std::get<Fir>(shaper);
 }
 
@@ -41,6 +42,7 @@ ControllerShaper shaper_of(const AnyShaper& given, double period_s) {
   if (!given) return ControllerSettings{}.shaper;
   if (const auto* design = std::get_if<Shaper>(&*given)) return to_fir(*design, period_s);
   if (const auto* fir = std::get_if<Fir>(&*given)) return *fir;
+  if (const auto* mode = std::get_if<Mode>(&*given)) return to_fir(zv_on_grid(*mode, period_s), period_s);
   if (const auto* following = std::get_if<FollowingFir>(&*given)) return *following;
   std::vector<Fir> each;
   for (const AxisShaper& one : std::get<std::vector<AxisShaper>>(*given)) each.push_back(fir_of(one, period_s));
@@ -176,8 +178,8 @@ Args:
     following: Limits of the axes that follow the path, at most six.
     contour_tolerance_mm: What smoothing and shaper may cut off corners and arcs; inf: as much as the limits let them.
     smoothing_time_s: Length of each of two moving averages over every axis in s; 0: none.
-    shaper: Shaper on the grid of the period or Fir for all axes, a list of them with one for each axis, FollowingFir;
-        None: none.
+    shaper: Shaper on the grid of the period, Fir, or Mode (whose ZV on the grid it is) for all axes, a list of them
+        with one for each axis, FollowingFir; None: none.
     contour_correction: Take back, to the second order, what smoothing and shaper cut off arcs.
     window: Segments that the look-ahead sees, 8 at least.
     queue: Segments that may wait in all; rounded up to a power of two, and holds the window.

@@ -6,9 +6,11 @@
 
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "register.hpp"
@@ -57,7 +59,8 @@ Args:
 
 Raises:
     ArgumentError: A value is outside its range.)")
-      .def(py::init(&checked_mode), py::arg("frequency_hz"), py::arg("damping_ratio"), py::arg("participation") = 1.0,
+      .def(py::init(&checked_mode), py::arg("frequency_hz"), py::arg("damping_ratio") = 0.0,
+           py::arg("participation") = 1.0,
            "Make a mode; ArgumentError if a value is outside the range that the class states.")
       .def_readonly("frequency_hz", &Mode::frequency_hz, "Undamped natural frequency in Hz.")
       .def_readonly("damping_ratio", &Mode::damping_ratio, "Damping ratio, no unit.")
@@ -130,6 +133,21 @@ Returns:
     The ratio V (no unit), 0 where the shaper cancels the mode.
 
 Source: paper 002, eq. 8.)")
+      .def("residual", py::vectorize([](const Shaper* self, double frequency_hz, double damping_ratio) {
+             return shapegcode::residual_ratio(*self, checked_mode(frequency_hz, damping_ratio, 1.0));
+           }),
+           py::arg("frequency_hz"), py::arg("damping_ratio") = 0.0,
+           R"(Residual vibration over frequency: `residual_ratio` of modes of these frequencies.
+
+Args:
+    frequency_hz: Natural frequency in Hz, above 0; a number or an array of any shape.
+    damping_ratio: Damping ratio (no unit), 0 <= zeta < 1; a number, or an array that broadcasts with the frequencies.
+
+Returns:
+    The ratio (no unit): a number for numbers, else an array of the broadcast shape.
+
+Raises:
+    ArgumentError: A value is outside its range.)")
       .def("__repr__",
            [](const Shaper& self) {
              return "Shaper(times_s=" + repr(self.times_s) + ", amplitudes=" + repr(self.amplitudes) + ")";
@@ -144,16 +162,45 @@ Source: paper 002, eq. 8.)")
 }
 
 void register_designs(py::module_& m) {
-  m.def("zv", &shapegcode::zv, py::arg("mode"), release_gil(),
-        R"(Zero-vibration shaper of one mode: taps at 0 and half the damped period.
+  m.def(
+      "zv",
+      [](const std::variant<Mode, double>& mode, std::optional<double> damping_ratio) {
+        if (const auto* given = std::get_if<Mode>(&mode)) {
+          if (damping_ratio) throw Error(ErrorKind::argument, "damping_ratio is given, but the mode has its own");
+          return shapegcode::zv(*given);
+        }
+        return shapegcode::zv(checked_mode(std::get<double>(mode), damping_ratio.value_or(0.0), 1.0));
+      },
+      py::arg("mode"), py::arg("damping_ratio") = py::none(), release_gil(),
+      R"(Zero-vibration shaper of one mode: impulses at 0 and half the damped period.
+
+Args:
+    mode: The mode to cancel, or its undamped natural frequency in Hz: ``zv(46, 0.02)``.
+    damping_ratio: With a frequency, the damping ratio (no unit), 0 <= zeta < 1; None: 0.
+
+Returns:
+    A shaper with 2 non-negative impulses.
+
+Raises:
+    ArgumentError: A value is outside its range, or a damping ratio beside a mode.
+
+Source: paper 002, eq. 1-2 (Smith 1958).)");
+  m.def("zv_on_grid", &shapegcode::zv_on_grid, py::arg("mode"), py::arg("period_s"), release_gil(),
+        R"(ZV with impulses at multiples of a period only: the second one split between the two around it.
 
 Args:
     mode: The mode to cancel.
+    period_s: Of the grid in s, above 0, at most a quarter of the damped period.
 
 Returns:
-    A shaper with 2 non-negative taps.
+    A shaper with 3 non-negative impulses, 2 where half the damped period is a multiple; residual exactly zero at the
+    mode.
 
-Source: paper 002, eq. 1-2 (Smith 1958).)");
+Raises:
+    ArgumentError: The period is not above 0.
+    DesignError: The period is too long.
+
+Source: this project.)");
   m.def("convolve", &shapegcode::convolve, py::arg("first"), py::arg("second"), release_gil(),
         R"(The two shapers in series: cancels what either cancels, lasts as long as both together.
 

@@ -31,7 +31,7 @@ def __getattr__(name: str) -> Any:
         return sorted(_home())
     # Python itself asks for names such as __path__ and _core, before anybody uses a public one.
     if (name != "__version__" and name.startswith("_")) or name not in _home():
-        raise AttributeError(f"module 'shapegcode' has no attribute {name!r}")
+        raise AttributeError(f"module 'shapegcode' has no attribute {name!r}{_near(name)}")
     value = getattr(importlib.import_module(_home()[name]), name)
     if _home()[name] == "shapegcode._core":
         from shapegcode.model.signatures import with_signature
@@ -39,6 +39,14 @@ def __getattr__(name: str) -> Any:
         value = with_signature(value)
     globals()[name] = value
     return value
+
+
+def _near(name: str) -> str:
+    """The public name that was probably meant."""
+    import difflib
+
+    near = [] if name.startswith("_") else difflib.get_close_matches(name, _home(), n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def __dir__() -> list[str]:

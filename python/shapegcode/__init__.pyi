@@ -47,6 +47,7 @@ from shapegcode._core import (
     wall_errors_um as wall_errors_um,
     worst_residual as worst_residual,
     zv as zv,
+    zv_on_grid as zv_on_grid,
 )
 from shapegcode.batching.batch import (
     Cluster as Cluster,

@@ -102,11 +102,13 @@ class Ratios {
 
 }  // namespace
 
-Trial random_trial(std::uint32_t seed) {
-  Draw draw{std::mt19937(seed)};
+namespace {
+
+// A path for the settings, and what somebody does meanwhile.
+Trial trial_of(const ControllerSettings& settings, double fewest, double most, Draw& draw) {
   Trial trial;
-  trial.settings = random_settings(draw);
-  const auto count = static_cast<std::size_t>(draw.logarithmic(3.0, 60.0));
+  trial.settings = settings;
+  const auto count = static_cast<std::size_t>(draw.logarithmic(fewest, most));
   trial.segments = random_segments(draw.engine, count, draw.logarithmic(20.0, 400.0), draw.chance(0.6));
   std::array<double, most_following_axes> at{};
   for (std::size_t i = 0; i < count; ++i) {
@@ -125,7 +127,39 @@ Trial random_trial(std::uint32_t seed) {
   return trial;
 }
 
-Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<void(const ControllerState&)>& see) {
+}  // namespace
+
+Trial random_trial(std::uint32_t seed) {
+  Draw draw{std::mt19937(seed)};
+  const ControllerSettings settings = random_settings(draw);
+  return trial_of(settings, 3.0, 60.0, draw);
+}
+
+Trial wide_trial(std::uint32_t seed) {
+  Draw draw{std::mt19937(seed)};
+  ControllerSettings settings = random_settings(draw);
+  if (draw.chance(0.4)) {
+    settings.limits.law = AccelerationLaw::constant_time;
+    settings.limits.time_constant_s = draw.logarithmic(0.005, 0.3);
+  }
+  settings.limits.feed_override = draw.chance(0.3) ? 1.0 : draw.logarithmic(0.02, 2.0);
+  settings.contour_correction = draw.chance(0.4) && !std::holds_alternative<FollowingFir>(settings.shaper);
+  settings.window = static_cast<std::size_t>(draw.logarithmic(8.0, 1025.0));
+  settings.queue = static_cast<std::size_t>(draw.logarithmic(4.0, 2000.0));
+  if (!std::holds_alternative<std::vector<Fir>>(settings.shaper)) {
+    settings.following.resize(draw.chance(0.5) ? 0 : static_cast<std::size_t>(draw.between(1.0, 7.0)));
+    for (FollowingLimits& axis : settings.following) {
+      axis.max_feed = draw.logarithmic(20.0, 200.0);
+      axis.max_acceleration = draw.logarithmic(200.0, 5000.0);
+      axis.max_jerk =
+          draw.chance(0.9) ? axis.max_acceleration * draw.logarithmic(10.0, 200.0) : FollowingLimits{}.max_jerk;
+    }
+  }
+  return trial_of(settings, 1.0, 10'001.0, draw);
+}
+
+Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<void(const ControllerState&)>& see,
+                  std::size_t most_steps) {
   Draw draw{std::mt19937(seed ^ 0x9e3779b9U)};
   MotionController control(trial.settings);
   const std::size_t n_following = trial.settings.following.size();
@@ -135,7 +169,7 @@ Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<vo
   ratios.add(out);
   Outcome outcome;
   std::size_t pushed = 0;
-  while (outcome.steps < most_steps_of_trial && !outcome.ended) {
+  while (outcome.steps < most_steps && !outcome.ended) {
     const bool alone = outcome.steps >= trial.does.leaves;
     while (pushed < trial.segments.size() && (alone || draw.chance(trial.does.push))) {
       if (control.push(trial.segments[pushed], std::span(trial.following_end[pushed].data(), n_following)) !=
@@ -178,9 +212,11 @@ std::string text_of(const ControllerSettings& settings) {
     return fmt::format("{:.6g} {:.6g} {:.6g}", vector[0], vector[1], vector[2]);
   };
   return fmt::format(
-      "period {} window {} queue {} smoothing {:.6g} tolerance {:.6g} correction {} shaper kind {} following {}; feed "
+      "law {} override {:.6g} time constant {:.6g} period {} window {} queue {} smoothing {:.6g} tolerance {:.6g} "
+      "correction {} shaper kind {} following {}; feed "
       "{}; "
       "acceleration {}; jerk {}",
+      static_cast<int>(settings.limits.law), settings.limits.feed_override, settings.limits.time_constant_s,
       settings.period_s, settings.window, settings.queue, settings.smoothing_time_s, settings.contour_tolerance_mm,
       settings.contour_correction, settings.shaper.index(), settings.following.size(),
       list(settings.limits.max_feed_mm_per_s), list(settings.limits.max_acceleration_mm_per_s2),

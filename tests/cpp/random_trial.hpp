@@ -42,6 +42,10 @@ struct Trial {
 
 Trial random_trial(std::uint32_t seed);
 
+/// Every setting is drawn: both laws, the override at the begin, correction, windows of 8 to 1024, up to six following
+/// axes, 1 to 10 000 segments. The seeds of `random_trial` keep the trials that they stand for in its tests.
+Trial wide_trial(std::uint32_t seed);
+
 inline constexpr std::size_t most_steps_of_trial = 1'000'000;
 
 struct Outcome {
@@ -55,7 +59,8 @@ struct Outcome {
 };
 
 /// Runs the path of a seed; `see` gets the state after each step.
-Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<void(const ControllerState&)>& see = {});
+Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<void(const ControllerState&)>& see = {},
+                  std::size_t most_steps = most_steps_of_trial);
 
 /// The settings in one line, for a message.
 std::string text_of(const ControllerSettings& settings);

@@ -48,7 +48,7 @@ TEST_CASE("interpreter: half a tape is refused, none is not") {
   check_refused("%\nG90\nM30\n", 4, 1, {"no line '%' at the end"});
   check_refused("G90\nG00 X1.\n", 2, 1, {"neither '%' lines nor an end M30"});
   CHECK(warns(read_program("G90\nG00 X1.\nM30\n"), "no '%' lines"));
-  CHECK(warns(read_program("%\nG90\nG00 X1.\n%\n"), "does not end with M30"));
+  CHECK(warns(read_program("%\nG90\nG00 X1.\n%\n"), "does not end with M30, M02 or M99"));
   CHECK(read_program("LEADER TEXT @@\n%\nG21 G90 G00 X0.\nM30\n%\n").warnings.empty());
   // A '%' in a comment is no tape mark.
   check_refused("%\nG90 (50% DONE)\nM30\n", 4, 1, {"no line '%'"});

@@ -240,7 +240,12 @@ TEST_CASE("what cannot be run is refused, and says why") {
   CHECK(differences.acceleration() <= 1.001 * most_acceleration);
   CHECK(control.push(make_line({4, 0, 0}, {5, 0, 0}, 10.0)) == PushResult::aborted);
   CHECK(control.step(values_of(point)) == Activity::aborted);
-  control.restart(values_of(point));
+  for (const double value : {std::nan(""), MotionLimits::none}) {
+    CHECK_FALSE(control.restart(std::array{0.0, value, 0.0}));
+    CHECK(control.step(values_of(point)) == Activity::aborted);
+    CHECK(point.allFinite());
+  }
+  CHECK(control.restart(values_of(point)));
   CHECK(control.push(make_line(point, {9, 0, 0}, 10.0)) == PushResult::accepted);
   CHECK(run_until_idle(control).set_points.back() == Vector3(9, 0, 0));
   for (int result = 0; result <= static_cast<int>(PushResult::aborted); ++result) {
@@ -254,6 +259,41 @@ TEST_CASE("what cannot be run is refused, and says why") {
   settings = limited();
   settings.limits.max_acceleration_mm_per_s2.setConstant(MotionLimits::none);
   CHECK_THROWS_AS(MotionController{settings}, Error);
+  settings = limited();
+  settings.limits.feed_override = 2.5;
+  CHECK_THROWS_AS(MotionController{settings}, Error);
+}
+
+TEST_CASE("limits hold for any later override, whatever the control begins with") {
+  for (const AccelerationLaw law : {AccelerationLaw::jerk_limited, AccelerationLaw::constant_time}) {
+    for (const double begin : {0.05, 0.25, 0.7, 1.0, 2.0}) {
+      for (const double later : {0.5, 1.0, 2.0}) {
+        CAPTURE(begin);
+        CAPTURE(later);
+        ControllerSettings settings = limited();
+        settings.limits.law = law;
+        settings.limits.feed_override = begin;
+        MotionController control(settings);
+        CHECK(control.state().feed_override == begin);
+        std::mt19937 random(7);
+        const std::vector<Segment> segments = random_segments(random, 24, 150.0, false);
+        for (const Segment& segment : segments) REQUIRE(control.push(segment) == PushResult::accepted);
+        Differences differences(axis_count, period_s);
+        Vector3 point = Vector3::Zero();
+        differences.add(values_of(point));
+        Activity activity = Activity::moving;
+        for (int k = 0; activity != Activity::idle; ++k) {
+          REQUIRE(k < 1'000'000);
+          if (k == 40) control.feed_override(later);
+          activity = control.step(values_of(point));
+          differences.add(values_of(point));
+        }
+        CHECK(differences.speed() <= 1.001 * most_speed);
+        CHECK(differences.acceleration() <= 1.001 * most_acceleration);
+        CHECK(differences.jerk() <= 1.001 * most_jerk);
+      }
+    }
+  }
 }
 
 TEST_CASE("segments that run out stop the motion and are counted; it goes on with the next") {

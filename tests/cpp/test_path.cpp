@@ -83,6 +83,18 @@ TEST_CASE("path: empty, and with segments of no length") {
   CHECK(path.point(2.0, cursor) == Vector3(2.0, 0.0, 0.0));
 }
 
+TEST_CASE("segments: an array in braces, or handed over, is kept") {
+  const auto line = [](double from) { return make_line({from, 0, 0}, {from + 1.0, 0, 0}, 10.0); };
+  const auto braces = [&]() -> shapegcode::Segments { return {line(0.0), line(1.0), line(2.0)}; }();
+  const auto handed_over = [&]() -> shapegcode::Segments { return std::vector<Segment>{line(0.0), line(1.0)}; }();
+  const std::vector<Segment> other(64, line(9.0));  // where the arrays stood, if they are gone
+  REQUIRE(braces.size() == 3);
+  CHECK(braces.back().end_mm == Vector3(3, 0, 0));
+  CHECK(braces.part(1, 1).front().end_mm == Vector3(2, 0, 0));
+  CHECK(handed_over.back().end_mm == Vector3(2, 0, 0));
+  CHECK(shapegcode::Segments(other)[5].end_mm == Vector3(10, 0, 0));
+}
+
 TEST_CASE("path: every segment comes back as it went in, to the bit") {
   std::mt19937_64 generator(7);
   std::uniform_real_distribution<double> place(-100.0, 100.0);

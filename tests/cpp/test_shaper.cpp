@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,35 @@ TEST_CASE("shaper: residual ratio is V(omega, zeta), summed directly") {
   // a long, well damped shaper must not overflow
   const Shaper late = shapegcode::make_shaper({0.0, 1000.0}, {0.5, 0.5});
   CHECK(shapegcode::residual_ratio(late, {100.0, 0.5}) == doctest::Approx(0.5));
+}
+
+TEST_CASE("shaper: ZV on a grid cancels its mode with impulses on the grid, for any period up to a quarter") {
+  for (const double frequency_hz : {3.7, 46.0, 131.0}) {
+    for (const double damping : {0.0, 0.02, 0.3}) {
+      const Mode mode{frequency_hz, damping, 1.0};
+      const double half_period_s = duration_s(zv(mode));
+      for (const double ratio : {0.5, 0.4999, 0.37, 0.1, 0.013}) {
+        const double period_s = ratio * half_period_s;
+        const Shaper shaper = zv_on_grid(mode, period_s);
+        // Summed directly, with the mode's own exponentials.
+        const double rate = mode.damping_ratio * 2.0 * std::numbers::pi * frequency_hz;
+        double in_phase = 0.0;
+        double across = 0.0;
+        for (std::size_t k = 0; k < shaper.times_s.size(); ++k) {
+          const double steps = shaper.times_s[k] / period_s;
+          CHECK(std::abs(steps - std::round(steps)) < 1e-9);
+          CHECK(shaper.amplitudes[k] > 0.0);
+          const double angle = std::numbers::pi * shaper.times_s[k] / half_period_s;
+          in_phase += shaper.amplitudes[k] * std::exp(rate * shaper.times_s[k]) * std::cos(angle);
+          across += shaper.amplitudes[k] * std::exp(rate * shaper.times_s[k]) * std::sin(angle);
+        }
+        CHECK(std::hypot(in_phase, across) < 1e-12);
+        CHECK(duration_s(shaper) < half_period_s + period_s);
+      }
+      CHECK_THROWS_AS(zv_on_grid(mode, 0.51 * half_period_s), Error);
+      CHECK_THROWS_AS(zv_on_grid(mode, 0.0), Error);
+    }
+  }
 }
 
 TEST_CASE("shaper: becomes a filter only where its times lie on the grid") {

@@ -64,6 +64,41 @@ TEST_CASE("tape: without the first tape mark there is a warning, without the las
   CHECK(refusal("%\nO0001\n" + body).thrown);
 }
 
+TEST_CASE("tape: text behind the closing mark is not read, and a warning says so") {
+  for (const std::string text : {"%\nO1\n" + body + "%\nG1X99.\nM30\n", "%\nO1\n" + body + "%\n%\n\n(LEFT)\n%\n"}) {
+    const Program program = read_program(text);
+    CHECK(program.final_state.position_mm.x() == 20.0);
+    CHECK(warns(program, "text behind the '%'", text.find("LEFT") == std::string::npos ? 10 : 12));
+  }
+  for (const std::string end : {"%\n", "%", "% (END)\n\n", "%\n%\n"}) {
+    CHECK_FALSE(warns(read_program("%\nO1\n" + body + end), "text behind"));
+  }
+}
+
+TEST_CASE("tape: a line that ends with CR alone is refused where it stands") {
+  check_refused(with_line_ends("%\nO1\n" + body + "%\n", "\r"), 1, 2, {"CR alone", "LF or CR LF"});
+  check_refused("%\nG21G90\nG1X1.\rY2.F100.\nM30\n%\n", 3, 6, {"CR alone"});
+  for (const std::string end : {"\r\n", "\n\r\r", "\r\r\n", "\n\r", " \r \n"}) {
+    CHECK_FALSE(refusal(with_line_ends("%\nO1\n" + body + "%\n", end)).thrown);
+  }
+}
+
+TEST_CASE("tape: a byte-order mark is left out with a note") {
+  const std::string mark = "\xEF\xBB\xBF";
+  for (const std::string text : {"%\nO1\n" + body + "%\n", "O1\n" + body, "\n%\nO1\nM98P2\n" + body + "O2\nM99\n%\n"}) {
+    const Program plain = read_program(text);
+    const Program marked = read_program(mark + text);
+    CHECK(warns(marked, "byte-order mark", 1));
+    CHECK(marked.warnings.size() == plain.warnings.size() + 1);
+    CHECK(marked.text == plain.text);
+    CHECK(marked.program_number == 1);
+    const auto entries = list_programs(mark + text);
+    REQUIRE(entries.size() == list_programs(text).size());
+    CHECK(entries[0].number == 1);
+    CHECK(entries.back().text_end == list_programs(text).back().text_end + mark.size());
+  }
+}
+
 TEST_CASE("tape: N words keep their leading zeros") {
   const Program program = read_program("%\nO1\n" + body + "%\n");
   REQUIRE(program.regions[0]->notes.size() == 1);

@@ -136,7 +136,7 @@ def test_an_older_result_of_another_name_goes(folder: Path) -> None:
     """Out of tolerance the program has another name: the one that passed before must not stand beside it."""
     told(folder, "parts/a.nc", *ONE, code=0)
     assert (folder / "out/a.nc").exists()
-    tight = ("--", "--set", "tolerance.contour_um=0.001", "--set", "tolerance.residual_floor_um=0.0001", "--shape-all")
+    tight = ("--", "--set", "tolerance.contour_um=0.001", "--set", "shaping.contour=off", "--shape-all")
     (row,) = told(folder, "parts/a.nc", *ONE, *tight)["rows"]
     if row["ended"] == "refused":
         assert not (folder / "out/a.nc").exists()

@@ -40,6 +40,15 @@ def test_a_program_that_gains_nothing_is_left_as_it_is() -> None:
     assert most < MACHINE.shaping.least_gain_um
 
 
+def test_arcs_with_absolute_centres_stay_shaped_where_nothing_is_gained() -> None:
+    # Their text cannot stand in an emitted program, whose arcs are FANUC's.
+    slow = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X2.F600\nG3X4.Y2.I2.J2.\nG1Y4.\nG0Z5.\nM30\n%\n"
+    converted = convert(slow, machine_with({"input.arc_centre": "absolute"}), shape_all=False).conversion
+    (region,) = converted.regions
+    assert region.lines == (5, 7)
+    assert converted.kept == ()
+
+
 def test_only_the_region_that_gains_is_shaped() -> None:
     text = part(SLOW, FAST, SLOW)
     conversion = convert(text, MACHINE, shape_all=False).conversion

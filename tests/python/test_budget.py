@@ -135,7 +135,7 @@ def test_what_is_given_up_is_said() -> None:
         assert str(limit) in entry["reason"]
     (sentence,) = (warning for warning in report["warnings"] if "given up for the budget" in warning)
     first, last = budget["given_up"][0]["lines"]
-    assert f"{len(budget['given_up'])} of {len(FEEDS)} regions keep their text (lines {first} to {last}" in sentence
+    assert f"{len(budget['given_up'])} of {len(FEEDS)} cuts are left unchanged (lines {first} to {last}" in sentence
 
 
 def test_everything_is_given_up_before_nothing_fits() -> None:
@@ -307,7 +307,8 @@ def test_sample_under_all_three(name: str) -> None:
     assert len(judged.conversion.text) <= limit
     baud, blocks = rates(judged)
     assert (baud <= 38400 * (1 + 1e-9), blocks <= 150 * (1 + 1e-9)) == (True, True)
-    assert judged.conversion.ok
+    # The cuts left unchanged for the budget may miss their limits; the whole program is judged apart.
+    assert judged.conversion.shaped_cuts_within
 
 
 def test_comments_travel_on_the_line_too() -> None:

@@ -34,6 +34,49 @@ def told(check: sg.Check, code: str) -> list[tuple[int, str, int]]:
     return [(each.line, each.severity, each.alarm) for each in check.findings if each.code == code]
 
 
+# ---- what deserves a word ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        (HEAD + "G1X10.F900\n%\n", 6, "does not end with M30, M02 or M99"),
+        (HEAD + "G1X10.F900\nM30\n%\nG1X99.\nM30\n%\n", 8, "text behind the '%' that ends the program"),
+        (HEAD + "G68X0Y0R400.\nG1X10.F900\nG69\n" + END, 5, "G68 R400: a control takes -360 to 360 degrees"),
+        ("\ufeff" + HEAD + "G1X10.F900\n" + END, 1, "a byte-order mark (UTF-8) before the first line is left out"),
+    ],
+    ids=["no end", "text behind the end", "a turn and more", "byte-order mark"],
+)
+def test_what_a_control_may_take_otherwise_is_a_warning_everywhere(text: str, line: int, said: str) -> None:
+    check = sg.check_text(text, machine(), source="part.nc")
+    (found,) = [each for each in check.findings if said in each.message]
+    assert (found.severity, found.line) == ("warning", line)
+    # What converts and simulates reads a program with these warnings; no other line of theirs is touched.
+    program = sg.Program.from_text(text, machine(), source="part.nc")
+    assert [each for each in program.warnings if said in each and f"part.nc:{line}:" in each]
+    for warnings in (sg.convert(program, machine(), shape_all=True).warnings, sg.simulate(program, machine()).warnings):
+        assert [each for each in warnings if said in each]
+    plain = text.removeprefix("\ufeff").encode()
+    assert sg.convert(program, machine(), shape_all=True, only=[]).text == plain
+
+
+def test_a_line_that_ends_with_cr_alone_is_refused() -> None:
+    text = (HEAD + "G1X10.F900\n" + END).replace("\n", "\r")
+    check = sg.check_text(text, machine(), source="part.nc")
+    assert told(check, "alarm") == [(1, "alarm", 0)] and "CR alone" in check.findings[0].message
+    with pytest.raises(
+        sg.ProgramError, match=r"part\.nc:1:2: a line ends with CR alone: write line ends as LF or CR LF"
+    ):
+        sg.Program.from_text(text, machine(), source="part.nc")
+
+
+def test_a_turn_beyond_a_whole_one_is_turned_by_what_is_left() -> None:
+    """400 degrees are 40: the judge of the dialect works out where the cut ends."""
+    body = HEAD + "G68X0Y0R{}.\nG1X10.Y5.F900\nG69\n" + END
+    ends = [sg.Program.from_text(body.format(turn), machine()).regions[0].path.end_mm for turn in (400, 40)]
+    assert list(ends[0]) == pytest.approx(list(ends[1]), abs=1e-9)
+
+
 # ---- what is refused ---------------------------------------------------------------------------------------
 
 
@@ -344,7 +387,7 @@ def test_exit_codes_and_table(folder: Path, capsys: pytest.CaptureFixture[str]) 
     assert (code, err) == (1, "")
     assert "short.nc:6" in out
     # The table says it, and nothing says it again.
-    assert " ".join(out.split()).count("without blocks in store") == 1
+    assert " ".join(out.split()).count("with an empty block buffer") == 1
     code, out, err = run(capsys, "bad.nc", "-m", "vx500")
     assert (code, err) == (2, "")
     for said in ("bad.nc:6:1", "0010", "bad.nc:8:4", "0005", "2 alarms", "next: correct bad.nc:6:1 first"):

@@ -93,6 +93,41 @@ def test_absolute_and_incremental_sample_are_the_same_part() -> None:
         assert absolute == pytest.approx(incremental, abs=2e-3)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_an_axis_at_rest_stays_where_it_is_whatever_the_unit(seed: int) -> None:
+    """Z stands between two increments of an inch; what the judge's interpreter reads of it never moves."""
+    rng = np.random.default_rng(seed)
+    # Z: 5 mm and others that no inch word of four digits names; then cuts in both units.
+    height, axis = 5.0 + rng.integers(0, 90) / 100.0, "XY"[seed % 2]
+    lines, at = [f"G0Z{height:.2f}"], 0.0
+    for unit in ("G21", "G20", "G21", "G20", "G21"):
+        scale, digits, feed = (25.4, 4, 80.0) if unit == "G20" else (1.0, 3, 2000.0)
+        lines.append(unit)
+        for _ in range(4):
+            at += rng.uniform(20.0, 60.0)
+            lines.append(f"G1{axis}{at / scale:.{digits}f}F{feed}")
+    text = part("\n".join(lines) + "\n")
+    judged = convert(text, machine_with())
+    assert len(judged.conversion.placed) == 5
+    # What stands before the first cut, and behind the last one, moves as in the original.
+    first, last = judged.conversion.placed[0].first_line, judged.conversion.placed[-1].last_line
+    records = interpret(judged.conversion.text.decode()).lines[first - 1 : last]
+    still = "Y" if axis == "X" else "X"
+    for move in (move for record in records for move in record.moves):
+        assert abs(move.delta[2]) == 0.0 and move.end[2] == pytest.approx(height, abs=1e-12), move
+        assert move.delta["XY".index(still)] == 0.0
+
+
+def test_a_cut_whose_end_its_unit_cannot_name_is_left_unchanged_with_its_reason() -> None:
+    text = part("X5.\nZ5.\nG1X40.F2000\nX81.2\nG20\nG91\nG1X1.F80.\nX1.Y1.\nG90\nG21\nG1X140.Y10.F2000\nX180.Y0\n")
+    judged = convert(text, machine_with())
+    outcomes = judged.conversion.cuts
+    assert [each.is_shaped for each in outcomes] == [True, False, True]
+    # 81.2 mm and 2 inches are 51968.504 increments of an inch.
+    assert "it ends at X 132.00000 mm, 1.26 um off what G20 can name" in outcomes[1].reason
+    assert "limit 0.50 um" in outcomes[1].reason
+
+
 # ---- programs made by hand, each for one thing -------------------------------------------------------------
 
 INCH = HEAD.replace("G21", "G20")
@@ -100,6 +135,10 @@ G91_UNKNOWN = "%\nO1\nG21G17G94\nG91G1X10.F600\nY5.\nG2X5.Y5.I5.\nM30\n%\n"
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "one line": (part("G1X10.F600\n"), {}),
     "inch": (part("G1X1.F40.\nY1.\nG2X2.Y0.I0.J-1.F20.\nX2.2345Y-.1234R.3\n", INCH), {}),
+    "inch and mm": (
+        part("Z5.\nG1X40.Y10.F2000\nX76.2Y0\nG20\nG1X4.Y.5F80.\nX5.Y0\nG21\nX140.Y10.F2000\nX180.Y0\n"),
+        {},
+    ),
     "inch slow": (part("G1X.1F.1\nY.1\n", INCH), {}),
     "G61": (part("G61\nG1X10.F600\nY10.\nX0\nG64\nY0\n"), {}),
     "G61 with a move": (part("G61G1X10.F600\nY10.\nG64X0\nY0\n"), {}),

@@ -70,7 +70,7 @@ def test_the_table_sets_original_against_emitted() -> None:
     assert "residual vibration Z" not in found
     assert found["contour error of the command, largest"].change == ""  # nothing to compare with
     assert found["contour error of the command, largest"].limit is None
-    assert found["contour error of the table, largest"].limit == 20.0  # what `shaping.contour` names
+    assert found["contour error of the machine table, largest"].limit == 20.0  # what `shaping.contour` names
     assert found["size of the program"].emitted == len(conversion.text)
     assert found["orbit error"].emitted == conversion.orbit_error_percent[0]
     text = str(conversion.tables()[0])
@@ -161,14 +161,14 @@ def test_an_option_is_checked_as_a_key_of_the_machine_file(options: dict[str, An
 
 def test_what_a_verdict_rests_on_fits_80_columns_without_a_broken_word() -> None:
     longest = RestsOn(
-        "controller.interpolation_period_s", "0.001 s", "inherited", "longer, case starved 20 ms",
+        "controller.interpolation_period_s", "0.001 s", "inherited", "longer, case underrun 20 ms",
         "contour error of the response", 12.3, 279.8, 20.0,
     )  # fmt: skip
     law = replace(longest, key="controller.motion", value="after_interpolation", origin="assumed")
     lines = str(rests_table([longest, law], 6)).splitlines()
     assert max(map(len, lines)) <= 80 and len(lines) <= 10
     words = {word for line in lines for word in line.split()}
-    assert {longest.key, "inherited", "after_interpolation", "contour", "279.8", "20.0", "limit", "starved"} <= words
+    assert {longest.key, "inherited", "after_interpolation", "contour", "279.8", "20.0", "limit", "underrun"} <= words
     assert any("20 ms" in line for line in lines)
 
 

@@ -61,7 +61,7 @@ def smoothed(points: np.ndarray, ms: int, bits: str) -> np.ndarray:
 
 @pytest.mark.parametrize(("ms", "bits"), [(100, "00000001"), (24, "00000001"), (40, "00000000")])
 def test_ball_bar_circle_with_the_filter_of_1622(ms: int, bits: str) -> None:
-    """Report and playback agree within 5 %: contour error of the table, and residual vibration where there is some."""
+    """Report and simulation agree within 5 %: contour error of the machine table, and residual vibration."""
     judged = convert(BALL_BAR, imported(ms, bits))
     report = judged.conversion.to_dict()
     modes = [[MODE], [], []]

@@ -144,7 +144,7 @@ def test_other_values_leave_the_defaults_what_they_are() -> None:
 
 def test_machine_never_changes_after_loading() -> None:
     machine = Machine.load("vx500")
-    with pytest.raises(ValueError, match="frozen"):
+    with pytest.raises(AttributeError, match="with_values"):
         machine.controller.block_time_s = 1  # type: ignore[misc]
 
 

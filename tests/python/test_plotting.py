@@ -184,7 +184,7 @@ LONG = "%\nO1\nG21G90G94G17\nG00X0Y0Z0\nG01X20.F200\nG03X40.Y20.I0.J20.\nG01Y40.
 def test_a_long_region_shows_its_worst_place_and_its_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     machine = Machine.load("vx500")
     conversion = convert(Program.from_text(LONG.encode(), machine, source="long"), machine, shape_all=True)
-    assert len(conversion.save_plots(tmp_path)) == 6
+    assert len(conversion.save_plots(tmp_path)) == 8
     text = svg_text(tmp_path / "path.svg")
     assert "around the worst place of the original" in text and "on the whole path" in text
     text = svg_text(tmp_path / "vibration.svg")

@@ -390,7 +390,7 @@ def test_verdict_ends_with_what_it_rests_on(started: Path, tmp_path: Path, capsy
     assert min(moves) >= 0.01
     assert all(row["moved_um"] >= row["figure_um"] for row in rows)
     assert len(keys) == len(set(keys)) <= 8
-    assert shown.index("what the verdict rests on") > shown.index("cases of the verdict")
+    assert shown.index("sensitivity to unverified parameters") > shown.index("operating conditions:")
 
 
 def test_an_axis_of_which_nobody_knows_is_tried_with_a_mode() -> None:

@@ -311,6 +311,15 @@ def test_inch_programs_are_shaped_in_inches() -> None:
     assert max(m.feed for k in range(first - 1, last) for m in emitted[k].moves) <= 15000.0
 
 
+def test_a_rapid_in_inches_leaves_a_height_in_mm_where_it_is() -> None:
+    text = "G90 G21 G17\nG00 X0. Y0.\nZ5.\nG20\nG01 X1. F40.\nG00 X3.5 Y.25\nG01 X4. F20.\nG21\nX140. F500.\nM30\n"
+    conversion = converted(text)
+    (move,) = conversion.to_dict()["rapids"]["moves"]
+    assert move["lines"] == [6, 6]
+    lines = interpret(conversion.text.decode()).lines[3:]
+    assert {line.modal["position"][2] for line in lines if line.moves} == {5.0}
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

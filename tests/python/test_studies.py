@@ -419,7 +419,7 @@ def test_a_choice_that_nothing_bears_is_code_1_and_draws_none(tmp_path: Path) ->
     done = run(written(tmp_path, text), "optimize", "STUDY.toml", "--set", "tolerance.contour_um=0.2", "--plots", "p")
     assert done.returncode == 1, done.stderr
     assert done.stdout.startswith("none of 4 choices stays within tolerance on 95 % of the machines")
-    assert "pictures: none are drawn of this" in done.stdout
+    assert "pictures: there are none of this result" in done.stdout
 
 
 @pytest.mark.parametrize(

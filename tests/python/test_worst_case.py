@@ -214,7 +214,7 @@ def test_a_starved_block_is_as_bad_as_the_worst_of_all_places(time_constant_tick
     judged = convert(PART, machine_with(keys))
     cuts = emitted_cuts(judged)
     case = judged.conversion.to_dict()["cases"][-1]
-    assert (case["name"], case["starved_ms"]) == ("starved 20 ms", 20.0)
+    assert (case["name"], case["starved_ms"]) == ("underrun 20 ms", 20.0)
     worst = np.zeros(3)
     for after in range(len(cuts) - 1):
         points, begin, end = starved_points(cuts, after, 0.020, "ceil")
@@ -281,7 +281,7 @@ def test_a_band_decides_what_counts() -> None:
     corners = {f"override {at} %, all modes {way}" for at in (75, 105) for way in ("low", "high")}
     assert counted({**band, "verdict.mode_uncertainty": True}) == counted(band) | modes | corners
     everything = {**only, "verdict.look_ahead": True, "verdict.starved_block": True, "verdict.starved_s": 0.03}
-    assert counted(everything) == {"nominal, ceil", "look-ahead on", "starved 30 ms"}
+    assert counted(everything) == {"nominal, ceil", "look-ahead on", "underrun 30 ms"}
     # A controller without look-ahead has no such case, unless it is asked for.
     names = [case.name for case in stated_cases(sg.Machine.load("kimm004"))]
     assert "look-ahead on" not in names
@@ -293,7 +293,7 @@ def test_a_band_decides_what_counts() -> None:
     [
         ({"verdict.override_percent": [80, 100], **STRICT}, "override"),
         ({"verdict.look_ahead": True}, "look-ahead on"),
-        ({"verdict.starved_block": True}, "starved 20 ms"),
+        ({"verdict.starved_block": True}, "underrun 20 ms"),
     ],
 )
 def test_the_worst_case_that_counts_decides(keys: dict[str, Any], words: str) -> None:
@@ -442,13 +442,13 @@ def test_what_has_to_be_measured_depends_on_the_target() -> None:
 
 
 def test_table_shows_what_only_stands_beside_in_brackets(judged: Judged) -> None:
-    (table,) = (each for each in judged.conversion.tables() if each.title.startswith("cases of the verdict"))
+    (table,) = (each for each in judged.conversion.tables() if each.title.startswith("operating conditions"))
     lines = str(table).splitlines()
     assert sum("<- worst" in line for line in lines) == 1
     rows = {case.name: line for case in judged.conversion.cases for line in lines if case.name in line}
-    assert "(out)" in rows["starved 20 ms"]
+    assert "(out)" in rows["underrun 20 ms"]
     assert "within" in rows["all modes low"] and "(" not in rows["all modes low"]
-    assert "8 of 17 cases count" in lines[-1]
+    assert "8 of 17 operating conditions count" in lines[-1]
     assert max(map(len, lines)) <= 80
 
 

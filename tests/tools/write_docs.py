@@ -21,7 +21,8 @@ _HEAD = """\
 <!-- Generated: make docs -->
 
 `import shapegcode as sg` offers these names. `help(sg.convert)` says what each takes, with shapes and units, what it
-returns and raises, and where the method comes from. Every function that takes a program takes a `Program` or its path.
+returns and raises, and where the method comes from. Every function that takes a program takes a `Program`, its path or
+its text (a string of several lines); every one that takes a machine takes a `Machine`, its file or its built-in name.
 Every result of a command is a frozen dataclass with `ok`, `warnings`, `next_step`, `to_dict()`, `tables()`, `plots()`;
 the keys of its JSON are in [schemas](schemas.md). `result.plots()` draws its pictures by name,
 `result.save_plots(folder)` writes them.
@@ -29,6 +30,19 @@ the keys of its JSON are in [schemas](schemas.md). `result.plots()` draws its pi
     machine = sg.Machine.load("vx500").with_values("tolerance.contour_um", 10)
     conversion = sg.convert("part.nc", machine)
     print(conversion.answer, conversion.next_step)
+
+What can be guessed:
+
+| line | what it gives |
+|---|---|
+| `sg.convert("part.nc", "vx500")` | the shaped program with its verdict; so do `simulate`, `check`, `cycle_time` |
+| `sg.zv(46, 0.02)` | the ZV shaper of 46 Hz with a damping ratio of 0.02; `sg.Mode(46, 0.02)` is that mode |
+| `sg.zv(46).residual(frequencies_hz)` | its residual vibration over an array of frequencies |
+| `sg.choose_shaper([46, 131])` | every family of shapers for two modes, and the one to take |
+| `sg.plot_sensitivity(shaper)` | residual vibration over frequency, of a comparison, a shaper or a dict of shapers |
+| `sg.identify(t, y)`, `sg.identify(t, y, force)` | modes of a decay, of an impact test, from arrays |
+| `sg.Machine.simple(modes={"x": 46, "y": [131, 200]})` | a machine of which nothing but its modes is known |
+| `sg.MotionController(shaper=sg.Mode(46, 0.02), ...)` | a controller behind the ZV of a mode on its own grid |
 
 | name | home | what it is |
 |---|---|---|

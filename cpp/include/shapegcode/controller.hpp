@@ -45,7 +45,8 @@ using ControllerShaper = std::variant<Fir, std::vector<Fir>, FollowingFir>;
 /// What a control is made of. Speeds, accelerations and jerks that are finite are kept by the set-points that leave it.
 struct ControllerSettings {
   double period_s = 0.001;
-  /// Of X, Y and Z, with the rules for corners. A finite jerk wants a finite acceleration. Under the constant-time law
+  /// Of X, Y and Z, with the rules for corners. A finite jerk wants a finite acceleration. Its feed override, at most
+  /// 2, is the one that the control begins with: what is planned holds for any later one. Under the constant-time law
   /// ramps are as steep as its time constant lets them be, but short ones are not stretched to it.
   MotionLimits limits;
   /// One for each axis behind X, Y and Z, at most six.
@@ -139,8 +140,9 @@ class MotionController {
   void resume() noexcept;
   /// Come to rest along the path and forget the rest of it.
   void abort() noexcept;
-  /// At rest at a position (axes() values), the queue empty. Not while another thread pushes or steps.
-  void restart(std::span<const double> position) noexcept;
+  /// At rest at a position (axes() values), the queue empty. Not while another thread pushes or steps. False, and
+  /// nothing is changed: a value is not finite.
+  bool restart(std::span<const double> position) noexcept;
 
   [[nodiscard]] ControllerState state() const noexcept;
   [[nodiscard]] int axes() const noexcept;
@@ -148,7 +150,7 @@ class MotionController {
   [[nodiscard]] double delay_periods() const noexcept;
   /// Periods of that which are the correction's.
   [[nodiscard]] int correction_delay() const noexcept;
-  /// What plan_speed takes for the same profile of a whole path.
+  /// What plan_speed takes for the same profile of a whole path at a feed override of 1.
   [[nodiscard]] const MotionLimits& planning_limits() const noexcept;
   [[nodiscard]] const FilterTolerance& planning_tolerance() const noexcept;
 

@@ -66,7 +66,8 @@ struct Nearest {
 };
 [[nodiscard]] Nearest nearest_on(const Segment& segment, const Vector3& p) noexcept;
 
-/// Segments in a row, of a path or of an array, by value. An array must outlive it.
+/// Segments in a row, of a path or of an array, by value. An array that it is given by reference must outlive it; one
+/// that is handed over, or written in braces, it keeps.
 class Segments;
 
 /// A connected run of segments with the distance of each from the start. Constant after construction; a copy is the
@@ -175,7 +176,11 @@ class Segments {
   Segments(Path path) noexcept : path_(std::move(path)), count_(path_.size()) {}
   Segments(std::span<const Segment> array) noexcept : array_(array.data()), count_(array.size()) {}
   Segments(const std::vector<Segment>& array) noexcept : Segments(std::span<const Segment>(array)) {}
-  Segments(std::initializer_list<Segment> array) noexcept : Segments(std::span<const Segment>(array)) {}
+  Segments(std::vector<Segment>&& array)
+      : own_(std::make_shared<const std::vector<Segment>>(std::move(array))),
+        array_(own_->data()),
+        count_(own_->size()) {}
+  Segments(std::initializer_list<Segment> array) : Segments(std::vector<Segment>(array)) {}
   // NOLINTEND(google-explicit-constructor)
 
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
@@ -197,6 +202,7 @@ class Segments {
 
  private:
   Path path_;
+  std::shared_ptr<const std::vector<Segment>> own_;
   const Segment* array_ = nullptr;
   std::size_t first_ = 0;
   std::size_t count_ = 0;

@@ -74,6 +74,12 @@ inline constexpr double grid_largest_residual = 1e-10;
 /// K = exp(-zeta*pi/sqrt(1-zeta^2)). Throws Error(argument) as `pole` does. Source: paper 002, eq. 1-2 (Smith 1958).
 [[nodiscard]] Shaper zv(const Mode& mode);
 
+/// ZV where impulses lie at multiples of a period only: the second one split between the two multiples around half the
+/// damped period, so that the residual at the mode is exactly zero; three non-negative impulses, two where half the
+/// period is a multiple. Throws Error(argument) as `pole` does or for a period that is not above 0, Error(design) if
+/// the period is longer than a quarter of the damped period. Source: this project.
+[[nodiscard]] Shaper zv_on_grid(const Mode& mode, double period_s);
+
 /// Most zeros that `repeated_zv` places at a mode.
 inline constexpr int most_repeated_zeros = 20;
 

@@ -225,8 +225,7 @@ shapegcode_status shapegcode_controller_abort(shapegcode_controller* controller)
 shapegcode_status shapegcode_controller_restart(shapegcode_controller* controller, const double* position) {
   if (controller == nullptr || position == nullptr) return SHAPEGCODE_ERROR_NULL;
   const std::span values(position, static_cast<std::size_t>(controller->control.axes()));
-  if (!std::ranges::all_of(values, [](double value) { return std::isfinite(value); })) return SHAPEGCODE_NOT_FINITE;
-  controller->control.restart(values);
+  if (!controller->control.restart(values)) return SHAPEGCODE_NOT_FINITE;
   std::ranges::copy(values, controller->end.begin());
   return SHAPEGCODE_OK;
 }

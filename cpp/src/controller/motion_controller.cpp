@@ -112,7 +112,8 @@ class MotionController::Implementation {
   void hold(bool held) noexcept { hold_.store(held, std::memory_order_relaxed); }
   void abort() noexcept { abort_.store(true, std::memory_order_relaxed); }
 
-  void restart(std::span<const double> position) noexcept {
+  bool restart(std::span<const double> position) noexcept {
+    if (!std::ranges::all_of(position, [](double value) { return std::isfinite(value); })) return false;
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
     tail_.store(head, std::memory_order_relaxed);
     hold_.store(false, std::memory_order_relaxed);
@@ -132,6 +133,7 @@ class MotionController::Implementation {
     first_ = head;
     ran_out_ = true;
     publish(Activity::idle);
+    return true;
   }
 
   [[nodiscard]] ControllerState state() const noexcept { return shared_.read(); }
@@ -242,7 +244,7 @@ void MotionController::feed_override(double ratio) noexcept { implementation_->f
 void MotionController::hold() noexcept { implementation_->hold(true); }
 void MotionController::resume() noexcept { implementation_->hold(false); }
 void MotionController::abort() noexcept { implementation_->abort(); }
-void MotionController::restart(std::span<const double> position) noexcept { implementation_->restart(position); }
+bool MotionController::restart(std::span<const double> position) noexcept { return implementation_->restart(position); }
 ControllerState MotionController::state() const noexcept { return implementation_->state(); }
 int MotionController::axes() const noexcept { return static_cast<int>(implementation_->axes()); }
 double MotionController::delay_periods() const noexcept { return implementation_->delay_periods(); }

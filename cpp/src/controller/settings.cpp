@@ -64,6 +64,7 @@ int jerk_periods(const ControllerSettings& settings) {
 void check_settings(const ControllerSettings& settings) {
   require_period(settings.period_s);
   check_limits(settings.limits, {settings.contour_tolerance_mm, 1.0, 0.0, 0.0});
+  require(settings.limits.feed_override <= most_override, "feed override", settings.limits.feed_override, "", "<= 2");
   if (settings.following.size() > most_following_axes) {
     throw Error(ErrorKind::argument, fmt::format("{} following axes, at most {} are possible",
                                                  settings.following.size(), most_following_axes));
@@ -93,6 +94,7 @@ void check_settings(const ControllerSettings& settings) {
 MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
   const double share = own_share(filters) / filters.gain();
   MotionLimits limits = settings.limits;
+  limits.feed_override = 1.0;  // the one at the begin may be raised later; zones reach as far as any can be
   const int periods = jerk_periods(settings);
   limits.jerk_time_s = periods > 1 ? periods * settings.period_s : 0.0;
   limits.max_feed_mm_per_s = (limits.max_feed_mm_per_s / filters.gain()).cwiseMin(changing_speed(settings, filters));

@@ -58,6 +58,34 @@ Shaper zv(const Mode& mode) {
   return make_shaper({0.0, half_period}, {1.0 / (1.0 + decay), decay / (1.0 + decay)});
 }
 
+Shaper zv_on_grid(const Mode& mode, double period_s) {
+  if (!(period_s > 0.0) || !std::isfinite(period_s)) {
+    throw Error(ErrorKind::argument, fmt::format("period is {} s: it must be above 0", period_s));
+  }
+  const std::complex<double> s = pole(mode);
+  const double half_period = std::numbers::pi / s.imag();
+  if (period_s > 0.5 * half_period) {
+    throw Error(ErrorKind::design,
+                fmt::format("period is {} s: a quarter of the damped period of {} Hz, {:.6g} s, is the longest for ZV",
+                            period_s, mode.frequency_hz, 0.5 * half_period));
+  }
+  const double steps = half_period / period_s;
+  constexpr double on_grid = 1e-9;
+  if (std::abs(steps - std::round(steps)) < on_grid) {
+    const double decay = std::exp(s.real() * half_period);
+    return make_shaper({0.0, std::round(steps) * period_s}, {1.0 / (1.0 + decay), decay / (1.0 + decay)});
+  }
+  const double before = std::floor(steps) * period_s;
+  const double behind = (std::floor(steps) + 1.0) * period_s;
+  // Vibration of the two impulses beside half the period, seen back at time 0, is real and negative.
+  const std::complex<double> first = std::exp(-s * before);
+  const std::complex<double> second = std::exp(-s * behind);
+  const double ratio = -first.imag() / second.imag();
+  const double first_one = -(first.real() + ratio * second.real());
+  const double sum = first_one + 1.0 + ratio;
+  return make_shaper({0.0, before, behind}, {first_one / sum, 1.0 / sum, ratio / sum});
+}
+
 Shaper repeated_zv(const Mode& mode, int zeros) {
   if (zeros < 1 || zeros > most_repeated_zeros) {
     throw Error(ErrorKind::argument,

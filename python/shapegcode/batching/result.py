@@ -160,7 +160,7 @@ class Batch(Result):
         summary: the table of all rows as a file.
         not_done: runs that were not begun or not ended, because the batch was stopped.
         stopped: why it was; empty: it was not.
-        warnings: what to heed.
+        warnings: caution, before you run.
         wall_s: of the batch.
         processes: at a time.
         html: folder of the pages; empty: there are none.
@@ -213,7 +213,7 @@ class Batch(Result):
         """To the worst of what is left to do."""
         counts = self.counts
         if self.not_done or counts["failed"]:
-            return "settle why, then say the same again with --resume: what is done stays."
+            return "resolve the cause, then run the same command with --resume: what is done stays."
         if counts["refused"]:
             return f"mend what was refused ({self.summary} has why), then say the same again with --resume."
         if counts["not ok"]:

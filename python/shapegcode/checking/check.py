@@ -29,7 +29,7 @@ from shapegcode.program import Program
 from shapegcode.program.memory import require_memory_for_lines
 from shapegcode.program.operating import no_room
 from shapegcode.program.program import ARC_OFF_RADIUS
-from shapegcode.program.reading import program_bytes
+from shapegcode.program.reading import is_program_text, program_bytes
 from shapegcode.program.several import index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN
 
@@ -45,6 +45,8 @@ _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
 _WORK_LIMIT = re.compile(r"controller\.max_(program|expansion)_")  # in the message of every limit of a reading
+# Of the reader's remarks those by which a control may do something else than the text seems to say.
+_NOT_AS_WRITTEN = re.compile(r"does not end with M30|^text behind the '%'|^G68 R|byte-order mark")
 _ROUNDING = 1e-9
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
 # Of one reading (most_alarms in the core's reader).
@@ -52,7 +54,9 @@ _MOST_ALARMS = 200
 _MEMORY_PER_LINE = 350  # bytes
 
 
-def check(program: Program | str | Path, machine: Machine, *, program_number: int | str | None = None) -> Check:
+def check(
+    program: Program | str | Path, machine: Machine | str | Path, *, program_number: int | str | None = None
+) -> Check:
     """Check a program: what the control would refuse, and what it would not run as programmed.
 
     Args:
@@ -68,8 +72,13 @@ def check(program: Program | str | Path, machine: Machine, *, program_number: in
         ProgramError: not to be read at all, without a place to point to.
         OSError: the file cannot be read.
     """
+    machine = Machine.of(machine)
     if isinstance(program, Program):
+        program.require_machine(machine)
         text, source, folder = program.text, program.source, program.folder
+        program_number = program.number if program_number is None else program_number
+    elif is_program_text(program):
+        return check_text(str(program), machine, program_number=program_number)
     else:
         text = program_bytes(program, machine.controller.max_program_bytes)
         source, folder = str(program), Path(program).parent
@@ -78,7 +87,7 @@ def check(program: Program | str | Path, machine: Machine, *, program_number: in
 
 def check_text(
     text: bytes | str,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     source: str = "<text>",
     program_number: int | str | None = None,
@@ -100,6 +109,7 @@ def check_text(
     Raises:
         ProgramError: not to be read at all, without a place to point to.
     """
+    machine = Machine.of(machine)
     data = text.encode() if isinstance(text, str) else text
     require_memory_for_lines(data, source, _MEMORY_PER_LINE)
     own, lines_before = _own_text(data, program_number, source)
@@ -224,7 +234,8 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
         message = f"reading stopped here after {_MOST_ALARMS} alarms: what follows is not checked"
         yield Finding("note", "reader", 0, file or program.source, line, 0, message)
     for line, column, alarm, message, file in program.core.warnings:
-        yield _finding("note", "reader", alarm, file or program.source, line, column, message)
+        severity = "warning" if _NOT_AS_WRITTEN.search(message) else "note"
+        yield _finding(severity, "reader", alarm, file or program.source, line, column, message)
 
 
 def _arc_centre_finding(data: bytes, program: Program, machine: Machine) -> Iterator[Finding]:
@@ -266,7 +277,7 @@ def _low_feed_findings(program: Program, machine: Machine) -> Iterator[Finding]:
             continue
         message = (
             f"{program.lines(region)}: feed {slowest:g} mm/min is below controller.minimum_feed_mm_per_min = {least:g}"
-            ": convert keeps them untouched"
+            ": convert leaves them unchanged"
         )
         yield _at(program, "note", "reader", region.first_line, message)
 
@@ -278,7 +289,8 @@ def _short_findings(program: Program, machine: Machine, runs: Iterable[CuttingRu
             message = (
                 f"{run.short_blocks} of {run.blocks} blocks up to {_end(program, run)} are "
                 f"shorter than the block time of {block_time_s * 1e3:g} ms, the shortest {run.shortest_s * 1e3:.3g} "
-                f"ms: without blocks in store the control starves, and {run.time_s:.3f} s become {run.taken_s:.3f} s"
+                "ms: with an empty block buffer the control stops between blocks (buffer underrun), and "
+                f"{run.time_s:.3f} s become {run.taken_s:.3f} s"
             )
             lost = run.taken_s - run.time_s >= _LOST_S
             yield _at(program, "warning" if lost else "note", "short_block", run.first_short_line, message)
@@ -335,7 +347,9 @@ def _dnc_findings(program: Program, line: SerialLine, runs: Iterable[CuttingRun]
     for run in runs:
         if run.time_s > 0.0 and run.needed_per_s > line.characters_per_s:
             factor = run.needed_per_s / line.characters_per_s
-            where = "" if run.bytes > run.time_s * line.characters_per_s else "its busiest stretch "
+            where = (
+                "" if run.bytes > run.time_s * line.characters_per_s else "its section with the most blocks per second "
+            )
             message = (
                 f"up to {_end(program, run)} the program asks for {run.needed_per_s:.0f} characters/s "
                 f"({run.blocks / run.time_s:.0f} blocks/s), the serial line carries {line.characters_per_s:.0f}: "

@@ -241,7 +241,7 @@ class Check(Result):
             stop = next(finding for finding in self.findings if finding.code == "work_limit")
             return f"correct {stop.place} if it is a slip; else raise the key that it names with --set."
         if "dnc_rate" in worst:
-            return "raise the baud rate or lower the feed where the serial line starves (controller.dnc_baud)."
+            return "raise the baud rate or lower the feed where the serial line is too slow (controller.dnc_baud)."
         if "program_memory" in worst:
             large = next(finding for finding in self.findings if finding.code == "program_memory")
             if "--max-bytes" in large.message:

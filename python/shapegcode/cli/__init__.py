@@ -67,7 +67,7 @@ class Command:
 COMMANDS: tuple[Command, ...] = (
     Command("convert", "convert a CNC program into an input-shaped FANUC program, and check the result"),
     Command("shaper", "compare input shapers for some vibration modes, and recommend one"),
-    Command("simulate", "play a program on the machine's model: cycle time, vibration, contour error"),
+    Command("simulate", "simulate a program on the machine's model: cycle time, vibration, contour error"),
     Command("feed", "set the feeds of a program so that cutting force and deflection stay within the tool's limits"),
     Command("expand", "write the plain program that calls, macros and coordinate modes come to"),
     Command("measure", "measure the part that programs would cut: contour, radius, walls, roughness, vibration"),
@@ -80,8 +80,13 @@ COMMANDS: tuple[Command, ...] = (
     Command("identify", "find vibration modes in a tap test or decay, and put them into the machine file"),
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("batch", "run a command over many programs and machines, and go on where it stopped"),
-    Command("study", "play a program on drawn machines: how likely it stays within tolerance, and what decides"),
-    Command("optimize", "choose settings for the shortest program that stays within tolerance on most drawn machines"),
+    Command(
+        "study",
+        "simulate a program on sampled machines (Monte Carlo): how likely it stays within tolerance, what decides",
+    ),
+    Command(
+        "optimize", "choose settings for the shortest program that stays within tolerance on most sampled machines"
+    ),
     Command("report", "make pages of results that --json has written"),
     Command("completion", "print the script that has bash, zsh or fish complete at TAB"),
     Command("demo", "repeat the figures of a paper beside the published ones"),

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
         "Rewrites the cutting moves of a program so that they no longer excite the machine's vibration modes, and "
-        "judges the written program by playing it back: vibration, contour error, time. The input is never "
+        "judges the emitted program by simulating it: vibration, contour error, time. The input is never "
         "overwritten; a program that nobody should run is written beside OUT with another suffix (exit code 1)."
     )
     parser.add_argument("input", metavar="IN", help="CNC program")
@@ -103,14 +103,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N[k|M]",
         type=size,
         default=None,
-        help="largest size of the written program, for example 256k (1k = 1024): what gains least keeps its text",
+        help="largest size of the emitted program, for example 256k (1k = 1024): what gains least is left unchanged",
     )
     parser.add_argument(
         "--baud",
         metavar="N",
         type=positive,
         default=None,
-        help="speed of the serial line that feeds the program: longer block periods, then regions keep their text",
+        help="speed of the serial line that feeds the program: longer block periods, then cuts left unchanged",
     )
     parser.add_argument(
         "--max-blocks-per-second",
@@ -217,7 +217,7 @@ def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar
 
     # Where each stage begins, and how much of the bar it takes; shaping again does not take it back.
     spans = {"shaping": (0.0, 0.4), "shaping again, slower": (0.0, 0.4), "round trip": (0.4, 0.4)}
-    spans["what it rests on"] = (0.8, 0.2)
+    spans["sensitivity to unverified parameters"] = (0.8, 0.2)
     reached = 0.0
 
     def show(stage: str, done: float, total: int) -> None:

@@ -86,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="input",
         metavar="PROGRAM",
         default=None,
-        help="convert this program, and rank the values that nobody measured by how far each moves its verdict",
+        help="convert this program, and rank the unverified parameters by how far each changes its verdict",
     )
     add_result_arguments(show)
 

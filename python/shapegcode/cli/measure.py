@@ -21,7 +21,7 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Plays programs on the machine's model and measures the response like a part: per section of the path "
+        "Simulates programs on the machine's model and measures the response like a part: per section of the path "
         "vibration and settling time, contour error, fitted radius, the walls that the tool leaves, their roughness "
         "and waviness. Programs written by shapegcode are measured against the first one if that is not. "
         "Exit code 0; 1: the response of a program leaves the path by more than tolerance.contour_um (of shaped "

@@ -12,7 +12,7 @@ __all__ = ["add_modes_arguments", "decided_modes"]
 
 
 def add_modes_arguments(parser: argparse.ArgumentParser, keep: str) -> None:
-    """Declare what decides over modes that nobody measured on this machine.
+    """Declare what decides over modes that were not measured on this machine.
 
     Args:
         parser: of the command.

@@ -21,7 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "The file is that of `shapegcode study`. Exit code 1 if no choice is likely enough."
     )
     add_study_arguments(
-        parser, "program, machine, what is varied, what can be chosen", "on how many machines a choice is played"
+        parser,
+        "program, machine, what is varied, what can be chosen",
+        "on how many sampled machines a choice is simulated",
     )
     parser.add_argument(
         "--at-least", type=ratio, default=None, metavar="RATIO",

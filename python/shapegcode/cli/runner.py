@@ -164,14 +164,14 @@ def finish(
     if output is not None:
         report["output"] = str(output[0])
     written = [str(file) for file in (*wrote, *([output[0]] if output is not None else []))]
-    step = result.next_step_after(written[0]) if written else result.next_step
+    step = report["next_step"] = result.next_step_after(written[0]) if written else result.next_step
     pages = _write_page(result, args, report, output, wrote)
     several: Gathered | None = getattr(args, "several", None)
     if several is not None:
         several.add(report, output)
     else:
         _write(report, getattr(args, "json", None), output)
-    pictured = [f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none are drawn of this"]
+    pictured = [f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: there are none of this result"]
     _say(
         result,
         args,

@@ -16,7 +16,7 @@ _REGIONS_SHARE = 0.1
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Plays a program through the controller's model and the machine's plant. Of each cutting region: time, "
+        "Simulates a program: the controller's model, then the machine's plant. Of each cut: time, "
         "residual and peak vibration, settling time, contour error of command and response. Of the whole program with "
         "its rapids, dwells and waits: the motion of the axes in time, as table, files and pictures."
     )
@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--shaped",
         action="store_true",
-        help="play every cut as shaped blocks: at their feed, without look-ahead; needed only where the header of a "
-        "shaped program is missing, which says which of them are",
+        help="simulate every cut as shaped blocks: at their feed, without look-ahead; needed only where the header of "
+        "a shaped program is missing, which says which of them are",
     )
     parser.add_argument(
         "--against",
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 
     runner.check_files(args)
     machine = load_machine(args)
-    with runner.progress(f"playing {args.input}", args) as bar:
+    with runner.progress(f"simulating {args.input}", args) as bar:
         program = Program.read(args.input, machine, program_number=args.program)
         shaped = True if args.shaped else None
         against = None if args.against is None else Program.read(args.against, machine, program_number=args.program)

@@ -46,7 +46,8 @@ def load(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Converts a program once and plays it on machines whose values are drawn as the file says: how likely it stays "
+        "Converts a program once and simulates it on machines sampled as the file says (Monte Carlo): how likely it "
+        "stays "
         "within tolerance, quantiles, and which value decides. Exit code 1 if that is less likely than at_least."
     )
     add_study_arguments(parser, "program, machine, and what is varied", "how many draws")
@@ -55,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scheduler",
         metavar="ADDRESS",
         default=None,
-        help="play on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
+        help="simulate on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
     )
     for name, what in (("ca", "the authority's certificate"), ("cert", "own certificate"), ("key", "own key")):
         parser.add_argument(f"--tls-{name}", metavar="FILE", default="", help=f"{what}, for tls:// schedulers")

@@ -17,7 +17,7 @@ from shapegcode.comparison.result import Comparison, KindCount, ProgramDifferenc
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.compensation import guard_lines
-from shapegcode.program.reading import program_bytes, reader_options
+from shapegcode.program.reading import is_program_text, program_bytes, reader_options
 
 __all__ = ["compare"]
 
@@ -27,7 +27,7 @@ _COMPENSATED = re.compile(rb"G4[12](?!\d)", re.IGNORECASE)
 def compare(
     original: Program | str | Path,
     emitted: Program | str | Path,
-    machine: Machine | None = None,
+    machine: Machine | str | Path | None = None,
     *,
     allow: Allowed | str | Iterable[str] = (),
 ) -> Comparison:
@@ -39,19 +39,23 @@ def compare(
     Args:
         original: the one program, or its file; a file that is cut off is read as far as it goes.
         emitted: the other one, for example what `convert` made of it.
-        machine: whose controller reads them; None: the built-in ``vx500``.
+        machine: whose controller reads them; None: that which read a `Program` of the two, else the built-in
+            ``vx500``.
         allow: differences that are allowed, for example ``"feeds,blocks,path=20um"``.
 
     Returns:
         Counts, distance of the paths, and every difference with its lines.
 
     Raises:
-        ArgumentError: `allow` has a word that is none.
+        ArgumentError: `allow` has a word that is none; a program was read with other settings than the machine has.
         ProgramError: a file is no program that can be read.
         OSError: a file cannot be read.
     """
+    machine = None if machine is None else Machine.of(machine)
     allowed = allow if isinstance(allow, Allowed) else Allowed.of(allow)
-    machine = machine or Machine.load("vx500")
+    if machine is None:
+        read = next((each.reading.machine for each in (original, emitted) if isinstance(each, Program)), None)
+        machine = read or Machine.load("vx500")
     (first, first_is_cut), (second, second_is_cut) = _read(original, machine), _read(emitted, machine)
     core = _core.compare_programs(
         first.core, second.core, reader_options(machine), _emission_lines(machine, first.core.expanded_radii_mm)
@@ -95,10 +99,13 @@ def _name(kind: _core.ComparedKind) -> str:
 def _read(program: Program | str | Path, machine: Machine) -> tuple[Program, bool]:
     """The program, and whether it is cut off: without its end, or within its last line."""
     if isinstance(program, Program):
+        program.require_machine(machine)
         return program, False
     try:
         return Program.read(program, machine), False
     except ProgramError:
+        if is_program_text(program):
+            raise
         text = program_bytes(program, machine.controller.max_program_bytes)
         whole_lines = text[: text.rfind(b"\n") + 1]
         for kept in (text, whole_lines):

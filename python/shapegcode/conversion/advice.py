@@ -14,7 +14,7 @@ from shapegcode.verdict.judge import Judge
 
 __all__ = ["FilterAdvice", "filter_advice"]
 
-_MOSTLY = 0.7  # of the contour error of the table: the command itself errs so much
+_MOSTLY = 0.7  # of the contour error of the machine table: the command itself errs so much
 _TRIALS = (0.9, 0.7, 0.5)  # of the time constant that a rounding in proportion to it would allow
 
 

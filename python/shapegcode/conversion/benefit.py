@@ -16,7 +16,7 @@ __all__ = ["gain_um", "most_to_gain_um"]
 
 
 def _figures_um(played: _core.PlaybackFigures) -> tuple[float, float]:
-    """Residual vibration of the worst axis, contour error of the table."""
+    """Residual vibration of the worst axis, contour error of the machine table."""
     return float(np.max(played.residual_mm)) * 1e3, played.response.max_abs_mm * 1e3
 
 
@@ -27,7 +27,7 @@ def most_to_gain_um(original: _core.PlaybackFigures) -> float:
         original: the region as programmed, played.
 
     Returns:
-        The larger of residual vibration and contour error of the table, µm.
+        The larger of residual vibration and contour error of the machine table, µm.
     """
     return max(_figures_um(original))
 

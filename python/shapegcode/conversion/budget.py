@@ -87,7 +87,7 @@ class TransferLoad:
 
     Attributes:
         extra_bytes: size of its text less that of the original's.
-        baud: what its busiest stretch needs of the line, bit/s.
+        baud: what its section with the most blocks per second needs of the line, bit/s.
         blocks_per_second: blocks in its busiest stretch.
     """
 
@@ -102,7 +102,7 @@ class TextNeeds:
 
     Attributes:
         bytes: its size.
-        baud: what its busiest stretch needs of the line, bit/s.
+        baud: what its section with the most blocks per second needs of the line, bit/s.
         blocks_per_second: blocks in its busiest stretch.
         block_period_s: on which it is written.
     """

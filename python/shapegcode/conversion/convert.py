@@ -27,7 +27,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
-from shapegcode.program.compensation import read_for_conversion, require_decision
+from shapegcode.program.compensation import program_for_conversion
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
@@ -47,7 +47,7 @@ __all__ = ["convert"]
 
 def convert(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     contour: str | None = None,
     contour_tolerance_um: float | None = None,
@@ -97,9 +97,11 @@ def convert(
         OSError: its file cannot be read.
         MachineError: a value that a machine file could not have.
         DesignError: no shaper exists on this grid.
-        ArgumentError: a block period that the controller cannot play, a budget without a choice, lines without a cut.
+        ArgumentError: the program was read with other settings than the machine has; a block period that the
+            controller cannot play, a budget without a choice, lines without a cut.
         RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
     """
+    machine = Machine.of(machine)
     stated = {
         "shaping.contour": contour,
         "tolerance.contour_um": contour_tolerance_um,
@@ -112,9 +114,7 @@ def convert(
     }
     if stated := {key: value for key, value in stated.items() if value is not None}:
         machine = machine.with_values(stated, source="options of convert")
-    if not isinstance(program, Program):
-        program = read_for_conversion(program, machine)
-    require_decision(program, machine)
+    program = program_for_conversion(program, machine)
     if program.stamp is not None:
         raise _core.ProgramError(
             f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
@@ -273,7 +273,7 @@ def _rests_on(run: Run, settled: Settled) -> tuple[tuple[RestsOn, ...], int]:
     simulated = zip(settled.written.placed, settled.figures, settled.trackers, strict=True)
     return rests_on(
         run.judge, run.machine, list(simulated), settled.emitted, deciding, run.pool,
-        settled.begun, partial(run.on_progress, "what it rests on"),
+        settled.begun, partial(run.on_progress, "sensitivity to unverified parameters"),
     )  # fmt: skip
 
 
@@ -300,7 +300,7 @@ def _warnings(run: Run, written: Written, figures: PlayedFigures) -> list[str]:
     elif not program.regions:
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the program is unchanged")
     if not written.placed:
-        # Where something was shaped, what the verdict rests on names them.
+        # Where something was shaped, the sensitivity to unverified parameters names them.
         warnings += open_axes(program, machine)
     warnings += played_warnings(program, figures, machine, is_priced=bool(run.aims.priced))
     return warnings + text_warnings(program, written.placed, figures, machine, written.size, written.blocks)

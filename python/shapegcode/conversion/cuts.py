@@ -111,7 +111,7 @@ def _cure(reason: str) -> str:
     if "minimum_feed" in reason or "feed" in reason.partition(" ")[0]:
         return "a programmed feed within controller.minimum_feed_mm_per_min"
     if "max_program" in reason or "bytes" in reason or "baud" in reason:
-        return "more room for the program: its limits are in the reason"
+        return "a larger size or rate limit for the program: the limits are in the reason"
     return "a lower programmed feed there, or --shape-all to see what shaping it does"
 
 

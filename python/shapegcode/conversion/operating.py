@@ -91,12 +91,15 @@ def control_table(notes: Sequence[ControlNote]) -> Table:
     """The notes as a table.
 
     Args:
-        notes: what to heed.
+        notes: caution, before you run.
 
     Returns:
         One row for each.
     """
-    columns = (Column("at the control", value="topic", text=True), Column("what to heed", value="text", text=True))
+    columns = (
+        Column("at the control", value="topic", text=True),
+        Column("caution, before you run", value="text", text=True),
+    )
     return Table("", columns, notes)
 
 
@@ -137,8 +140,10 @@ def _line(loads: Mapping[int, TransferLoad], machine: Machine) -> str:
     baud = max((load.baud for load in loads.values()), default=0.0)
     line = machine.controller.dnc_baud
     here = f", the line of this machine has {line}" if line > 0 else ""
-    enough = "" if line <= 0 else ": enough" if baud <= line else ": it starves (--baud fits the program to it)"
-    return f"{baud:.0f} baud or more in the busiest stretch of the cuts{here}{enough}"
+    enough = (
+        "" if line <= 0 else ": enough" if baud <= line else ": buffer underrun (--baud fits the program to the line)"
+    )
+    return f"{baud:.0f} baud or more, where the cuts have the most blocks per second{here}{enough}"
 
 
 def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_period_s: float) -> str:
@@ -216,7 +221,7 @@ def _restarts(
         yield (
             f"{count} restart point{'' if count == 1 else 's'} inside of long cuts, where the command is nearly at "
             f"rest: spindle on, tool, H and coordinate system of the list in force{switched}, go to its position from "
-            f"above, then search the N number; a start there shakes the table once, by up to {shakes_um:.0f} µm"
+            f"above, then search the N number; a start there makes the table vibrate once, by up to {shakes_um:.0f} µm"
         )
     if stops := sum(each.stops for each in restarts):
         cost_s = sum(each.stops_s for each in restarts)

@@ -65,7 +65,7 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
         return "calm", conversion.reason
     turning = [row.key for row in conversion.rests_on if row.moved_um > row.limit_um]
     if turning:
-        return "amber", f"a value that nobody measured on this machine could turn the verdict: {turning[0]}"
+        return "amber", f"an unverified parameter of this machine could change the verdict: {turning[0]}"
     if said := len(conversion.warnings):
         return "amber", f"{said} warning{'s' if said > 1 else ''} to settle first"
     return "green", f"every tolerance is kept in all {sum(case.counts for case in conversion.cases)} cases that count"
@@ -97,7 +97,7 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     if conversion.rests_on:
         table = rests_table(conversion.rests_on, conversion.unmeasured_tried)
         how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
-        yield Section("rests", "What the verdict rests on", (table,), how=how)
+        yield Section("rests", "Sensitivity to unverified parameters", (table,), how=how)
     yield from _price(conversion, made)
     yield _times(conversion)
     if isinstance(conversion, ScheduledConversion):
@@ -193,7 +193,7 @@ def _further(conversion: Conversion) -> Iterator[NextStep]:
             yield NextStep(f"At the control, {note.topic}: {note.text}.")
     if conversion.rests_on:
         key = conversion.rests_on[0].key
-        text = f"Measure {key}: nobody has on this machine, and the verdict rests on it more than on anything else."
+        text = f"Measure {key}: it is assumed, and the verdict depends on it more than on any other parameter."
         yield NextStep(text, "shapegcode identify --tap-plan -m MACHINE.toml" if ".modes" in key else "")
 
 
@@ -203,11 +203,12 @@ def _cases(conversion: Conversion) -> Section:
                "worst share of its limit %")  # fmt: skip
     rows = tuple(_case(rank, case, axes, conversion) for rank, case in enumerate(conversion.cases))
     how = (
-        "Each line is a condition under which the written program was played. The colour is the share of the limit: "
+        "Each line is an operating condition under which the emitted program was simulated. The "
+        "colour is the ratio to the limit: "
         "up to 100 % is within. Lines in brackets are only shown."
     )
     counted = sum(case.counts for case in conversion.cases)
-    caption = f"{counted} of {len(rows)} cases count ([verdict] of the machine file)"
+    caption = f"{counted} of {len(rows)} operating conditions count ([verdict] of the machine file)"
     heat = HeatMap(columns, rows, 1, caption, factors=(*(1.0 for _ in axes), 1.0, 1.0, 100.0))
     return Section("cases", "Under which conditions it was tried", (heat,), how=how)
 

@@ -20,6 +20,7 @@ from shapegcode import _core
 from shapegcode.conversion.restart_points import EXTRA_SYSTEM, PLACEHOLDER, CutRestarts, RestartMark, system_of
 from shapegcode.machine import Machine
 from shapegcode.model.modes import slowest_mode
+from shapegcode.program import between_increments
 
 __all__ = ["RegionRestarts", "RestartPlaces", "block_lines", "decimal"]
 
@@ -208,6 +209,8 @@ class RegionRestarts:
     ) -> None:
         self._places, self._region, self._fit, self._decimals = places, region, fit, decimals
         self._max = machine.emission.max_line_length
+        # An axis between two increments is left where it is: the list of points names its position.
+        self._resting = between_increments(region, fit.increment_mm)
         self._marks: list[RestartMark] = []
         self._bytes = self._lines = 0  # of the pieces so far
 
@@ -234,8 +237,8 @@ class RegionRestarts:
 
         def point(index: int) -> bytes | None:
             block = int(blocks[index])
-            values = zip("XYZ", ends[block] * 10.0**-self._decimals, strict=True)
-            position = "".join(f"{axis}{decimal(value, self._decimals)}" for axis, value in values)
+            values = zip("XYZ", ends[block] * 10.0**-self._decimals, self._resting, strict=True)
+            position = "".join(f"{axis}{decimal(value, self._decimals)}" for axis, value, rests in values if not rests)
             return lines.write(block, position) if block > 0 else None
 
         parts, done, size = [], 0, self._bytes
@@ -249,7 +252,9 @@ class RegionRestarts:
                 byte=size + begin - done,
                 line=self._lines + text.count(b"\n", 0, begin),
                 time_s=float(periods[index]) * self._fit.block_period_s,
-                position_mm=_millimetres(ends[block - 1] * self._fit.increment_mm),
+                position_mm=_millimetres(
+                    np.where(self._resting, self._region.path.start_mm, ends[block - 1] * self._fit.increment_mm)
+                ),
                 speed_mm_per_s=float(speed[index]),
                 vibration_um=float(left[index]) * 1e3,
             )

@@ -66,13 +66,13 @@ class Conversion(PlayedFigures, Result):
         bytes_read: size of the original, expanded.
         bytes_emitted: size of the emitted program.
         limits: tolerances that were applied.
-        warnings: what to heed.
+        warnings: caution, before you run.
         budget: only under one: what it allowed, and what was given up for it.
         rapids: only where rapids may be shaped: what became of them.
         least_gain_um: what is too little.
         rests_on: values that nobody measured on this machine, by how far each moves the deciding figure to its limit.
         unmeasured_tried: how many such values were moved.
-        at_the_control: what to heed when it is loaded and run; empty where nothing was shaped.
+        at_the_control: caution, before you run when it is loaded and run; empty where nothing was shaped.
         restart_points: blocks inside of shaped cuts at which the control can begin.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.

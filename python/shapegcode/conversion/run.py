@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import compress
 
 from shapegcode import _core
 from shapegcode.conversion.aims import Aims
@@ -111,7 +112,7 @@ class Run:
         self.aims = Aims(
             program, machine,
             [
-                choice.not_shaped.get(index) or why_kept(region, machine, self.grid)
+                choice.not_shaped.get(index) or why_kept(program, region, machine, self.grid)
                 for index, region in enumerate(program.regions)
             ],
             self.curves.of,
@@ -149,8 +150,9 @@ class Run:
             settled = self._settle()
         settled = self._within_program_price(self._without_what_gains_nothing(settled))
         if not shape_all and not self.is_benefit(settled):
+            shaped = self._shaped()
             self._leave_everything("")
-            settled = self._rewritten([], [])
+            settled = self._rewritten(settled, shaped)
         rapids: ShapedRapids | None = None
         if self.machine.shaping.rapids:
             rapids = shape_rapids(
@@ -223,22 +225,20 @@ class Run:
         """The same without the cuts that gained too little or became worse: these are left unchanged."""
         least = self.machine.shaping.least_gain_um
         indices = self._shaped()
-        left: list[RegionFigures] = []
-        trackers: list[_core.ContourTracker | None] = []
-        simulated = zip(settled.figures, settled.trackers, strict=True)
-        for index, (figures, tracker), verdict in zip(indices, simulated, self._verdicts(settled), strict=True):
+        for index, figures, verdict in zip(indices, settled.figures, self._verdicts(settled), strict=True):
             gained = self.gains_um[index] = gain_um(figures)
             stays = not keepable(self.program.regions[index], self.machine) or self.choice.shape_all
-            if stays or (gained >= least and not verdict.worse):
-                left.append(figures)
-                trackers.append(tracker)
-            else:
+            if not stays and (gained < least or verdict.worse):
                 self._leave(index, verdict.worse[0] if verdict.worse else f"shaping gains {gained:.1f} µm", gained)
-        return settled if len(left) == len(indices) else self._rewritten(left, trackers)
+        return self._rewritten(settled, indices)
 
-    def _rewritten(self, figures: list[RegionFigures], trackers: list[_core.ContourTracker | None]) -> Settled:
-        """Further cuts are left unchanged; what stays shaped is as before: neither shaped nor simulated again."""
+    def _rewritten(self, settled: Settled, shaped: Sequence[int]) -> Settled:
+        """Some cuts are left unchanged now; what stays shaped is as before: neither shaped nor simulated again."""
+        stay = [not self.reasons[index] for index in shaped]
+        if all(stay):
+            return settled
         written = self._write(self.grid)
+        figures, trackers = [*compress(settled.figures, stay)], [*compress(settled.trackers, stay)]
         return Settled(written, written.read_back(self.machine), figures, trackers, {})
 
     def _within_program_price(self, settled: Settled) -> Settled:

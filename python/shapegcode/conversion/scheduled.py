@@ -33,7 +33,7 @@ Progress = Callable[[float], None]
 
 def convert_scheduled(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     tools: Tool | Sequence[Tool],
     stock: Stock,
     *,
@@ -66,6 +66,7 @@ def convert_scheduled(
     Raises:
         ProgramError, DesignError, ArgumentError, StockError, RoundTripError: as those two.
     """
+    machine = Machine.of(machine)
     surveyed = survey(
         program, machine, tools, stock, resolution_mm=resolution_mm, on_progress=lambda d, n: on_progress(0.2 * d / n)
     )

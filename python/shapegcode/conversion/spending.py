@@ -170,7 +170,7 @@ class Spending:
             lines += f" and {len(entries) - _LINES_NAMED} more" if len(entries) > _LINES_NAMED else ""
             stays = max(max(entry.residual_um) for entry in entries)
             said.append(
-                f"{len(entries)} of {len(self._program.regions)} regions keep their text (lines {lines}) "
+                f"{len(entries)} of {len(self._program.regions)} cuts are left unchanged (lines {lines}) "
                 f"and up to {stays:.1f} um of residual vibration"
             )
         return f"{self._program.source}: given up for the budget: {'; '.join(said)}" if said else ""
@@ -225,7 +225,7 @@ class Spending:
         if limit is None or not possible or self._program.core.size > limit:
             if possible:
                 raise self._too_large_error(min(size, self._program.core.size))
-            raise self._too_large_error(size, "; arcs with absolute centres cannot be kept as they are")
+            raise self._too_large_error(size, "; arcs with absolute centres cannot be left unchanged")
         return dict.fromkeys(loads, self._memory_reason())
 
     def _memory_reason(self) -> str:

@@ -95,12 +95,12 @@ def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
     """
     columns = (
         Column("key", left=True),
-        Column("value → if it were", value=_moved, text=True),
+        Column("assumed → tested", value=_moved, text=True),
         Column("figure, µm", value=_figure, text=True),
         Column("limit", value="limit_um", digits=1),
     )
     return Table(
-        "what the verdict rests on: values that nobody measured on this machine",
+        "sensitivity to unverified parameters: assumed values, changed one at a time",
         columns,
         rows,
         caption=f"{tried} values moved, one at a time, in the region that comes nearest to a limit",

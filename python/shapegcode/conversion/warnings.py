@@ -101,7 +101,7 @@ def _worse(figures: PlayedFigures) -> list[str]:
         for axis in "xyz"
     ]
     response = figures.contour_error_um.response
-    pairs.append(("contour error of the table", response.original.max, response.emitted.max))
+    pairs.append(("contour error of the machine table", response.original.max, response.emitted.max))
     return [
         f"{name} is larger than the original's: {before:.1f} -> {after:.1f} um"
         for name, before, after in pairs

@@ -16,13 +16,13 @@ from shapegcode.conversion.write import RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.shaped_program import stamp_of_machine
-from shapegcode.program import Program
+from shapegcode.program import Program, end_off_grid_mm, least_increment_mm
 from shapegcode.program.compensation import guard_lines, header_lines
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.ahead import Ahead, OnShare, cores
 from shapegcode.verdict.placed import Placed
 
-__all__ = ["TextWriter", "Written", "why_kept"]
+__all__ = ["TextWriter", "Written", "why_kept", "why_off_grid"]
 
 _MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
 
@@ -31,8 +31,10 @@ Aim = tuple[float, float]
 """Tolerance, µm, and share of the feed for which a region is shaped."""
 
 
-def why_kept(region: _core.Region, machine: Machine, grid: Grid) -> str:
+def why_kept(program: Program, region: _core.Region, machine: Machine, grid: Grid) -> str:
     """Why a region cannot be written as shaped blocks; empty if it can."""
+    if reason := why_off_grid(program, region, machine):
+        return reason
     longest_s = _MOST_PERIODS * grid.block_period_s
     time_s = region.path.programmed_time_s
     if time_s > longest_s:
@@ -41,6 +43,32 @@ def why_kept(region: _core.Region, machine: Machine, grid: Grid) -> str:
     least = machine.controller.minimum_feed_mm_per_min
     if slowest < least * (1 - 1e-9):
         return f"feed {slowest:g} mm/min is below controller.minimum_feed_mm_per_min = {least:g}"
+    return ""
+
+
+def why_off_grid(program: Program, region: _core.Region, machine: Machine) -> str:
+    """Why the end of a move cannot be written exactly enough for what follows in the other unit; empty if it can.
+
+    Args:
+        program: of which it is a part; its cuts may be in G20 and in G21.
+        region: of the program, or in place of one of its rapids.
+        machine: whose controller reads it.
+
+    Returns:
+        The reason, with axis and position.
+    """
+    if region.incremental:
+        return ""
+    units = {region.exit.units, *(each.exit.units for each in program.regions)}
+    limit_mm = 0.5 * min(least_increment_mm(machine, each) for each in units) + 1e-9
+    off_mm = end_off_grid_mm(region, least_increment_mm(machine, region.exit.units))
+    moves = zip("XYZ", region.path.end_mm, off_mm, region.path.extent_mm, region.exit.known, strict=True)
+    for axis, end_mm, off, extent_mm, is_known in moves:
+        if is_known and extent_mm > 0.0 and off > limit_mm:
+            return (
+                f"it ends at {axis} {end_mm:.5f} mm, {off * 1e3:.2f} um off what G{region.exit.units} can name; the "
+                f"program changes between G20 and G21 (limit {limit_mm * 1e3:.2f} um)"
+            )
     return ""
 
 
@@ -292,10 +320,10 @@ class TextWriter:
         """The warning for a region that keeps its text."""
         if not keepable(region, self._machine):
             raise self._program.region_error(
-                region, f"{reason}; its arcs have absolute centres and cannot be kept as they are"
+                region, f"{reason}; its arcs have absolute centres and cannot be left unchanged"
             )
         program = self._program
-        return f"{program.place(region.first_line)}: {program.lines(region)} kept untouched: {reason}"
+        return f"{program.place(region.first_line)}: {program.lines(region)} left unchanged: {reason}"
 
     def _opening(self, *, shapes: bool) -> bytes:
         """Header comments where something is shaped, and the guards of expanded radii."""

@@ -15,7 +15,7 @@ from shapegcode.conversion.region_text import EmittedRegion, RegionText, Room
 from shapegcode.conversion.restart import RegionRestarts, RestartPlaces, block_lines, decimal
 from shapegcode.model.machine_model import MachineModel, OwnFilter
 from shapegcode.model.modes import NO_OFFSET, Offset
-from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
+from shapegcode.program import MM_PER_INCH, Program, between_increments, least_increment_mm
 from shapegcode.program.stamp import REGION_MARK
 from shapegcode.shaping.grid import Grid
 
@@ -327,7 +327,9 @@ class RegionWriter:
         emission = self._machine.emission
         fastest = max(axis.max_feed_mm_per_min for axis in self._machine.axes.as_tuple())
         lock = emission.lock_lines if emission.override == "lock" else ()
-        lines = [*lock, *emission.prologue, _safe_line(region, start, writer.position_decimals, fastest)]
+        unit_mm, _ = self._units(region)
+        resting = between_increments(region, unit_mm * 10.0**-writer.position_decimals)
+        lines = [*lock, *emission.prologue, _safe_line(region, start, resting, writer.position_decimals, fastest)]
         lines[0] = number + lines[0]
         if emission.header:
             lines.insert(0, self._mark)
@@ -379,15 +381,16 @@ def _mean_deviation_s(shaper: _core.Shaper) -> float:
     return float(sum(abs(a) * abs(t - mean) for t, a in zip(shaper.times_s, shaper.amplitudes, strict=True)))
 
 
-def _safe_line(region: _core.Region, start: list[int], decimals: int, fastest_mm_per_min: float) -> str:
+def _safe_line(
+    region: _core.Region, start: list[int], resting: list[bool], decimals: int, fastest_mm_per_min: float
+) -> str:
     entry = region.entry
     words = [f"G{entry.plane}", "G91" if region.incremental else "G90", "G94", "G40", "G64", "G01"]
     if not region.incremental:
-        known = entry.known
         words += [
             f"{letter}{decimal(value * 10.0**-decimals, decimals)}"
-            for letter, value, is_known in zip("XYZ", start, known, strict=True)
-            if is_known
+            for letter, value, is_known, rests in zip("XYZ", start, entry.known, resting, strict=True)
+            if is_known and not rests
         ]
     # In G93 the modal F is no speed; a feed over the axes' limit is none that the machine runs.
     unit = MM_PER_INCH if entry.units == 20 else 1.0

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from shapegcode import _core
@@ -39,7 +40,7 @@ Progress = Callable[[float], None]
 
 def schedule_feed(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     tools: Tool | Sequence[Tool],
     stock: Stock,
     *,
@@ -71,6 +72,7 @@ def schedule_feed(
 
     Source: this project; the force model and feeds that follow the force are those of Kim and Ko, 2001 (paper 001).
     """
+    machine = Machine.of(machine)
     surveyed = survey(
         program,
         machine,
@@ -232,4 +234,4 @@ def _read_back(text: bytes, program: Program, places: Sequence[int], machine: Ma
                 f"{program.lines(before)}: written from line {line}, read back from line {after.first_line}; ends "
                 f"{off:g} mm apart, lengths differ by {longer:g} mm"
             )
-    return Program(emitted.core, program.source)
+    return replace(emitted, source=program.source, unexpanded=None)

@@ -13,7 +13,7 @@ from shapegcode.cutting.tool import Tool
 from shapegcode.feed.walk import SurveyedMove, SurveyedRegion, Walk, why_not_swept
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.program.compensation import read_for_conversion, require_decision
+from shapegcode.program.compensation import program_for_conversion
 
 __all__ = ["Survey", "survey"]
 
@@ -44,7 +44,7 @@ class Survey:
 
 def survey(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     tools: Tool | Sequence[Tool],
     stock: Stock,
     *,
@@ -70,12 +70,11 @@ def survey(
             memory.
         StockError: the stock does not suit the program.
     """
+    machine = Machine.of(machine)
     tools = [tools] if isinstance(tools, Tool) else list(tools)
     if not tools:
         raise _core.ArgumentError("no tool is given: at least one must cut")
-    if not isinstance(program, Program):
-        program = read_for_conversion(program, machine)
-    require_decision(program, machine)
+    program = program_for_conversion(program, machine)
     walk = Walk(program, tools)
     material = _material(walk, program, machine, tools, stock, resolution_mm)
     if any(tool.feed.air_feed_mm_per_min is not None for tool in tools):

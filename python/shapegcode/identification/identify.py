@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from shapegcode.errors import ArgumentError, NumericError, RecordError
 from shapegcode.identification.checks import prepare
@@ -16,19 +20,24 @@ from shapegcode.identification.sweep import find_swept_modes
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.klipper import is_klipper, read_sweep
 from shapegcode.io.read import ReadOptions, read_measurement
-from shapegcode.io.record import Record
+from shapegcode.io.record import Quantity, Record
+from shapegcode.io.sampling import UnevenTimeError, even_period
 
 __all__ = ["MOST_MODES", "identify"]
 
 MOST_MODES = 8
 """Largest number of modes that is tried unless asked otherwise."""
 _LARGEST_MODEL = 99
+_LEAST_SAMPLES = 3
 
 
 def identify(
-    source: str | Path | Sequence[str | Path] | Sequence[Record] | Sequence[FrequencyResponse],
-    options: ReadOptions | None = None,
+    source: str | Path | Sequence[str | Path] | Sequence[Record] | Sequence[FrequencyResponse] | ArrayLike,
+    response: ArrayLike | ReadOptions | None = None,
+    force: ArrayLike | None = None,
     *,
+    options: ReadOptions | None = None,
+    quantity: Quantity = "acceleration",
     most_modes: int = MOST_MODES,
     modes: int | None = None,
     band_hz: tuple[float, float] | None = None,
@@ -40,7 +49,12 @@ def identify(
 
     Args:
         source: a file (CSV, UFF, WAV, MATLAB), several files, records or frequency responses; of one point and axis.
+            With `response`: the instants of its samples in s, shape (n,), evenly spaced.
+        response: what a sensor measured at these instants, shape (n,), in the unit of `quantity`. Read options are
+            taken here too.
+        force: of the hammer at these instants in N, shape (n,); None: a free decay.
         options: what the files do not say.
+        quantity: of `response`: "acceleration" in m/s², "velocity" in m/s or "displacement" in m.
         most_modes: largest number of modes that is tried.
         modes: number of modes; None: chosen by evidence.
         band_hz: lowest and highest frequency of interest; None: all.
@@ -62,7 +76,13 @@ def identify(
     for name, number in (("most_modes", most_modes), ("modes", modes)):
         if number is not None and not 1 <= number <= _LARGEST_MODEL:
             raise ArgumentError(f"{name} = {number}: must be from 1 to {_LARGEST_MODEL}")
-    sources = [source] if isinstance(source, str | Path) else source
+    if isinstance(response, ReadOptions):
+        options, response = response, None
+    if response is not None:
+        source = [_record_of(source, response, force, quantity)]
+    elif force is not None:
+        raise ArgumentError("force is given without a response: identify(time_s, response, force)")
+    sources: Sequence[Any] = [source] if isinstance(source, str | Path) else source  # type: ignore[assignment]
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
     ready: Prepared | None = None
     try:
@@ -98,6 +118,30 @@ def identify(
         return Identification(
             files=names, prepared=ready, reason=str(error), warnings=ready.warnings, notes=ready.notes
         )
+
+
+def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:
+    """Arrays as a record.
+
+    Raises:
+        RecordError: instants that do not ascend evenly, or arrays of other lengths.
+    """
+    times = np.asarray(time_s, dtype=np.float64)
+    samples = np.asarray(response, dtype=np.float64)
+    if times.shape != samples.shape or times.ndim != 1 or len(times) < _LEAST_SAMPLES:
+        raise RecordError(
+            f"arrays: {times.shape} instants and {samples.shape} samples of the response: one of each is needed, at "
+            f"least {_LEAST_SAMPLES}"
+        )
+    if not np.isfinite(times).all():
+        raise RecordError(f"arrays: instant {np.flatnonzero(~np.isfinite(times))[0]} is not finite")
+    try:
+        period_s, warnings = even_period(times)
+    except UnevenTimeError as error:
+        raise RecordError(f"arrays: {error}") from None
+    hammer = None if force is None else np.asarray(force, dtype=np.float64)
+    start_s = float(times[0])
+    return Record("arrays", period_s, samples, quantity, hammer, start_s=start_s, warnings=tuple(warnings))
 
 
 def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:

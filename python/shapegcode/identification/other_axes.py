@@ -53,7 +53,7 @@ def require_decisions(open_axes: Mapping[str, str], keep: str, rigid: str, file:
         said = "; ".join(f"{axis.upper()}: {modes}" for axis, modes in undecided.items())
         letters = "".join(undecided).upper()
         raise ArgumentError(
-            f"{file}: modes that nobody measured on this machine would stay, and make shapers longer: {said}. "
+            f"{file}: modes that were not measured on this machine would stay, and make shapers longer: {said}. "
             f"--keep-modes {letters} keeps them (until they are tapped), --rigid {letters} takes them out"
         )
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import textwrap
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.identification.checks import DOUBLE_HIT, LEAST_FORCE, LEAST_LEAD, LEAST_PULSE
 from shapegcode.identification.plan_result import AxisRecording, RapidStop, TapPlan
 from shapegcode.identification.quality import EXCITED_HALF_SINE, FOLDING, LEAST_PERIODS
+from shapegcode.machine import Machine
 
 if TYPE_CHECKING:
-    from shapegcode.machine import Axis, Machine
+    from shapegcode.machine import Axis
 
 __all__ = ["rapid_stop_program", "recording_for", "tap_plan"]
 
@@ -238,7 +240,7 @@ def _refusal_part() -> list[str]:
     ]
 
 
-def tap_plan(machine: Machine | None = None) -> TapPlan:
+def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
     """How to do the test: where to tap, with what, how to record, how to write the file, and what is refused.
 
     Args:
@@ -249,6 +251,7 @@ def tap_plan(machine: Machine | None = None) -> TapPlan:
 
     Source: this project; limits are those of `identification.checks`.
     """
+    machine = None if machine is None else Machine.of(machine)
     usual = f"{_USUAL_HZ[0]:g} to {_USUAL_HZ[1]:g} Hz"
     if machine is None:
         recordings: tuple[AxisRecording, ...] = (recording_for("X Y Z", ()),)

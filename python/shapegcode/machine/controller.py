@@ -39,7 +39,7 @@ class Controller(TomlTable):
         assumed=True,
     )
     motion: Literal["look_ahead", "after_interpolation"] = key(
-        'how an ordinary program is played. "look_ahead": the speed is planned along the path before '
+        'how an ordinary program is executed. "look_ahead": the speed is planned along the path before '
         'interpolation; "after_interpolation": each axis is smoothed after interpolation, and cutting blocks '
         "overlap",
         default="look_ahead",

@@ -73,10 +73,10 @@ class MachineDescription(Result):
             said = f"{count} of {len(self.keys)} values are assumed or inherited"
             return f"{name}: {said}; --for part.nc ranks them by what they do to your program"
         if not self.matters:
-            return f"{name}: none of {count} values that nobody measured matters for {Path(self.program).name}"
+            return f"{name}: none of {count} unverified parameters matters for {Path(self.program).name}"
         first = self.matters[0]
         return (
-            f"{name}: {len(self.matters)} of {count} values that nobody measured matter for "
+            f"{name}: {len(self.matters)} of {count} unverified parameters matter for "
             f"{Path(self.program).name}, most of all {first.key} ({first.effect})"
         )
 
@@ -130,7 +130,11 @@ class MachineDescription(Result):
         if self.program is not None:
             columns = (
                 Column("matters most", value="key", left=True),
-                Column("value → if it were", value=lambda row: f"{row.value} {row.origin} → {row.moved}", text=True),
+                Column(
+                    "assumed value → tested value",
+                    value=lambda row: f"{row.value} {row.origin} → {row.moved}",
+                    text=True,
+                ),
                 Column("then, µm", value="effect", text=True),
             )
             left_out = len(self.matters[limit:]) if limit is not None else 0

@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, overload
 
 from pydantic import Field, PrivateAttr, Strict, model_validator
 
-from shapegcode.errors import MachineError, Problem
+from shapegcode._core import Mode
+from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine.axes import Axes, Axis, AxisMode
 from shapegcode.machine.controller import Controller, PowerOn
 from shapegcode.machine.drive import Drive
@@ -33,6 +34,7 @@ from shapegcode.settings.problems import KeyProblem
 from shapegcode.settings.reference import documentation
 from shapegcode.settings.remarks import DEFAULT, inherited, remarks_of, with_remarks
 
+_ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
 _VARIABLE = re.compile(r"#\d+")
 _USUAL_DIAL_PERCENT = (70.0, 120.0)  # as far as operators turn it without thinking
 
@@ -216,6 +218,70 @@ class Machine(TomlTable):
         return cls.from_toml(read_text(path, MachineError), str(path))
 
     @classmethod
+    def of(cls, machine: Machine | str | Path) -> Machine:
+        """A machine as it is, or loaded from its file or by its built-in name.
+
+        Args:
+            machine: the machine, its file or its name.
+
+        Returns:
+            The machine.
+
+        Raises:
+            ArgumentError: it is none of these.
+            MachineError, OSError: as `load` does.
+        """
+        if isinstance(machine, cls):
+            return machine
+        if not isinstance(machine, str | Path):
+            raise ArgumentError(
+                f"machine: a Machine, a file or a built-in name is needed, not {type(machine).__name__}"
+            )
+        return cls.load(machine)
+
+    @classmethod
+    def simple(
+        cls,
+        modes: Mapping[str, float | Mode | Sequence[float | Mode]],
+        *,
+        name: str = "simple",
+        max_feed_mm_per_min: float = 12_000.0,
+        rapid_mm_per_min: float = 24_000.0,
+        max_acceleration_mm_per_s2: float = 3000.0,
+    ) -> Machine:
+        """A machine of which little is known: its modes, and limits that all axes share.
+
+        Everything else is a default of the machine file, and counts as assumed, as do limits that are not given.
+
+        Args:
+            modes: by axis ("x", "y", "z"): natural frequencies in Hz (damping ratio 0.02 assumed) or modes, one or
+                several; an axis without an entry counts as rigid as long as nobody knows better.
+            name: of the machine.
+            max_feed_mm_per_min: largest cutting feed of an axis, mm/min.
+            rapid_mm_per_min: rapid traverse of an axis, mm/min.
+            max_acceleration_mm_per_s2: largest acceleration while cutting, mm/s².
+
+        Returns:
+            The machine; `with_values` gives others of its keys, `to_toml` its file.
+
+        Raises:
+            ArgumentError: an axis other than x, y, z.
+            MachineError: a value that a machine file could not have.
+        """
+        if unknown := set(modes) - set("xyz"):
+            raise ArgumentError(f"modes: {min(unknown)!r} is no axis: x, y, z are")
+        limits = {
+            "max_feed_mm_per_min": max_feed_mm_per_min,
+            "rapid_mm_per_min": rapid_mm_per_min,
+            "max_acceleration_mm_s2": max_acceleration_mm_per_s2,
+        }
+        axes = {
+            axis: {**limits, "modes": [_table_of(mode) for mode in _several(modes.get(axis, ()))]} for axis in "xyz"
+        }
+        machine = validated(cls, {"name": name, "axes": axes}, "Machine.simple", "", MachineError)
+        return machine.with_remarks({f"axes.{axis}.{limit}": "assumed" for axis in "xyz" for limit in limits})
+
+    @classmethod
     def from_toml(cls, text: str, source: str = "<text>") -> Machine:
         """Read the text of a machine file; *source* names it in messages.
 
@@ -360,3 +426,17 @@ def key_documentation() -> str:
         The page; ``make docs`` writes it.
     """
     return documentation(Machine, Machine.builtin_names())
+
+
+def _several(modes: float | Mode | Sequence[float | Mode]) -> Sequence[float | Mode]:
+    return [modes] if isinstance(modes, int | float | Mode) else modes
+
+
+def _table_of(mode: float | Mode) -> dict[str, float]:
+    if not isinstance(mode, Mode):
+        return {"frequency_hz": mode, "damping_ratio": _ASSUMED_DAMPING_RATIO}
+    return {
+        "frequency_hz": mode.frequency_hz,
+        "damping_ratio": mode.damping_ratio,
+        "participation": mode.participation,
+    }

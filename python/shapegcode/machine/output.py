@@ -24,10 +24,10 @@ class Emission(TomlTable):
         default=None,
     )
     prologue: tuple[Text, ...] = key(
-        'lines written before each shaped stretch, for example ["G05.1 Q0"] to switch a look-ahead mode off',
+        'lines written before each shaped cut, for example ["G05.1 Q0"] to switch a look-ahead mode off',
         default=(),
     )
-    epilogue: tuple[Text, ...] = key("lines written after each shaped stretch", default=())
+    epilogue: tuple[Text, ...] = key("lines written after each shaped cut", default=())
     override: Literal["ask", "any", "lock"] = key(
         'what is done about the feed override while shaped moves run. "ask": the header asks for 100 %, but for a '
         'verdict.override_percent that states more, where it is as "any"; "lock": '
@@ -49,7 +49,7 @@ class Emission(TomlTable):
         default=("G53", "#3004=#33"),
     )
     prefill_dwell_s: Annotated[NonNegative, Field(le=60)] = key(
-        "dwell before each shaped stretch, in which the block buffer fills; 0: none", unit="s", default=0.0
+        "dwell before each shaped cut, in which the block buffer fills; 0: none", unit="s", default=0.0
     )
     restart_interval_s: Positive = key(
         "cutting time between restart points of a shaped cut, at most, where its command comes nearly to rest anyway; "
@@ -186,7 +186,7 @@ class Shaping(TomlTable):
         default=False,
     )
     least_gain_um: NonNegative = key(
-        "a region keeps its text unless shaping it lowers its residual vibration or the contour error of the table by "
+        "a cut stays unchanged unless shaping lowers residual vibration or the contour error of the machine table by "
         "at least this; 0: everything is shaped",
         unit="µm",
         default=3.0,

@@ -40,7 +40,7 @@ _LEAST_SPACING_MM = 1e-3
 
 def measure(
     programs: Program | str | Path | Sequence[Program | str | Path],
-    machine: Machine,
+    machine: Machine | str | Path,
     tool_diameter_mm: float,
     *,
     plant: str = "modal",
@@ -83,6 +83,7 @@ def measure(
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
+    machine = Machine.of(machine)
     given = [programs] if isinstance(programs, Program | str | Path) else list(programs)
     several = [given_program(each, machine) for each in given]
     if not several:

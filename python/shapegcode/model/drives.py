@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 
@@ -18,7 +19,9 @@ _MM = 1e-3  # m
 _GROWING_PER_S = 1e-3  # real part of a pole above which a loop grows
 
 
-def drive_parameters(machine: Machine, shift: float = 0.0, only: str | None = None) -> list[_core.FeedDriveParameters]:
+def drive_parameters(
+    machine: Machine | str | Path, shift: float = 0.0, only: str | None = None
+) -> list[_core.FeedDriveParameters]:
     """The feed drives of X, Y and Z, referred to the travel of the tables.
 
     Position gain and feed-forward are those of the controller; the modes of the axes ride on the tables, those that
@@ -35,6 +38,7 @@ def drive_parameters(machine: Machine, shift: float = 0.0, only: str | None = No
     Raises:
         MachineError: an axis has no such table, or its loop is unstable.
     """
+    machine = Machine.of(machine)
     missing = [
         Problem(f"axes.{name}.drive", "", "required for a simulation with feed drives, but missing")
         for name, axis in zip("xyz", machine.axes.as_tuple(), strict=True)

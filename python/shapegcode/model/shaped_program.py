@@ -89,7 +89,7 @@ def _other_period(stamp: Stamp, machine: Machine) -> str:
         tick_ms = controller.interpolation_period_s * 1e3
         return f"{said}, which is no whole number of this control's periods of {tick_ms:g} ms"
     if period_s < controller.block_time_s * (1.0 - _WHOLE):
-        return f"{said}, this control needs {controller.block_time_s * 1e3:g} ms for a block: it starves"
+        return f"{said}, this control needs {controller.block_time_s * 1e3:g} ms for a block: buffer underrun"
     if stated_s is not None and abs(stated_s - period_s) > _WHOLE * period_s:
         return f"{said}, emission.block_period_s is {stated_s * 1e3:g} ms here"
     return ""
@@ -107,6 +107,6 @@ def shaped_note(program: Program) -> str:
     shaped, whole = program.shaped_regions, len(program.regions)
     if not shaped:
         return ""
-    others = "" if shaped == whole else f"; the other {whole - shaped} as the control plays any program"
-    how = f"{shaped} of {whole} regions are played block by block at their feed"
+    others = "" if shaped == whole else f"; the other {whole - shaped} as the control executes any program"
+    how = f"{shaped} of {whole} regions are simulated block by block at their feed"
     return f"its header says that it is shaped: {how}{others}"

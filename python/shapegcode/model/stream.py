@@ -99,7 +99,7 @@ class Chunk:
 
 def stream(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     plant: str = "modal",
     shaped: bool | None = None,
@@ -130,6 +130,7 @@ def stream(
         MachineError: the machine has no feed drives.
         NumericError: while pieces are given: the integrator of a feed drive fails.
     """
+    machine = Machine.of(machine)
     if chunk_samples < 1:
         raise _core.ArgumentError(f"chunk_samples = {chunk_samples}: must be 1 or more")
     program = given_program(program, machine)

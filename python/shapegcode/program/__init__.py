@@ -3,6 +3,8 @@
 from shapegcode.program.program import (
     MM_PER_INCH,
     Program,
+    between_increments,
+    end_off_grid_mm,
     given_program,
     least_increment_mm,
     located_error,
@@ -12,6 +14,8 @@ from shapegcode.program.reading import program_loader, reader_options
 __all__ = [
     "MM_PER_INCH",
     "Program",
+    "between_increments",
+    "end_off_grid_mm",
     "given_program",
     "least_increment_mm",
     "located_error",

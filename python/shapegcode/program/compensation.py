@@ -27,7 +27,7 @@ _SLACK_MM = 0.0005  # a radius that differs by more is another one
 
 
 def read_for_conversion(path: str | Path, machine: Machine, *, program_number: int | str | None = None) -> Program:
-    """Read a program as `convert` wants it: compensation expanded only if `input.compensation` says so.
+    """Read a program file or text as `convert` wants it: compensation expanded only if `input.compensation` says so.
 
     Raises:
         ProgramError: see :meth:`Program.read`; compensation is refused; the memory would not hold what is written.
@@ -40,7 +40,21 @@ def read_for_conversion(path: str | Path, machine: Machine, *, program_number: i
     if period_s > 0.0:
         blocks = round(program.core.least_time_s / period_s)
         said = f"up to {blocks} blocks are to be written"
-        require_memory(str(path), blocks * _MEMORY_PER_BLOCK, said)
+        require_memory(program.source, blocks * _MEMORY_PER_BLOCK, said)
+    return program
+
+
+def program_for_conversion(program: Program | str | Path, machine: Machine) -> Program:
+    """A program as it is, or read from its file as `convert` wants it.
+
+    Raises:
+        ArgumentError: it was read with other settings than the machine has.
+        ProgramError, OSError: see `read_for_conversion`.
+    """
+    if not isinstance(program, Program):
+        return read_for_conversion(program, machine)
+    program.require_machine(machine)
+    require_decision(program, machine)
     return program
 
 

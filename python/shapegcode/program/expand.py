@@ -16,7 +16,7 @@ __all__ = ["expand"]
 
 def expand(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     compensation: Literal["expand", "keep"] = "expand",
     program_number: int | str | None = None,
@@ -36,9 +36,13 @@ def expand(
     Raises:
         ProgramError: the text is no program that can be read, or its compensation has a radius of 0; the message
             starts with ``file:line:column``.
+        ArgumentError: it was read with other settings than the machine has.
         OSError: the file cannot be read.
     """
-    if not isinstance(program, Program):
+    machine = Machine.of(machine)
+    if isinstance(program, Program):
+        program.require_machine(machine)
+    else:
         whole = compensation == "expand"
         program = Program.read(program, machine, program_number=program_number, expand_compensation=whole)
     if compensation == "expand":

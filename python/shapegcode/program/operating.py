@@ -49,7 +49,7 @@ OVERRIDE_LOCKED = Habit(
 OVERRIDE_ANY = Habit(
     "override",
     "BLOCKS OF ONE DURATION FOR ANY FEED OVERRIDE",
-    "blocks of one duration: a turned feed override stretches all alike; least vibration stays at 100 %",
+    "blocks of one duration: another feed override scales all of them alike; vibration is lowest at 100 %",
 )
 OVERRIDES = {"ask": OVERRIDE, "lock": OVERRIDE_LOCKED, "any": OVERRIDE_ANY}
 """By `emission.override`."""
@@ -63,7 +63,8 @@ SINGLE_BLOCK = Habit(
 FEED_HOLD = Habit(
     "feed hold",
     "AFTER FEED HOLD GO ON AT 100 PCT",
-    "feed hold is safe and may shake the machine once, since the control brakes by its own rule; cycle start goes on",
+    "feed hold is safe; the machine may vibrate once, since the control decelerates in its own way; "
+    "cycle start resumes the program",
 )
 RESTART = Habit(
     "restart",

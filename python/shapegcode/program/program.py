@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.memory import require_memory_for_lines
-from shapegcode.program.reading import program_bytes, program_loader, reader_options
+from shapegcode.program.reading import Reading, is_program_text, program_bytes
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
 from shapegcode.program.turning import signs_of_turning
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 MM_PER_INCH = 25.4
-_ANY_PROGRAM = [0, 99_999_999]
 _KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
 ARC_OFF_RADIUS = "off its radius"
 
@@ -33,6 +33,7 @@ class Program:
     Attributes:
         core: what the core made of it: text, regions (runs of cutting moves between stops), other moves.
         source: name for messages.
+        reading: the machine whose controller read it, and how.
         unexpanded: the text that was read, where the core's is the plain program that it comes to.
         folder: where programs that it calls are looked for.
         number: which program of the text it is, as it was asked for; None: the first.
@@ -40,6 +41,7 @@ class Program:
 
     core: _core.ProgramText
     source: str
+    reading: Reading
     unexpanded: bytes | None = None
     folder: Path | None = None
     number: int | str | None = None
@@ -48,7 +50,7 @@ class Program:
     def read(
         cls,
         path: str | Path,
-        machine: Machine | None = None,
+        machine: Machine | str | Path | None = None,
         *,
         program_number: int | str | None = None,
         expand_compensation: bool = True,
@@ -59,8 +61,8 @@ class Program:
         Programs that it calls are looked for in the file, beside it, and in `input.program_folders`.
 
         Args:
-            path: the file.
-            machine: whose controller reads it.
+            path: the file; a string of several lines is the program's text itself.
+            machine: whose controller reads it, its file or its built-in name.
             program_number: which program of a file that holds several: its O number, or an address as in
                 `shapegcode.program.several`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
@@ -75,7 +77,15 @@ class Program:
         """
         from shapegcode.machine import Machine
 
-        machine = machine or Machine.load("vx500")
+        machine = Machine.of(machine or "vx500")
+        if is_program_text(path):
+            return cls.from_text(
+                str(path),
+                machine,
+                program_number=program_number,
+                expand_compensation=expand_compensation,
+                collect_alarms=collect_alarms,
+            )
         return cls.from_text(
             program_bytes(path, machine.controller.max_program_bytes),
             machine,
@@ -90,7 +100,7 @@ class Program:
     def from_text(
         cls,
         text: bytes | str,
-        machine: Machine | None = None,
+        machine: Machine | str | Path | None = None,
         *,
         source: str = "<text>",
         emitted: bool = False,
@@ -125,32 +135,35 @@ class Program:
         """
         from shapegcode.machine import Machine
 
-        machine = machine or Machine.load("vx500")
+        machine = Machine.of(machine or "vx500")
         data = text.encode() if isinstance(text, str) else text
         require_memory_for_lines(data, source)
         if not emitted and (turning := signs_of_turning(data)) is not None:
             line, signs = turning
             said = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"
             raise located_error(source, line, 1, said)
-        index = None if program_number is None else index_of(data, program_number, source)
-        options = reader_options(
+        reading = Reading(
             machine,
             # What shapegcode wrote has FANUC's arcs, whatever those of its original were.
             emitted=emitted or STAMP_BEGIN in data,
-            probe_lines=probe_lines,
-            program_number=program_number if isinstance(program_number, int) and index is None else None,
-            program_index=index,
+            probe_lines=tuple(probe_lines),
             expand_compensation=expand_compensation,
             collect_alarms=collect_alarms,
         )
-        _look_in(options, machine, [folder] if folder is not None else [])
+        options = reading.options([folder] if folder is not None else [])
+        if program_number is not None:
+            index = index_of(data, program_number, source)
+            options.program_index = -1 if index is None else index
+            options.program = program_number if isinstance(program_number, int) and index is None else -1
         try:
             core = _core.read_program(data, options)
         except ProgramError as error:
             hint = _absolute_centre_hint(data, options) if ARC_OFF_RADIUS in str(error) else ""
             raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
 
-        return cls(core, source, data if core.expanded else None, folder, program_number)
+        # The core leaves the mark out too.
+        whole = data.removeprefix(codecs.BOM_UTF8) if core.expanded else None
+        return cls(core, source, reading, whole, folder, program_number)
 
     @classmethod
     def from_parts(
@@ -170,14 +183,27 @@ class Program:
         Raises:
             ProgramError: as `from_text` does.
         """
-        options = reader_options(machine, emitted=True, probe_lines=probe_lines)
-        options.opaque_programs = _ANY_PROGRAM  # a call that stands in such a text was kept
-        _look_in(options, machine, [])
+        reading = Reading(machine, emitted=True, keeps_calls=True, probe_lines=tuple(probe_lines))
         try:
-            core = _core.read_parts(parts, options)
+            core = _core.read_parts(parts, reading.options([]))
         except ProgramError as error:
             raise located_error(error.file or source, error.line, error.column, str(error), error.alarm) from None
-        return cls(core, source, core.unexpanded if core.expanded else None)
+        return cls(core, source, reading, core.unexpanded if core.expanded else None)
+
+    def require_machine(self, machine: Machine) -> None:
+        """Refuse a machine that would read this program otherwise than the one that read it.
+
+        Args:
+            machine: on which it is to be simulated, converted, checked or timed.
+
+        Raises:
+            ArgumentError: with the settings that differ, both values of each, and what to do.
+        """
+        if differences := self.reading.differences(machine):
+            raise _core.ArgumentError(
+                f"{self.source} was read with other settings than those of the machine {machine.name}: "
+                f"{'; '.join(differences)}; read it with that machine: machine= of Program.read or Program.from_text"
+            )
 
     @property
     def text(self) -> bytes:
@@ -311,17 +337,43 @@ class Program:
         return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
 
 
-def _look_in(options: _core.ReaderOptions, machine: Machine, folders: list[Path]) -> None:
-    """Let the core look for called programs in folders, and in those of the machine."""
-    folders = [*folders, *(Path(name).expanduser() for name in machine.input.program_folders)]
-    if folders:
-        options.load_program = program_loader(folders, machine.controller.max_program_bytes)
-
-
 def least_increment_mm(machine: Machine, units: int) -> float:
     """Least increment of the words of a program in G20 or G21, mm."""
     controller = machine.controller
     return controller.least_increment_inch * MM_PER_INCH if units == 20 else controller.least_increment_mm
+
+
+_ON_INCREMENT = 1e-6  # increments: so near to one a position is on it
+
+
+def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
+    """How far the end of a region lies from the nearest position that its words can name.
+
+    A program that changes between G20 and G21, or that has more digits than the control resolves, may end elsewhere.
+
+    Args:
+        region: of a program.
+        increment_mm: least increment of its words.
+
+    Returns:
+        Of X, Y and Z, mm; 0 where only the rounding of floating-point numbers is left.
+    """
+    off = [abs(each / increment_mm - round(each / increment_mm)) for each in map(float, region.path.end_mm)]
+    return [each * increment_mm if each > _ON_INCREMENT else 0.0 for each in off]
+
+
+def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
+    """Which axes rest through a whole region where none of its words leads: nothing may be written of them.
+
+    Args:
+        region: of a program.
+        increment_mm: least increment of its words.
+
+    Returns:
+        Of X, Y and Z.
+    """
+    off_mm = end_off_grid_mm(region, increment_mm)
+    return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 
 
 def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:
@@ -346,6 +398,10 @@ def given_program(program: Program | str | Path, machine: Machine) -> Program:
     """A program as it is, or read from its file as the controller of `machine` would.
 
     Raises:
+        ArgumentError: it was read with other settings than the machine has.
         ProgramError, OSError: see :meth:`Program.read`.
     """
-    return program if isinstance(program, Program) else Program.read(program, machine)
+    if not isinstance(program, Program):
+        return Program.read(program, machine)
+    program.require_machine(machine)
+    return program

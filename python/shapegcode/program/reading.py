@@ -6,18 +6,118 @@ import errno
 import math
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.program.memory import require_memory
+from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["PROGRAM_SUFFIXES", "program_bytes", "program_loader", "reader_options"]
+__all__ = ["PROGRAM_SUFFIXES", "Reading", "is_program_text", "program_bytes", "program_loader", "reader_options"]
 
 _NO_LIMIT = 2**63
+_ANY_PROGRAM = (0, 99_999_999)
+_SHOWN_CHARACTERS = 60  # of a value in a message: a table of tools may be long
+
+_CONTROLLER_KEYS = (
+    "calculator_decimal_point",
+    "least_increment_mm",
+    "least_increment_inch",
+    "arc_radius_tolerance_mm",
+    "offset_memory",
+    "nesting_limit_subprogram",
+)
+"""Of `controller`: what changes how a text is read; limits of memory and time do not."""
+
+_NOT_READ = ("compensation", "material_side")
+"""Of `input`: what is decided of a program that was read."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a program was read.
+
+    Attributes:
+        machine: whose controller read it.
+        emitted: shapegcode wrote the text: its arcs are FANUC's, whatever the original's were.
+        keeps_calls: shapegcode has just written it: every call in it was kept.
+        probe_lines: ascending line numbers behind which the modal state is kept.
+        expand_compensation: G41/G42 became plain moves.
+        collect_alarms: the reader went on behind an alarm.
+    """
+
+    machine: Machine
+    emitted: bool = False
+    keeps_calls: bool = False
+    probe_lines: tuple[int, ...] = ()
+    expand_compensation: bool = True
+    collect_alarms: bool = False
+
+    def options(self, folders: Sequence[Path]) -> _core.ReaderOptions:
+        """Settings with which the core reads a text so.
+
+        Args:
+            folders: where called programs are looked for, before `input.program_folders`.
+
+        Returns:
+            The options of the core.
+        """
+        options = reader_options(
+            self.machine,
+            emitted=self.emitted,
+            probe_lines=self.probe_lines,
+            expand_compensation=self.expand_compensation,
+            collect_alarms=self.collect_alarms,
+        )
+        if self.keeps_calls:
+            options.opaque_programs = list(_ANY_PROGRAM)
+        folders = [*folders, *(Path(name).expanduser() for name in self.machine.input.program_folders)]
+        if folders:
+            options.load_program = program_loader(folders, self.machine.controller.max_program_bytes)
+        return options
+
+    def differences(self, machine: Machine) -> list[str]:
+        """Settings with which another machine would read the text otherwise.
+
+        Args:
+            machine: the other one.
+
+        Returns:
+            Each with both values; none where both machines read alike.
+        """
+        if machine is self.machine:
+            return []
+        unused = {"input.arc_centre"} if self.emitted else set()
+        unused |= {"input.opaque_programs"} if self.keeps_calls else set()
+        mine, other = _settings_of_reading(self.machine), _settings_of_reading(machine)
+        return [
+            f"{key} = {_shown(value)} as read, {_shown(other[key])} there"
+            for key, value in mine.items()
+            if value != other[key] and key not in unused
+        ]
+
+
+def _settings_of_reading(machine: Machine) -> dict[str, object]:
+    tables = (
+        ("controller", {name: getattr(machine.controller, name) for name in _CONTROLLER_KEYS}),
+        ("power_on", vars(machine.power_on)),
+        ("input", {name: value for name, value in vars(machine.input).items() if name not in _NOT_READ}),
+    )
+    return {f"{table}.{name}": value for table, values in tables for name, value in values.items()}
+
+
+def _shown(value: object) -> str:
+    text = toml(value)
+    return text if len(text) <= _SHOWN_CHARACTERS else f"{text[:_SHOWN_CHARACTERS]}..."
+
+
+def is_program_text(given: object) -> bool:
+    """Whether a string is the text of a program and not the name of a file: it has several lines."""
+    return isinstance(given, str) and ("\n" in given or "\r" in given)
 
 
 def reader_options(
@@ -25,8 +125,6 @@ def reader_options(
     *,
     emitted: bool = False,
     probe_lines: Sequence[int] = (),
-    program_number: int | None = None,
-    program_index: int | None = None,
     expand_compensation: bool = True,
     collect_alarms: bool = False,
 ) -> _core.ReaderOptions:
@@ -36,8 +134,6 @@ def reader_options(
         machine: whose controller reads the text.
         emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
         probe_lines: ascending line numbers behind which the modal state is kept.
-        program_number: O number to play of a file that holds several; None: the first.
-        program_index: the same by its place in the file; None: by number.
         expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
         collect_alarms: go on behind an alarm.
 
@@ -63,8 +159,6 @@ def reader_options(
     options.offset_memory = machine.controller.offset_memory
     options.retained_variables = {int(name): value for name, value in machine.input.variables.items()}
     options.bindings = _bindings(machine)
-    options.program = -1 if program_number is None else program_number
-    options.program_index = -1 if program_index is None else program_index
     options.opaque_programs = list(machine.input.opaque_programs)
     options.subprogram_nesting = machine.controller.nesting_limit_subprogram
     options.limits = _limits(machine, emitted=emitted)

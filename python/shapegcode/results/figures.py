@@ -17,7 +17,7 @@ from shapegcode.results.result import Xyz
 Vector = npt.NDArray[np.float64]
 T = TypeVar("T")
 
-CONTOURS = {"command": "contour error of the command", "response": "contour error of the table"}
+CONTOURS = {"command": "contour error of the command", "response": "contour error of the machine table"}
 """What the contour errors of `Tracks` are called."""
 
 

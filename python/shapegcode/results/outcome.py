@@ -1,4 +1,4 @@
-"""What every result says of itself: whether it is good, what to heed, what to do next; figures, tables, pictures.
+"""What every result says of itself: whether it is good, its cautions, what to do next; figures, tables, pictures.
 
 The same fields give JSON, table, picture and page. A result's pictures are drawn by the module `plots` beside it, which
 is loaded when somebody asks for them.

@@ -52,7 +52,7 @@ class Reports(Result):
         count = len(self.pages)
         said = f"{count} page{'s' if count > 1 else ''} written"
         bad = sum(bool(page.problems) for page in self.pages)
-        return f"{said}, {bad} with something to heed" if bad else said
+        return f"{said}, {bad} with a caution" if bad else said
 
     @property
     def next_step(self) -> str:

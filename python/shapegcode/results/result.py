@@ -1,4 +1,4 @@
-"""What every result is: a frozen dataclass that says whether it is good, what to heed, and what to do next.
+"""What every result is: a frozen dataclass that says whether it is good, caution, before you run, and what to do next.
 
 >>> time = sg.cycle_time("part.nc", machine)
 >>> time.ok, time.warnings, time.next_step
@@ -153,7 +153,7 @@ class Result(Outcome):
         """
         plots = self.plots()
         if not plots or (name and name not in plots):
-            there = f"one of {', '.join(plots)}" if plots else "nothing is drawn of this"
+            there = f"one of {', '.join(plots)}" if plots else "there is no picture of this"
             from shapegcode._core import ArgumentError
 
             raise ArgumentError(f"plot {name}: {there}" if name else there)

@@ -37,6 +37,15 @@ class TomlTable(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse it with what to do instead."""
+        if not name.startswith("_"):
+            raise AttributeError(
+                f"{type(self).__name__}.{name} cannot be set: values never change; "
+                f"machine.with_values({{'...{name}': value}}) gives a machine with another one"
+            )
+        super().__setattr__(name, value)
+
 
 class InlineTable(TomlTable):
     """A table that is written in one line, as the value of a key."""

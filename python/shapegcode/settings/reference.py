@@ -74,7 +74,7 @@ def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
         "Where a value comes from stands behind it, and its first words count: `# measured ...`, `# FANUC 1622`",
         "(of the control's dump), `# from VX500: ...` (inherited from another machine), `# assumed ...`,",
         "`# choice` (a property of no machine); anything else is what the file states. `machine show` counts",
-        "them, and a verdict ends with those that it rests on and that nobody measured.",
+        "them, and a verdict ends with those that it depends on and that are unverified.",
         "",
         "A default marked **assumed** is not known for real controllers in general: look it up or measure",
         "it. The FANUC column names the parameter that corresponds to a key; numbers differ between series,",

@@ -220,7 +220,7 @@ def _of_modes(modes: ModesAnswer) -> str:
 EXPLAINED: Mapping[str, Callable[[Any], str]] = {
     "name": lambda _: "It stands in the header of every program that is written.",
     "control": lambda said: (
-        "A parameter file of it can be read; look-ahead goes on and off by G05.1 or G08."
+        "A parameter file of it can be read; look-ahead is switched by G05.1 or G08."
         if said == "fanuc"
         else "Programs are written as FANUC controls read them: try one above the part first."
     ),
@@ -238,7 +238,7 @@ EXPLAINED: Mapping[str, Callable[[Any], str]] = {
         "Feeds above it are cut down, and cost time." if said else "The rapid rate is assumed for it."
     ),
     "max_acceleration_mm_s2": lambda said: (
-        "It says how sharply corners are taken, and what shakes the machine."
+        "It says how sharply corners are taken, and what excites vibration."
         if said
         else "0.3 g is assumed, as usual for a machining centre: measure it with `shapegcode characterize`."
     ),

@@ -13,7 +13,7 @@ from shapegcode.results.json import hidden
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["NARROW_PERCENT", "NO_MODE", "ModeBand", "machine_bands", "parse_mode_band"]
+__all__ = ["NARROW_PERCENT", "NO_MODE", "ModeBand", "machine_bands", "mode_band", "parse_mode_band"]
 
 NO_MODE = (
     "the machine file gives no vibration mode (axes.x.modes): nothing to shape for; `shapegcode identify --tap-plan` "
@@ -171,3 +171,12 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
     if not widths:
         raise ArgumentError(NO_MODE)
     return [ModeBand(Mode(*key), width) for key, width in widths.items()]
+
+
+def mode_band(given: float | str | Mode | ModeBand, uncertainty: float = 0.0) -> ModeBand:
+    """A mode with its band, from a frequency in Hz, a text as `parse_mode_band` reads it, a mode, or as it is."""
+    if isinstance(given, Mode):
+        return ModeBand(given, uncertainty)
+    if isinstance(given, ModeBand):
+        return given
+    return parse_mode_band(given if isinstance(given, str) else f"{float(given):.17g}", uncertainty)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from shapegcode import _core
 from shapegcode.machine import Machine
@@ -81,7 +82,7 @@ def make_grid(
 
 
 def choose_grid(
-    machine: Machine, block_period_s: float | None = None, *, fastest_mm_per_s: float | None = None
+    machine: Machine | str | Path, block_period_s: float | None = None, *, fastest_mm_per_s: float | None = None
 ) -> Grid:
     """Block period and shaper for all modes of a machine, and shapers that follow moving modes.
 
@@ -103,6 +104,7 @@ def choose_grid(
         ArgumentError: the machine has no mode, its modes vary over several axes, or the period does not fit the
             controller.
     """
+    machine = Machine.of(machine)
     if not any(axis.modes for axis in machine.axes.as_tuple()):
         raise _core.ArgumentError(NO_MODE)
     bands = machine_bands(machine)

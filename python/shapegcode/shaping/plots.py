@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapegcode._core import MinimalBranches, Shaper, minimal_branches
+from shapegcode._core import MinimalBranches, Mode, Shaper, minimal_branches
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
+from shapegcode.shaping.bands import ModeBand, mode_band
 from shapegcode.shaping.designs import Design
 from shapegcode.shaping.result import Recommendation, times_name
 from shapegcode.shaping.shaper_plots import draw_branches, draw_impulses, draw_sensitivity, draw_steps
@@ -130,17 +131,27 @@ def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
     return upper
 
 
-def plot_sensitivity(result: Recommendation, ax: Axes | None = None) -> Axes:
-    """What is left if the frequencies are others? One curve for each of `selected`, the limit dashed.
+def plot_sensitivity(
+    result: Recommendation | Shaper | Mapping[str, Shaper],
+    ax: Axes | None = None,
+    *,
+    modes: Sequence[float | str | Mode | ModeBand] = (),
+) -> Axes:
+    """Residual vibration over the frequency of a mode.
 
     Args:
-        result: the comparison.
+        result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, or shapers by name.
+        modes: of shapers, to be marked: as `choose_shaper` takes them; empty: undamped, up to two periods per shaper
+            duration.
         ax: where to draw; None: a new figure.
 
     Returns:
         The axes that were drawn into.
     """
-    return draw_sensitivity(_named(result), result.modes, result.vibration_limit, ax)
+    if isinstance(result, Recommendation):
+        return draw_sensitivity(_named(result), result.modes, result.vibration_limit, ax)
+    shapers = {"shaper": result} if isinstance(result, Shaper) else dict(result)
+    return draw_sensitivity(shapers, [mode_band(each) for each in modes], None, ax)
 
 
 def plot_impulses(result: Recommendation, ax: Axes | None = None) -> Axes:

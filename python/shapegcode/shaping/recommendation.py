@@ -6,18 +6,16 @@ import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
-from shapegcode.shaping.bands import ModeBand, machine_bands, parse_mode_band
+from shapegcode.machine import Machine
+from shapegcode.shaping.bands import ModeBand, machine_bands, mode_band
 from shapegcode.shaping.comparison import choose
 from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.periods import candidate_periods, check_block_period
 from shapegcode.shaping.result import Recommendation
 from shapegcode.shaping.taps import parse_taps
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
 
 __all__ = ["choose_shaper"]
 
@@ -25,9 +23,9 @@ _SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of 
 
 
 def choose_shaper(
-    modes: Sequence[str | Mode | ModeBand] = (),
+    modes: float | str | Mode | ModeBand | Sequence[float | str | Mode | ModeBand] = (),
     *,
-    machine: Machine | None = None,
+    machine: Machine | str | Path | None = None,
     uncertainty: float = 0.0,
     periods_s: Sequence[float | None] | None = None,
     families: Sequence[str] | None = None,
@@ -45,7 +43,8 @@ def choose_shaper(
     >>> sg.choose_shaper(["46:0.02±5%", "131:0.02"], periods_s=[0.005]).design.shaper
 
     Args:
-        modes: texts such as ``46:0.02±5%`` (Hz, damping ratio, band), modes or bands; empty: those of the machine.
+        modes: frequencies in Hz of undamped modes, texts such as ``46:0.02±5%`` (Hz, damping ratio, band), modes or
+            bands; one or several; empty: those of the machine.
         machine: its modes, unless some are given, and its controller: the block periods worth trying.
         uncertainty: half width of the band, relative, of modes that state none.
         periods_s: grids on which the taps may lie, s; None among them: continuous times too. None: with a machine its
@@ -68,8 +67,11 @@ def choose_shaper(
         ArgumentError: neither modes nor a machine with modes, equal modes, or a value outside its range.
         DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
     """
-    if modes:
-        bands = [_band(each, uncertainty) for each in modes]
+    machine = None if machine is None else Machine.of(machine)
+    if isinstance(modes, int | float | str | Mode | ModeBand):
+        modes = [modes]
+    if len(modes) > 0:
+        bands = [mode_band(each, uncertainty) for each in modes]
     elif machine is not None:
         bands = machine_bands(machine, uncertainty)
     else:
@@ -93,7 +95,7 @@ def choose_shaper(
             bands, kinds, options, families=families, objective=objective, allow_negative=allow_negative,
             on_progress=on_progress,
         )  # fmt: skip
-        return result if modes or machine is None else replace(result, machine=machine.name)
+        return result if len(modes) > 0 or machine is None else replace(result, machine=machine.name)
 
     if max_duration_s is not None:
         return compared(max_duration_s)
@@ -108,11 +110,3 @@ def choose_shaper(
             if result.ok and result.design.exact:
                 return result
     return compared(longest_s)
-
-
-def _band(given: str | Mode | ModeBand, uncertainty: float) -> ModeBand:
-    if isinstance(given, Mode):
-        return ModeBand(given, uncertainty)
-    if isinstance(given, ModeBand):
-        return given
-    return parse_mode_band(given, uncertainty)

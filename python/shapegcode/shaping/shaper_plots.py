@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_branches", "draw_impulses", "draw_sensitivity", "draw_steps", "residual_curve"]
 
 _FREQUENCIES = 601
+_PERIODS_IN_DURATION = 2.0
 _SAMPLES_OF_A_STEP = 3000
 _SWINGS_SHOWN = 3.0  # of the slowest mode, behind the longest shaper
 
@@ -29,15 +30,14 @@ def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: S
     Args:
         shaper: whose zeros are looked for.
         frequencies_hz: (n,), above 0.
-        modes: whose damping ratios count, at least one.
+        modes: whose damping ratios count; none: no damping.
 
     Returns:
         (n,), share of the unshaped vibration that is left.
     """
-    known = sorted((mode.frequency_hz, mode.damping_ratio) for mode in modes)
+    known = sorted((mode.frequency_hz, mode.damping_ratio) for mode in modes) or [(0.0, 0.0)]
     damping = np.interp(frequencies_hz, [frequency for frequency, _ in known], [ratio for _, ratio in known])
-    pairs = zip(frequencies_hz, damping, strict=True)
-    return np.array([shaper.residual_ratio(Mode(float(f), float(zeta))) for f, zeta in pairs])
+    return np.asarray(shaper.residual(frequencies_hz, damping))
 
 
 def draw_sensitivity(
@@ -50,7 +50,7 @@ def draw_sensitivity(
 
     Args:
         shapers: by their names in the legend.
-        bands: the modes and how far they may be off, at least one.
+        bands: the modes and how far they may be off; none: up to two and a half periods in the duration.
         vibration_limit: residual ratio drawn as a dashed line; None: none.
         ax: where to draw; None: a new figure.
 
@@ -62,7 +62,11 @@ def draw_sensitivity(
         1.0, 1.01, "a curve that comes down to 0 turns there: an amplitude has no sign", ha="right", fontsize=8,
         color="#555555", transform=panel.transAxes,
     )  # fmt: skip
-    highest = max(band.mode.frequency_hz * (1.0 + band.uncertainty) for band in bands)
+    longest_s = max(shaper.duration_s for shaper in shapers.values())
+    highest = max(
+        (band.mode.frequency_hz * (1.0 + band.uncertainty) for band in bands),
+        default=_PERIODS_IN_DURATION / longest_s if longest_s > 0.0 else 1.0,
+    )
     frequencies_hz = np.linspace(0.0, 1.25 * highest, _FREQUENCIES)[1:]
     modes = [band.mode for band in bands]
     for number, (label, shaper) in enumerate(shapers.items()):

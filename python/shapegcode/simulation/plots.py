@@ -101,6 +101,6 @@ def _band(panel: Axes, times: FloatArray, low: FloatArray, high: FloatArray, col
         panel.fill_between(times, low, high, color=colour, alpha=0.3 if dense else 1.0, linewidth=0)
     if dense:
         panel.plot(times, np.array([low, high]).T, color=colour, linewidth=0.5)
-        panel.plot([], [], color=colour, alpha=0.4, linewidth=6, label=f"{name}, least to largest of each stretch")
+        panel.plot([], [], color=colour, alpha=0.4, linewidth=6, label=f"{name}, minimum to maximum of each section")
     else:
         panel.plot(times, (low + high) / 2, color=colour, linewidth=0.9, label=name)

@@ -248,7 +248,7 @@ class Simulation(Result):
         return "shapegcode convert shapes this program and shows what it gains"
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """Time, vibration after a stop and contour error of the table."""
+        """Time, vibration after a stop and contour error of the machine table."""
         residual, _ = _NAMES[self.plant]
         swings = [
             Figure(f"{residual} {axis.upper()}", "µm", None, self.residual_vibration_um[axis], 2,

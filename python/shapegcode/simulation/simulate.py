@@ -36,7 +36,7 @@ _SHORTEST_REST_S, _LONGEST_REST_S, _DRIVE_REST_S = 0.5, 10.0, 0.5
 
 def simulate(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     plant: str = "modal",
     shaped: bool | None = None,
@@ -73,6 +73,7 @@ def simulate(
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
+    machine = Machine.of(machine)
     program = given_program(program, machine)
     model, band_um = MachineModel(machine), machine.tolerance.residual_floor_um
     limit_s = _rest_s(model, plant)
@@ -142,7 +143,7 @@ def simulate(
 
 def play_motion(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     plant: str = "modal",
     shaped: bool | None = None,
@@ -177,6 +178,7 @@ def play_motion(
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
+    machine = Machine.of(machine)
     program = given_program(program, machine)
     model = MachineModel(machine)
     chunks = stream(program, machine, plant=plant, shaped=shaped, lines=lines)

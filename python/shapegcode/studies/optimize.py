@@ -43,7 +43,7 @@ _NO_TEXT_S = 1e9
 
 def optimize(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     vary: Vary,
     *,
     choose: Choices | None = None,
@@ -81,6 +81,7 @@ def optimize(
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
     """
+    machine = Machine.of(machine)
     check_probability("probability", probability)
     if isinstance(most, bool) or not isinstance(most, int) or most < 1:
         raise ArgumentError(f"most = {most!r}: must be a whole number of conversions, 1 or more")
@@ -97,6 +98,8 @@ def optimize(
         check_ends(machine, varied, columns)
     rows = [_rows([each.key for each in varied], columns) for columns in samples]
     _check_values(machine, choices)
+    if isinstance(program, Program):
+        program.require_machine(machine)
     source = str(program) if isinstance(program, Path) else program
     run = _Choosing(source, machine, choices, rows, probability, shape_all)
     total = min(most, math.prod(len(values) for values in choices.values()))

@@ -67,7 +67,7 @@ class Optimum(Result):
         as_it_is: the machine file without a choice; None: it has no text.
         candidates: all that were converted, the shortest first.
         combinations: how many there are to choose from.
-        warnings: what to heed.
+        warnings: caution, before you run.
         machine_words: the machine as a command names it behind -m.
     """
 

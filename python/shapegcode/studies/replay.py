@@ -14,7 +14,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
-from shapegcode.program.compensation import read_for_conversion
+from shapegcode.program.compensation import program_for_conversion
 from shapegcode.results.figures import Deviation
 from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures
@@ -30,7 +30,7 @@ MEASURES: Mapping[str, str] = {
     "peak_um": "vibration on the way, worst axis",
     "contour_um": "contour error that is judged",
     "command_um": "contour error of the command",
-    "response_um": "contour error of the table",
+    "response_um": "contour error of the machine table",
     "cutting_time_s": "time of the shaped cuts",
     "time_s": "cycle time",
     "original_residual_um": "residual vibration of the original",
@@ -145,13 +145,13 @@ class Replay:
             ShapegcodeError: it cannot be converted.
             OSError: its file cannot be read.
         """
-        original = program if isinstance(program, Program) else read_for_conversion(program, machine)
+        original = program_for_conversion(program, machine)
         found = convert(original, machine, shape_all=shape_all, tolerance_curve=False)
         if is_whole and (missed := next(found.misses(), "")):
             raise ArgumentError(missed)
         if not found.placed:
             raise ArgumentError(
-                f"{found.program} on {machine.name}: nothing was shaped that could be played: {found.answer}"
+                f"{found.program} on {machine.name}: nothing was shaped that could be simulated: {found.answer}"
             )
         judging = MachineModel(judged_by or machine)
         judge, ranks = Judge(judging), {id(region): index for index, region in enumerate(original.regions)}

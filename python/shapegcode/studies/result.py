@@ -179,7 +179,7 @@ class MachineStudy(Result):
         decides: values by what they do to the verdict, the one that decides first.
         curves: measures over each value, for pictures.
         refused: draws without a text.
-        warnings: what to heed.
+        warnings: caution, before you run.
         limits_um: smallest limit of each measure that has one.
         draws: values by key and measures by name, one row for each draw.
     """

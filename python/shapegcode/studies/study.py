@@ -34,7 +34,7 @@ Progress = Callable[[str, float], None]
 
 def study(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     vary: Vary,
     *,
     n: int = 1000,
@@ -77,11 +77,14 @@ def study(
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
     """
+    machine = Machine.of(machine)
     check_probability("at_least", at_least)
     wanted = checked_measures(measure)
     varied = varied_values(machine, vary)
     columns = drawn(varied, n, sampling, seed, indices=indices)
     check_ends(machine, varied, columns)
+    if isinstance(program, Program):
+        program.require_machine(machine)
     source = str(program) if isinstance(program, Path) else program
     with _pool(scheduler) as pool:
         run = _StudyRun(source, machine, varied, columns, wanted, pool, shape_all, on_progress)
@@ -223,7 +226,7 @@ def _result(
     kept = np.flatnonzero(~np.isnan(run.measured[:, run.wanted.index(SHARE)]))
     refused = [text for text in texts if text.replay is None]
     if len(kept) == 0:
-        raise ArgumentError(f"no draw could be played: {refused[0].why}")
+        raise ArgumentError(f"no sample could be simulated: {refused[0].why}")
     columns = [[column[index] for index in kept] for column in run.columns]
     measured = {name: run.measured[kept, rank] for rank, name in enumerate(run.wanted)}
     shares = measured[SHARE]

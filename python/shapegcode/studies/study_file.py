@@ -183,7 +183,7 @@ class StudyFile(TomlTable):
     most: Annotated[int, Strict(), Field(ge=1, le=_MOST_CONVERSIONS)] = key(
         "conversions at most, of optimize", default=USUAL_CONVERSIONS
     )
-    vary: Values = key("what each key of the machine file is drawn from")
+    vary: Values = key("the distribution from which each key of the machine file is sampled")
     choose: Lists | None = key(
         "values that optimize chooses from, by key of the machine file; left out: block periods, families, tolerances "
         "that are aimed at, feeds on arcs",

@@ -31,7 +31,7 @@ _CUTTING, _RAPID = _core.BlockKind.cutting.value, _core.BlockKind.rapid.value
 
 def cycle_time(
     program: Program | str | Path,
-    machine: Machine,
+    machine: Machine | str | Path,
     *,
     per_block: bool = False,
     full: bool = True,
@@ -62,6 +62,7 @@ def cycle_time(
         ArgumentError: a value that no controller can have, or an override at which full interpolation would take the
             program beyond `controller.max_program_s`.
     """
+    machine = Machine.of(machine)
     program = given_program(program, machine)
     if feed_override is None:
         feed_override = machine.times.feed_override_percent / 100.0

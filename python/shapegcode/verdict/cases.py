@@ -192,7 +192,7 @@ def stated_cases(machine: Machine) -> list[Case]:
         ]
     if machine.controller.motion == "look_ahead" or band.look_ahead:
         cases.append(Case("look-ahead on", None, band.look_ahead, look_ahead=True))
-    cases.append(Case(f"starved {band.starved_s * 1e3:g} ms", own, band.starved_block, starved_s=band.starved_s))
+    cases.append(Case(f"underrun {band.starved_s * 1e3:g} ms", own, band.starved_block, starved_s=band.starved_s))
     return cases
 
 

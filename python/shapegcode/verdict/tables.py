@@ -25,14 +25,14 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         The table.
     """
     columns = (
-        Column("case", value=lambda case: unbroken(case.name), text=True),
+        Column("condition", value=lambda case: unbroken(case.name), text=True),
         *(
             Column(axis.upper(), value=f"residual_um.{axis}", digits=2)
             for axis in "xyz"
             if any(case.residual_um[axis] >= _SWINGS_UM for case in cases)
         ),
         Column("command", value=lambda case: _micrometres(case.contour_error_um.command)),
-        Column("table", value=lambda case: _micrometres(case.contour_error_um.response)),
+        Column("resp.", value=lambda case: _micrometres(case.contour_error_um.response)),
         Column("s", value=lambda case: "-" if case.time_s is None else f"{case.time_s:.2f}"),
         Column("of limit", value=lambda case: _share(case.share_of_limit)),
         Column("verdict", value=lambda case: _verdict(case) + (" <- worst" if case is worst else ""), left=True),
@@ -40,10 +40,10 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
     shown = sum(not case.counts for case in cases)
     brackets = "; those in brackets are only shown" if shown else ""
     return Table(
-        "cases of the verdict: residual X Y Z, contour error of command and table, µm",
+        "operating conditions: residual X Y Z, contour error of command and response, µm",
         columns,
         cases,
-        caption=f"{len(cases) - shown} of {len(cases)} cases count{brackets} ([verdict])",
+        caption=f"{len(cases) - shown} of {len(cases)} operating conditions count{brackets} ([verdict])",
         row_style=lambda case: _style(case, case is worst),
     )
 

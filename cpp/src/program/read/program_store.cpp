@@ -69,6 +69,32 @@ std::string between(std::string_view line, char open, char close) {
   return std::string(inside.substr(0, last == std::string_view::npos ? 0 : last + 1));
 }
 
+// A CR with text on both sides ends a line for who wrote it; read as a blank it would join two blocks.
+void refuse_lone_carriage_return(const std::string& text) {
+  for (std::size_t at = text.find('\r'); at != std::string::npos; at = text.find('\r', at)) {
+    const std::size_t behind = std::min(text.find_first_not_of(" \t\r", at), text.size());
+    const bool begins_line = at == 0 || text[at - 1] == '\n';
+    if (!begins_line && behind < text.size() && text[behind] != '\n') {
+      const std::size_t line_start = text.rfind('\n', at) + 1;  // npos + 1 is 0
+      const auto line = static_cast<std::uint32_t>(
+          1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+      throw Error(ErrorKind::program, "a line ends with CR alone: write line ends as LF or CR LF", line,
+                  static_cast<std::uint32_t>(at - line_start + 1));
+    }
+    at = behind;
+  }
+}
+
+// The first line behind the one at `end`, where a control stops reading, that holds more than blanks and '%'; 0: none.
+std::uint32_t text_line_behind(const std::string& text, std::size_t end) {
+  const std::size_t next_line = text.find('\n', end);
+  const std::size_t at = next_line == std::string::npos ? next_line : text.find_first_not_of(" \t\r\n%", next_line);
+  return at == std::string::npos
+             ? 0U
+             : static_cast<std::uint32_t>(
+                   1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+}
+
 class ProgramHeads {
  public:
   enum class Kind : std::uint8_t { number, name, folder };
@@ -131,7 +157,9 @@ class ProgramHeads {
 
 // Where the program text proper begins and ends: between the first '%' and the next one.
 TapeFrame find_frame(const std::string& text) {
-  if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
+  const std::size_t start = text.starts_with(byte_order_mark) ? byte_order_mark.size() : 0;
+  const std::size_t first_mark = text.find_first_not_of(" \t\r\n", start);
+  if (first_mark == std::string::npos) {
     throw Error(ErrorKind::program, "the file is empty", 1, 1);
   }
   const auto junk = text.find('\0');
@@ -142,21 +170,22 @@ TapeFrame find_frame(const std::string& text) {
     throw Error(ErrorKind::program, fmt::format("byte 0x00 at offset {}: this is no program text", junk), at,
                 static_cast<std::uint32_t>(junk - line_start + 1));
   }
+  refuse_lone_carriage_return(text);
   // Offsets of lines that start with '%'.
   const auto percent_line = [&](std::size_t from) {
     for (std::size_t at = text.find('%', from); at != std::string::npos; at = text.find('%', at + 1)) {
       std::size_t k = at;
-      while (k > 0 && (text[k - 1] == ' ' || text[k - 1] == '\t' || text[k - 1] == '\r')) {
+      while (k > start && (text[k - 1] == ' ' || text[k - 1] == '\t' || text[k - 1] == '\r')) {
         --k;
       }
-      if (k == 0 || text[k - 1] == '\n') {
+      if (k == start || text[k - 1] == '\n') {
         return at;
       }
     }
     return std::string::npos;
   };
-  const std::size_t first = percent_line(0);
-  const bool leads = first != std::string::npos && text.find_first_not_of(" \t\r\n") == first;
+  const std::size_t first = percent_line(start);
+  const bool leads = first != std::string::npos && first_mark == first;
   const std::size_t second = first == std::string::npos ? first : percent_line(first + 1);
   const auto last_line = static_cast<std::uint32_t>(1 + std::count(text.begin(), text.end(), '\n'));
   TapeFrame frame;
@@ -166,7 +195,7 @@ TapeFrame find_frame(const std::string& text) {
   if (frame.framed && second == std::string::npos && leads) {
     throw Error(ErrorKind::program, "no line '%' at the end of the program: truncated?", last_line, 1);
   }
-  frame.begin = 0;
+  frame.begin = start;
   frame.end = text.size();
   frame.no_start = frame.framed && second == std::string::npos;
   if (frame.no_start) {
@@ -177,6 +206,7 @@ TapeFrame find_frame(const std::string& text) {
   }
   frame.first_line = static_cast<std::uint32_t>(
       1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(frame.begin), '\n'));
+  frame.unread_line = frame.framed ? text_line_behind(text, frame.end) : 0;
   return frame;
 }
 

@@ -17,14 +17,19 @@ namespace shapegcode::detail {
 
 /// A text between its '%' lines.
 struct TapeFrame {
-  std::size_t begin = 0;         ///< first byte behind the first '%' line
-  std::size_t end = 0;           ///< the closing '%'
-  std::uint32_t first_line = 1;  ///< line number at `begin`
-  bool framed = false;           ///< has its '%' lines
-  bool no_start = false;         ///< has the closing one alone
+  std::size_t begin = 0;          ///< first byte behind the first '%' line
+  std::size_t end = 0;            ///< the closing '%'
+  std::uint32_t first_line = 1;   ///< line number at `begin`
+  bool framed = false;            ///< has its '%' lines
+  bool no_start = false;          ///< has the closing one alone
+  std::uint32_t unread_line = 0;  ///< first line with text behind the closing '%'; 0: none
 };
 
-/// Finds the frame. Throws Error(program) on an empty text, a zero byte, a '%' at the start without one at the end.
+/// UTF-8's byte-order mark, which some editors put before the first line.
+inline constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+
+/// Finds the frame, behind a byte-order mark. Throws Error(program) on an empty text, a zero byte, a line that ends
+/// with CR alone, a '%' at the start without one at the end.
 [[nodiscard]] TapeFrame find_frame(const std::string& text);
 
 /// A place in a text: offset of a line's first byte and the line's number.

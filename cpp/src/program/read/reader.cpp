@@ -49,7 +49,12 @@ void Reader::alarm(int number, const std::string& message, std::uint32_t column)
 }
 
 void Reader::load_main() {
-  const std::string& text = sources_.front().text;
+  std::string& given = sources_.front().text;
+  if (given.starts_with(byte_order_mark)) {
+    given.erase(0, byte_order_mark.size());
+    program_.warnings.push_back({1, "a byte-order mark (UTF-8) before the first line is left out", 0, 0, ""});
+  }
+  const std::string& text = given;
   require_room_for(text);
   const TapeFrame frame = find_frame(text);
   framed_ = frame.framed;
@@ -62,6 +67,12 @@ void Reader::load_main() {
   if (frame.no_start) {
     program_.warnings.push_back(
         {1, "no line '%' at the start: a control that reads from a tape skips all before one", 0, 0, ""});
+  }
+  if (frame.unread_line > 0) {
+    program_.warnings.push_back({frame.unread_line,
+                                 "text behind the '%' that ends the program: a control stops reading there, and "
+                                 "neither is it read here",
+                                 0, 0, ""});
   }
   program_.header_offset = frame.begin;
   program_.line_count = static_cast<std::uint32_t>(lines_read_) - (text.back() == '\n' ? 1U : 0U);
@@ -437,7 +448,7 @@ void Reader::finish() {
       throw error;
     }
   } else if (!interpreter_.ended() && read_to_the_end) {
-    program_.warnings.push_back({last, "the program does not end with M30 or M02", 0, 0, ""});
+    program_.warnings.push_back({last, "the program does not end with M30, M02 or M99", 0, 0, ""});
   } else if (!framed_) {
     program_.warnings.push_back(
         {1, "the program has no '%' lines; a control that reads it over a line or from a tape needs them", 0, 0, ""});

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "program/rewrite/move_rewriter.hpp"
 #include "shapegcode/error.hpp"
@@ -130,6 +131,12 @@ void MoveRewriter::set_rotation(int g_tenths) {
   }
   const int normal = plane_normal(programmed_.plane);
   const double angle = angle_rad(words['R']);
+  if (std::abs(angle) > 2.0 * std::numbers::pi * (1.0 + 1e-12)) {
+    interpreter_.warn_at(origin_,
+                         fmt::format("G68 R{:g}: a control takes -360 to 360 degrees; it turns by {:g} here",
+                                     angle * 180.0 / std::numbers::pi,
+                                     std::remainder(angle, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi));
+  }
   const double before = modes_.rotation ? modes_.rotation_rad : 0.0;
   modes_.rotation = false;
   Vector3 centre = modes_.undo(programmed_.position_mm);

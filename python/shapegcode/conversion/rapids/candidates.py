@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.conversion.whole_text import why_off_grid
 from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program
 
@@ -25,6 +26,7 @@ OTHER_WORDS = "other words in its block"
 NEW_STATE = "other codes in its block change the modal state"
 UNKNOWN_START = "start position not known"
 NO_CUT = "no cut follows"
+OFF_GRID = "its end lies between two increments, and the program changes between G20 and G21"
 BLOCK_SKIP = "the modal state depends on the block-skip switch"
 
 # Nothing behind these needs a table at rest: the operator or the tool changer comes first.
@@ -136,6 +138,7 @@ class _Reader:
 
     def __init__(self, program: Program, machine: Machine, shared: set[int]) -> None:
         self._core = core = program.core
+        self._program, self._machine = program, machine
         self._shared = shared  # lines that make several moves
         moves = core.other_moves
         texts = core.text.split(b"\n")
@@ -173,6 +176,8 @@ class _Reader:
         feed = self._feed_mm_per_s(end_mm - start_mm, entry.units)
         path = _core.Path([_core.Segment.line(start_mm, end_mm, feed)])
         region = _core.Region(path=path, entry=entry, exit=after, line=line, text_begin=begin, text_end=end)
+        if why_off_grid(self._program, region, self._machine):
+            return Rapid(line, start_mm, end_mm, None, OFF_GRID, "")
         number = next((f"N{value}" for letter, value in _words(source) or () if letter == "N"), "")
         return Rapid(line, start_mm, end_mm, region, "", number + "".join(_COMMENT.findall(source)))
 

@@ -44,7 +44,7 @@ class RapidsOutcome:
         shaped: of them, shaped moves now.
         kept: how many stay, by reason.
         time_saved_s: by which the table is ready for the next cuts sooner, in all.
-        settle_band_um: half the width of the band in which vibration counts as settled.
+        settle_band_um: half the width of the band in which vibration counts as having decayed.
         blocks: shaped blocks that replace them.
         slowed_blocks: of these, such as step an axis by more than the corner limit of the look-ahead.
         moves: those that are shaped.

@@ -88,7 +88,7 @@ def shape_rapids(
     """
     if model.machine.tolerance.residual_floor_um <= 0.0:
         raise _core.ArgumentError(
-            "tolerance.residual_floor_um is 0: shaped rapids need the band in which vibration counts as settled"
+            "tolerance.residual_floor_um is 0: shaped rapids need the band in which vibration counts as having decayed"
         )
     # One shaper for all axes keeps a straight move straight.
     return _RapidShaper(emitted, placed, _without_contour(model), replace(grid, axis_firs=()), pool).shaped(budget)

@@ -11,9 +11,10 @@ UNKNOWN = "Labels and units are at the axes."
 HOW: Mapping[str, str] = {
     "path": "The programmed path beside the table's, magnified as the title says: a gap is an error.",
     "feed": "Speed along the path over time: a dip is a corner or a short block, and costs time.",
-    "vibration": "Table minus command over time: what still swings behind the stop is the residual vibration.",
+    "vibration": "Response of the machine table minus command over time: what oscillates after the stop is the "
+    "residual vibration.",
     "tolerance": "Each point is the program at a contour tolerance: left of the knee each micrometre is dear.",
-    "motion": "The whole program in time; each band spans the least and the largest value of a stretch.",
+    "motion": "The whole program in time; each band spans the minimum and the maximum of a section.",
     "time": "Each bar is a tool or a region; its colours are where its time goes.",
     "measure-part": "Where on the part each program leaves the contour: further from its line is worse.",
     "measure-walls": "Each wall as a probe would see it, one line for each program; zero is the drawing.",
@@ -23,7 +24,8 @@ HOW: Mapping[str, str] = {
     "shaper-pareto": "Each point is a shaper: further left is faster, further down leaves less vibration.",
     "shaper-sensitivity": "How much vibration is left if the mode is not where it was measured: low and wide is good.",
     "shaper-impulses": "The taps of each shaper: a move is split into so many parts, so far apart.",
-    "shaper-steps": "The table after a step through each shaper: what swings behind the last tap stays.",
+    "shaper-steps": "Response of the machine table to a step through each shaper: what oscillates after the "
+    "last impulse is the residual vibration.",
     "shaper-branches": "Duration of the shortest shaper over the ratio of two modes: each branch is a way to build it.",
     "identify-sweep": "Each column is a place of the axis: where its peak moves, the mode moves with the position.",
     "identify-response": "Peaks of the measured response are modes; the model should lie on the measurement.",
@@ -50,8 +52,8 @@ HOW: Mapping[str, str] = {
     "paper002-figure4-impulses": "The taps of the shaper with the fewest.",
     "paper002-figure5-sensitivity": "Vibration that is left over the error of the frequency: low and wide is good.",
     "paper002-figure6-responses": "Response of two modes to a shaped step: flat behind the last tap is good.",
-    "paper002-figure8-stage-short": "The stage of the paper, a short move: what swings behind the end is left over.",
-    "paper002-figure9-stage-long": "The stage of the paper, a long move: what swings behind the end is left over.",
+    "paper002-figure8-stage-short": "The stage of the paper, a short move: oscillation after it is residual vibration.",
+    "paper002-figure9-stage-long": "The stage of the paper, a long move: oscillation after it is residual vibration.",
     "paper003-figures2-3-acceleration": "Acceleration after a tap, measured and of the fitted modes.",
     "paper003-deflection": "The way that belongs to the acceleration: what the tool's tip does.",
 }

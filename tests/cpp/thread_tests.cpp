@@ -1,0 +1,98 @@
+// Sessions of the controller with a thread for each of its parts, for ThreadSanitizer: one steps, one pushes and turns
+// the override, one reads the state. What the sanitizer finds ends the process with its own exit code; what is checked
+// here is that no reader sees half a state.
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <random>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include "random_motion.hpp"
+#include "shapegcode/controller.hpp"
+
+using namespace shapegcode;
+
+namespace {
+
+constexpr std::uint32_t sessions = 8;
+constexpr std::size_t most_steps = 1'000'000;
+
+std::atomic<int> failures{0};
+
+void check(bool holds, const char* what, std::uint32_t session) {
+  if (holds) return;
+  failures.fetch_add(1, std::memory_order_relaxed);
+  std::fprintf(stderr, "session %u: %s\n", session, what);
+}
+
+ControllerSettings settings_of(std::uint32_t session) {
+  ControllerSettings settings;
+  settings.limits.law = session % 2 == 0 ? AccelerationLaw::jerk_limited : AccelerationLaw::constant_time;
+  settings.limits.max_feed_mm_per_s.setConstant(200.0);
+  settings.limits.max_acceleration_mm_per_s2.setConstant(2000.0);
+  settings.limits.max_jerk_mm_per_s3.setConstant(100'000.0);
+  settings.limits.feed_override = session % 3 == 0 ? 0.25 : 1.0;
+  settings.following.resize(session % 4 == 1 ? 2 : 0);
+  settings.shaper = Fir({0, 11}, {0.516, 0.484});
+  settings.window = session % 2 == 0 ? 8 : 64;
+  settings.queue = 66;  // small: pushing waits for stepping, and places are used again and again
+  return settings;
+}
+
+void session_of(std::uint32_t session) {
+  const ControllerSettings settings = settings_of(session);
+  MotionController control(settings);
+  std::mt19937 random(session);
+  const std::vector<Segment> segments = tests::random_segments(random, 120, 150.0, true);
+  const std::array<double, 2> following{};
+  const std::span<const double> followed(following.data(), settings.following.size());
+  std::atomic<bool> ended{false};
+  std::thread pusher([&] {
+    std::mt19937 draw(session + 1000);
+    for (const Segment& segment : segments) {
+      PushResult result = control.push(segment, followed);
+      while (result == PushResult::queue_full && !ended.load(std::memory_order_relaxed)) {
+        std::this_thread::yield();
+        result = control.push(segment, followed);
+      }
+      const auto what = draw() % 100;
+      if (what < 20) control.feed_override(0.02 * static_cast<double>(draw() % 101));
+      if (what == 20) control.hold();
+      control.resume();
+    }
+    control.feed_override(2.0);
+  });
+  std::thread reader([&] {
+    std::uint64_t last = 0;
+    while (!ended.load(std::memory_order_relaxed)) {
+      const ControllerState state = control.state();
+      check(state.steps >= last, "the state went back", session);
+      // All of one step: the path is run from segment 0 on, and nothing is done that was not pushed.
+      check(state.segments_done + state.segments_waiting <= segments.size(), "a state of two steps", session);
+      check(std::isfinite(state.set_point[0]) && state.feed_override <= 2.0, "no number", session);
+      last = state.steps;
+    }
+  });
+  std::array<double, most_controller_axes> point{};
+  std::size_t steps = 0;
+  while (steps < most_steps && control.state().segments_done < segments.size()) {
+    control.step({point.data(), static_cast<std::size_t>(control.axes())});
+    ++steps;
+  }
+  check(steps < most_steps, "the path did not end", session);
+  ended.store(true, std::memory_order_relaxed);
+  pusher.join();
+  reader.join();
+}
+
+}  // namespace
+
+int main() {
+  for (std::uint32_t session = 0; session < sessions; ++session) session_of(session);
+  std::printf("thread_tests: %u sessions, %d failures\n", sessions, failures.load());
+  return failures.load() == 0 ? 0 : 1;
+}

@@ -1,0 +1,127 @@
+"""What a notebook user guesses: each line works without a look at the book, or says what to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import shapegcode as sg
+
+TEXT = "%\nO1\nG21 G90 G17 G94\nG00 X0. Y0. Z0.\nG01 X10. F500.\nY10.\nM30\n%\n"
+TIME_S = np.arange(0.0, 1.0, 1e-3)
+
+
+def decay(frequency_hz: float, damping_ratio: float) -> np.ndarray:
+    omega = 2.0 * np.pi * frequency_hz
+    damped = omega * np.sqrt(1.0 - damping_ratio**2)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(TIME_S.size)
+    return np.asarray(np.exp(-damping_ratio * omega * TIME_S) * np.sin(damped * TIME_S) + noise)
+
+
+def test_zv_of_a_frequency_and_a_damping_ratio() -> None:
+    """Smith 1958: amplitudes 1/(1+K), K/(1+K), half the damped period apart."""
+    shaper = sg.zv(46, 0.02)
+    k = np.exp(-0.02 * np.pi / np.sqrt(1.0 - 0.02**2))
+    assert shaper.times_s == pytest.approx([0.0, 0.5 / (46.0 * np.sqrt(1.0 - 0.02**2))])
+    assert shaper.amplitudes == pytest.approx([1.0 / (1.0 + k), k / (1.0 + k)])
+    assert sg.zv(46) == sg.zv(sg.Mode(46, 0.0))
+    with pytest.raises(sg.ArgumentError, match="damping"):
+        sg.zv(sg.Mode(46, 0.02), 0.03)
+
+
+def test_residual_of_many_frequencies_at_once() -> None:
+    """Of undamped modes ZV leaves |cos(pi f / (2 f0))|."""
+    frequencies = np.linspace(10.0, 200.0, 50)
+    assert sg.zv(46).residual(frequencies) == pytest.approx(np.abs(np.cos(0.5 * np.pi * frequencies / 46.0)), abs=1e-12)
+    assert sg.zv(46, 0.02).residual(46.0, 0.02) == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(sg.ArgumentError):
+        sg.zv(46).residual([46.0, -1.0])
+
+
+@pytest.mark.parametrize("modes", [[46, 131], 46.0, np.array([46.0, 131.0]), ["46:0.02"], [sg.Mode(46, 0.02)]])
+def test_choose_shaper_takes_frequencies_and_modes(modes: object) -> None:
+    assert sg.choose_shaper(modes, families=["zv", "zvd"]).ok  # type: ignore[arg-type]
+
+
+def test_plot_sensitivity_of_a_shaper() -> None:
+    curve = sg.plot_sensitivity(sg.zv(50)).lines[0]
+    frequencies, percent = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
+    assert percent == pytest.approx(100.0 * np.abs(np.cos(0.5 * np.pi * frequencies / 50.0)), abs=1e-9)
+    sg.plot_sensitivity({"zv": sg.zv(50), "other": sg.zv(60)}, modes=[50, "60:0.01±5%"])
+    plt.close("all")
+
+
+def test_identify_arrays() -> None:
+    (mode,) = sg.identify(TIME_S, decay(46.0, 0.02)).modes
+    assert mode.frequency_hz.value == pytest.approx(46.0, rel=1e-3)
+    assert mode.damping_ratio.value == pytest.approx(0.02, rel=0.02)
+    with pytest.raises(sg.RecordError, match=r"\(1000,\) instants and \(5,\) samples"):
+        sg.identify(TIME_S, TIME_S[:5])
+    with pytest.raises(sg.ArgumentError, match="force is given without a response"):
+        sg.identify(TIME_S, force=TIME_S)
+
+
+def test_identify_arrays_with_a_force() -> None:
+    """A half sine of 2 ms on a mass of 100 kg, its acceleration summed from the closed impulse response."""
+    period_s, omega, zeta, mass_kg = 2e-4, 2.0 * np.pi * 120.0, 0.02, 100.0
+    time_s = period_s * np.arange(8192)
+    start_s = 0.05
+    within = (time_s >= start_s) & (time_s < start_s + 2e-3)
+    force = np.where(within, 2000.0 * np.sin(np.pi * (time_s - start_s) / 2e-3), 0.0)
+    damped = omega * np.sqrt(1.0 - zeta**2)
+    impulse = np.exp(-zeta * omega * time_s) * np.sin(damped * time_s) / (mass_kg * damped)
+    displacement = np.convolve(force, impulse)[: time_s.size] * period_s
+    (mode,) = sg.identify(time_s, displacement, force, quantity="displacement").modes
+    assert mode.frequency_hz.value == pytest.approx(120.0, rel=1e-3)
+    assert mode.mass_kg is not None and mode.mass_kg.value == pytest.approx(mass_kg, rel=0.02)
+
+
+def test_convert_takes_a_text_a_file_and_a_program(tmp_path: Path) -> None:
+    file = tmp_path / "part.nc"
+    file.write_text(TEXT)
+    by_name = sg.convert(TEXT, "vx500")
+    assert by_name.text == sg.convert(file, sg.Machine.load("vx500")).text
+    assert by_name.text == sg.convert(sg.Program.read(TEXT, "vx500"), "vx500").text
+    with pytest.raises(sg.ArgumentError, match="a Machine, a file or a built-in name is needed, not int"):
+        sg.convert(TEXT, 5)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("function", ["simulate", "check", "cycle_time", "compare", "expand"])
+def test_a_machine_is_named_wherever_one_is_taken(function: str) -> None:
+    given = (TEXT, TEXT) if function == "compare" else (TEXT,)
+    assert getattr(sg, function)(*given, "vx500") is not None
+
+
+def test_a_controller_takes_a_mode() -> None:
+    """Its set-points are those of the ZV on its grid, which leaves nothing of the mode."""
+    mode = sg.Mode(46, 0.02)
+    shaper = sg.zv_on_grid(mode, 0.001)
+    assert shaper.residual_ratio(mode) < 1e-12 and min(shaper.amplitudes) > 0.0
+
+    def set_points(given: sg.Mode | sg.Shaper) -> np.ndarray:
+        controller = sg.MotionController(max_acceleration_mm_per_s2=3000.0, max_jerk_mm_per_s3=5e4, shaper=given)
+        controller.push(sg.Segment.line([0.0, 0.0, 0.0], [10.0, 0.0, 0.0], 50.0))
+        return np.asarray(controller.run(1000))
+
+    assert np.array_equal(set_points(mode), set_points(shaper))
+
+
+def test_a_simple_machine() -> None:
+    machine = sg.Machine.simple(modes={"x": 46, "y": [sg.Mode(131, 0.01), 200.0]})
+    assert [mode.frequency_hz for mode in machine.axes.y.modes] == [131.0, 200.0]
+    assert machine.axes.z.modes == ()
+    assert sg.convert(TEXT, machine).machine == "simple"
+    with pytest.raises(sg.ArgumentError, match="'a' is no axis"):
+        sg.Machine.simple(modes={"a": 46})
+    with pytest.raises(sg.MachineError, match="frequency_hz"):
+        sg.Machine.simple(modes={"x": -46})
+
+
+def test_errors_say_what_to_do() -> None:
+    with pytest.raises(AttributeError, match="did you mean 'convert'"):
+        sg.conver  # noqa: B018
+    with pytest.raises(AttributeError, match="with_values"):
+        sg.Machine.load("vx500").name = "other"  # type: ignore[misc]
