@@ -26,11 +26,11 @@ from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, Controlle
 from shapegcode.identification.servo.models import GAINS, lag_way
 from shapegcode.io.servo_log import ServoLog
 
+Array = npt.NDArray[np.float64]
+_Interval = tuple[float, float]  # a value and its half-width
 _FOLLOWED = 0.9
 _RUN_SETTLE_S = 0.45
 _STEPS_SETTLE_S = 0.3
-
-_Interval = tuple[float, float]  # a value and its half-width
 
 
 def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:
@@ -255,7 +255,8 @@ def _followed_share(log: PartLog) -> float | None:
     return swing / (part.feed_mm_per_min / 120.0)
 
 
-Array = npt.NDArray[np.float64]
+# --- time constants from the shape of single moves --------------------------------------------------------------------
+
 _ODD_SHAPE = 0.002  # of the way: a fit that leaves more is no fit
 _BELL_GAIN = 0.8  # a second moving average must lower the variance below this share
 _FINE = 1.7  # periods
@@ -341,15 +342,12 @@ def _cutting_fits(facts: LogFacts, stops: list[PartLog]) -> dict[str, list[Shape
     fits: dict[str, list[ShapeFit]] = {"linear": [], "bell": [], "exponential": []}
     for part in stops:
         nominal = part.part.duration_s
-        longest = nominal + (facts.period or 0.004) * 1.1
-        shapes = {
-            "linear": ([nominal, 0.05], [nominal * 0.95, 1e-4], [longest, 1.0]),
-            "bell": ([nominal, 0.06, 0.02], [nominal * 0.95, 1e-4, 1e-5], [longest, 1.0, 0.5]),
-            "exponential": ([nominal, 0.03], [nominal * 0.95, 1e-4], [longest, 1.0]),
-        }
-        for shape, (guess, low, high) in shapes.items():
-            share = lagged_share if shape == "exponential" else smoothed_share
-            fits[shape].append(fit_shape(part, share, guess, low, high))
+        low, high = nominal * 0.95, nominal + (facts.period or 0.004) * 1.1
+        one = [low, 1e-4], [high, 1.0]
+        fits["linear"].append(fit_shape(part, smoothed_share, [nominal, 0.05], *one))
+        two = [low, 1e-4, 1e-5], [high, 1.0, 0.5]
+        fits["bell"].append(fit_shape(part, smoothed_share, [nominal, 0.06, 0.02], *two))
+        fits["exponential"].append(fit_shape(part, lagged_share, [nominal, 0.03], *one))
     return fits
 
 
@@ -376,21 +374,11 @@ def _rapid(part: PartLog, facts: LogFacts) -> _Rapid:
     for bell, ramp_guess in itertools.product((None, 0.005, 0.03, 0.08), (0.06, 0.15)):
         begin = math.sqrt(nominal * ramp_guess)
         tail, low, high = ([], [], []) if bell is None else ([bell], [1e-5], [0.5])
-        fit = fit_shape(
-            part,
-            lambda t, p: smoothed_share(t, [p[0], p[0], *p[1:]]),
-            [begin, *tail],
-            [0.1 * begin, *low],
-            [20.0 * begin, *high],
-        )
+        ends = [0.1 * begin, *low], [20.0 * begin, *high]
+        fit = fit_shape(part, lambda t, p: smoothed_share(t, [p[0], p[0], *p[1:]]), [begin, *tail], *ends)
         found.append((fit, False, bell is not None))
-        fit = fit_shape(
-            part,
-            lambda t, p: smoothed_share(t, [rectangle, *p]),
-            [0.7 * rectangle, *tail],
-            [1e-4, *low],
-            [1.05 * rectangle, *high],
-        )
+        ends = [1e-4, *low], [1.05 * rectangle, *high]
+        fit = fit_shape(part, lambda t, p: smoothed_share(t, [rectangle, *p]), [0.7 * rectangle, *tail], *ends)
         found.append((fit, True, bell is not None))
     plain = min((each for each in found if not each[2]), key=lambda each: each[0].rms_mm)
     curved = min((each for each in found if each[2]), key=lambda each: each[0].rms_mm)
@@ -515,8 +503,7 @@ def _lag_of(records: list[tuple[Array, Array, float]]) -> tuple[float, float]:
         rest = cross / square
         return power - rest * cross, rest
 
-    found = minimize_scalar(
-        lambda log_gain: solve(math.exp(log_gain))[0], bounds=tuple(np.log(GAINS)), method="bounded"
-    )
+    bounds = tuple(np.log(GAINS))
+    found = minimize_scalar(lambda logarithm: solve(math.exp(logarithm))[0], bounds=bounds, method="bounded")
     gain = math.exp(float(found.x))
-    return gain, float(solve(gain)[1])
+    return gain, solve(gain)[1]

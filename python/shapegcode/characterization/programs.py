@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from shapegcode.characterization.air_tests import (
     AirBox,
     AirTest,
     ControllerTiming,
+    Kind,
     Part,
     Pattern,
     make_tests,
@@ -77,7 +77,7 @@ def write_characterization_tests(
 
 def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
     """The program of a test: incremental, no spindle, no reference point, no tool change, written out."""
-    step = machine.controller.least_increment_mm
+    decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
     shared = test.name.startswith("override")  # one program, run at several overrides
     title = "OVERRIDE" if shared else test.name.upper().replace("_", "-")
     seconds = program_time_s(replace(test, override_percent=100), ControllerTiming.of(machine))
@@ -100,12 +100,12 @@ def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
             if block.length_mm == 0.0:
                 lines.append(f"G04 P{round(block.dwell_s * 1000.0)}")
                 continue
-            word = _word(part.axis, block.length_mm, step)
+            word = _word(part.axis, block.length_mm, decimals)
             now = ("G00" if part.pattern == "rapid" else "G01", block.feed_mm_per_min)
             if mode is None or now[0] != mode[0]:
                 word = f"{now[0]} {word}"
             if now[0] == "G01" and (mode is None or now[1] != mode[1]):
-                word = f"{word} {_feed(block.feed_mm_per_min)}"
+                word = f"{word} {_word('F', block.feed_mm_per_min, 1)}"
             mode = now
             lines.append(word)
         if part.pattern == "exact":
@@ -114,18 +114,11 @@ def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _number(value: float, decimals: int) -> str:
+def _word(address: str, value: float, decimals: int) -> str:
+    """A word with a decimal point and no zero before it."""
     text = f"{value:.{decimals}f}".rstrip("0")
-    return text.replace("-0.", "-.") if text.startswith("-0.") and text != "-0." else text.removeprefix("0")
-
-
-def _word(address: str, value: float, step: float) -> str:
-    decimals = max(0, round(-math.log10(step)))
-    return f"{address}{_number(value, max(decimals, 1))}"
-
-
-def _feed(value: float) -> str:
-    return f"F{value:.1f}".rstrip("0")
+    text = text.replace("-0.", "-.") if text.startswith("-0.") and text != "-0." else text.removeprefix("0")
+    return f"{address}{text}"
 
 
 def readme_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
@@ -187,7 +180,7 @@ _Length = Annotated[Float, Field(ge=-1e5, le=1e5)]
 _Feed = Annotated[Float, Field(ge=0, le=1e6)]
 _Dwell = Annotated[Float, Field(ge=0, le=1e4)]
 _Time = Annotated[Positive, Field(lt=86_400)]
-_PROGRAM = re.compile(r"O(\d{1,8})\.nc")
+_PROGRAM = r"O(\d{1,8})\.nc$"
 
 
 class _PartTable(InlineTable):
@@ -212,7 +205,7 @@ class _PartTable(InlineTable):
 class _TestTable(TomlTable):
     """One test."""
 
-    program: Annotated[Text, Field(pattern=_PROGRAM.pattern + "$")] = key("name of its file, such as O7001.nc")
+    program: Annotated[Text, Field(pattern=_PROGRAM)] = key("name of its file, such as O7001.nc")
     override_percent: Annotated[Count, Field(ge=1, le=254)] = key("feed override", unit="%", default=100)
     times_s: tuple[_Time, ...] = key("stopwatch times", unit="s", default=())
     log: Text | None = key("file of the servo log", default=None)
@@ -247,7 +240,11 @@ def read_sheet(path: Path) -> FilledSheet:
     text = read_text(path, FileError)
     sheet = validated(_SheetTable, parsed(text, str(path), FileError), str(path), text, FileError)
     logs: dict[str, Path] = {}
+    tests: dict[str, AirTest] = {}
     for name, test in sheet.tests.items():
+        kind: Kind = "stopwatch" if test.log is None else "log"
+        parts = tuple(Part(**part.model_dump()) for part in test.parts)
+        tests[name] = AirTest(name, int(test.program[1:-3]), kind, "", parts, test.override_percent)
         if test.log is None:
             continue
         file = path.parent / (test.log or f"{name}.csv")
@@ -258,20 +255,13 @@ def read_sheet(path: Path) -> FilledSheet:
             raise FileError(str(path), (Problem(place, test.log, f"no such file: {file}", line_of(place, text)),))
     return FilledSheet(
         file=str(path),
-        tests={name: _test(name, test) for name, test in sheet.tests.items()},
+        tests=tests,
         times_s={name: test.times_s for name, test in sheet.tests.items() if test.times_s},
         logs=logs,
         resolution_s=sheet.resolution_s,
         reaction_s=sheet.reaction_s,
         lines={name: line_of(f"tests.{name}", text) or 1 for name in sheet.tests},
     )
-
-
-def _test(name: str, table: _TestTable) -> AirTest:
-    number = _PROGRAM.fullmatch(table.program)
-    assert number is not None
-    parts = tuple(Part(**part.model_dump()) for part in table.parts)
-    return AirTest(name, int(number[1]), "stopwatch" if table.log is None else "log", "", parts, table.override_percent)
 
 
 def sheet_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
@@ -294,12 +284,12 @@ def sheet_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
             lines.append(f"times_s = []  # expected: about {program_time_s(test, timing):.1f} s")
         else:
             lines.append(f'log = ""  # for example "{test.name}.csv"; about {program_time_s(test, timing):.0f} s')
-        lines += ["parts = [", *(f"  {_part_text(part)}," for part in test.parts), "]", ""]
+        lines.append("parts = [")
+        for part in test.parts:
+            values = [
+                f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {round(value, 9)!r}"
+                for name, value in dataclasses.asdict(part).items()
+            ]
+            lines.append(f"  {{ {', '.join(values)} }},")
+        lines += ["]", ""]
     return "\n".join(lines)
-
-
-def _part_text(part: Part) -> str:
-    values = []
-    for name, value in dataclasses.asdict(part).items():
-        values.append(f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {round(value, 9)!r}")
-    return "{ " + ", ".join(values) + " }"
