@@ -21,8 +21,6 @@ from shapegcode.timing.calibration.motion import (
     LookAhead,
     MotionFit,
     fit_motion,
-    fitted_model,
-    machine_values,
     misfit,
     parameter_intervals,
     section_residuals,
@@ -32,9 +30,9 @@ from shapegcode.timing.calibration.motion import (
 from shapegcode.timing.calibration.observed import (
     ObservedRun,
     TimedProgram,
+    longest,
     observe,
     rapid_rate,
-    seen_arc_acceleration,
     timed_program,
     with_override,
 )
@@ -186,11 +184,6 @@ def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
     return folds
 
 
-def _seen(runs: Sequence[ObservedRun]) -> dict[str, float]:
-    across = seen_arc_acceleration(runs)
-    return {"arc_acceleration": across} if math.isfinite(across) else {}
-
-
 def _tried(
     tried: Sequence[LookAhead],
     runs: Sequence[ObservedRun],
@@ -206,18 +199,16 @@ def _tried(
         )
     fits, scores = [], []
     for family in tried:
-        fit = fit_motion(sections, family, machine, rate, seen=_seen(runs), on_step=meter.step)
+        fit = fit_motion(runs, family, machine, rate, on_step=meter.step)
         meter.next()
         left_out = []
         for fold in folds if len(folds) > 1 else ():
             rest = [run for run in runs if run not in fold]
-            part = fit_motion(
-                sections_of(rest), family, machine, rate, seen=_seen(rest), on_step=meter.step, thorough=False
-            )
-            left_out.append(misfit(sections_of(fold), fitted_model(machine, family, part.values, rate)))
+            part = fit_motion(rest, family, machine, rate, on_step=meter.step, thorough=False)
+            left_out.append(misfit(sections_of(fold), part.model(machine)))
             meter.next()
         fits.append(fit)
-        score = misfit(sections, fitted_model(machine, family, fit.values, rate))
+        score = misfit(sections, fit.model(machine))
         scores.append(FamilyScore(family.name, family.meaning, score, float(np.mean(left_out)) if left_out else None))
     return fits, scores
 
@@ -233,7 +224,7 @@ def _left_out(
     found = {}
     for fold in folds:
         rest = [run for run in runs if run not in fold]
-        part = fit_motion(sections_of(rest), motion.family, machine, rate, seen=_seen(rest))
+        part = fit_motion(rest, motion.family, machine, rate)
         other = _Learned(part, fit_functions(rest, part, machine), machine)
         found.update({id(run): other for run in fold})
     return found
@@ -247,7 +238,14 @@ def _rows(
     # What whole runs left out were off by is in the interval, too: a start that an operator delays, a tool at hand.
     off = [row.left_out_percent / 100.0 for row in rows if row.left_out_percent is not None]
     whole = 2.0 * math.sqrt(sum(each**2 for each in off) / len(off)) if off else 0.0
-    rows = [_widened(row, whole) for row in rows]
+    rows = [
+        replace(
+            row,
+            low_s=min(row.low_s, row.predicted_s * (1.0 - whole)),
+            high_s=max(row.high_s, row.predicted_s * (1.0 + whole)),
+        )
+        for row in rows
+    ]
     warnings = []
     for row in rows:
         judged = row.judged_percent
@@ -267,7 +265,10 @@ def _row(run: ObservedRun, learned: _Learned, other: _Learned | None, spread: fl
     starts = learned.starts(run)
     holds = _holds_of(run, starts)
     tools, kinds = _shares(run, starts, holds)
-    reach = _reach(run, starts, spread, learned.functions)
+    # Half of the 95 % interval of its time: cuts err together, what lies between them by itself.
+    cut = sum(float(starts[stretch.lines[1] + 1] - starts[stretch.lines[0]]) for stretch in run.stretches)
+    between = len(run.stretches) * learned.functions.scatter_s**2
+    reach = 2.0 * math.sqrt((spread * cut) ** 2 + between)
     return LearnedRun(
         program=str(run.entry.program),
         log=run.log.source,
@@ -287,11 +288,6 @@ def _row(run: ObservedRun, learned: _Learned, other: _Learned | None, spread: fl
     )
 
 
-def _widened(row: LearnedRun, ratio: float) -> LearnedRun:
-    low, high = row.predicted_s * (1.0 - ratio), row.predicted_s * (1.0 + ratio)
-    return replace(row, low_s=min(row.low_s, low), high_s=max(row.high_s, high))
-
-
 def _spread(observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]) -> float:
     """Root mean square of the relative error of whole sections, of runs left out where there are any."""
     square = weight = 0.0
@@ -299,10 +295,9 @@ def _spread(observed: Sequence[ObservedRun], learned: _Learned, others: dict[int
         if run.entry.use != "fit":
             continue
         who = others.get(id(run), learned)
-        model = fitted_model(who.machine, who.motion.family, who.motion.values, who.motion.rapid_mm_per_s)
         sections = sections_of([run])
         holds = _holds_of(run, who.starts(run))
-        for section, residual in zip(sections, section_residuals(sections, model), strict=True):
+        for section, residual in zip(sections, section_residuals(sections, who.motion.model(who.machine)), strict=True):
             begin, end = float(section.time_s[0]), float(section.time_s[-1])
             if any(since < end and since + length > begin for since, length, _ in holds):
                 continue
@@ -311,13 +306,6 @@ def _spread(observed: Sequence[ObservedRun], learned: _Learned, others: dict[int
             square += min(error / took, 0.2) ** 2 * took if took > 0.0 else 0.0
             weight += took
     return max(math.sqrt(square / weight) if weight > 0.0 else 0.0, _MIN_SPREAD)
-
-
-def _reach(run: ObservedRun, starts: FloatArray, spread: float, functions: FunctionFit) -> float:
-    """Half of the 95 % interval of a run's time: cuts err together, what lies between them by itself."""
-    cut = sum(float(starts[stretch.lines[1] + 1] - starts[stretch.lines[0]]) for stretch in run.stretches)
-    between = len(run.stretches)
-    return 2.0 * math.sqrt((spread * cut) ** 2 + between * functions.scatter_s**2)
 
 
 # --- what a model says of a run: when each line begins, where it was held ---------------------------------------------
@@ -447,16 +435,7 @@ _KNOWN = 4.0  # an interval that reaches so far from its value to both sides tel
 
 def _feed_override(run: ObservedRun) -> float:
     """At which most of a run was cut."""
-    return _longest((each.feed_override, each.lines[1] - each.lines[0]) for each in run.stretches)[0]
-
-
-def _longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
-    """Of pairs of value and duration the value that held for the longest time, and its ratio of the whole time."""
-    held: dict[float, float] = defaultdict(float)
-    for value, duration in pairs:
-        held[value] += duration
-    value = max(held, key=lambda each: held[each], default=1.0)
-    return value, held[value] / sum(held.values()) if any(held.values()) else 1.0
+    return longest((each.feed_override, each.lines[1] - each.lines[0]) for each in run.stretches)[0]
 
 
 def learned_machine(
@@ -464,7 +443,7 @@ def learned_machine(
 ) -> tuple[Machine, dict[str, str], list[LearnedNumber], list[str]]:
     """The machine with what was learned."""
     source = f"logs of {len(runs)} runs"
-    values = machine_values(motion.family, motion.values, motion.rapid_mm_per_s)
+    values = motion.file_values()
     values.update(_function_values(functions, runs))
     numbers, remarks = _motion_numbers(machine, motion, runs, source)
     if math.isfinite(motion.rapid_mm_per_s):
@@ -493,7 +472,7 @@ def learned_machine(
 def _motion_numbers(
     machine: Machine, motion: MotionFit, runs: Sequence[ObservedRun], source: str
 ) -> tuple[list[LearnedNumber], dict[str, str]]:
-    intervals = parameter_intervals(motion, sections_of(runs), machine)
+    intervals = parameter_intervals(motion, runs, machine)
     numbers, remarks = [], {}
     for parameter in motion.family.parameters:
         value = motion.values[parameter.name] * parameter.scale
@@ -524,7 +503,7 @@ def _function_numbers(functions: FunctionFit) -> list[LearnedNumber]:
 
 def _usual(overrides: Iterable[tuple[float, float]]) -> float:
     """The override at which most of the time was run; 1 where the operator had it now so, now otherwise."""
-    value, ratio = _longest(overrides)
+    value, ratio = longest(overrides)
     return value if ratio >= _USUAL else 1.0
 
 

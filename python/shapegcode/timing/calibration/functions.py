@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.timing.calibration.motion import MotionFit, fitted_model, starts_of
+from shapegcode.timing.calibration.motion import MotionFit, starts_of
 from shapegcode.timing.calibration.observed import ObservedRun
 
 FloatArray = npt.NDArray[np.float64]
@@ -57,7 +57,7 @@ def whole_model(
     machine: Machine, motion: MotionFit, values: dict[str, float], last_tool_in_spindle: bool
 ) -> _core.ControllerModel:
     """The controller with motion and functions."""
-    model = fitted_model(machine, motion.family, motion.values, motion.rapid_mm_per_s)
+    model = motion.model(machine)
     model.program_start_s = values.get("start", 0.0)
     model.tool_change_s = values.get("tool change", 0.0)
     model.last_tool_in_spindle = last_tool_in_spindle

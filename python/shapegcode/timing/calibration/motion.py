@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
-from shapegcode.timing.calibration.observed import ObservedRun, TimedProgram
+from shapegcode.timing.calibration.observed import ObservedRun, TimedProgram, seen_arc_acceleration
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -112,73 +112,80 @@ _OFF = 1e9
 _NO_LIMIT = 1e6  # mm/s²
 
 
-def fitted_model(
-    machine: Machine, family: LookAhead, values: Mapping[str, float], rapid_mm_per_s: float
-) -> _core.ControllerModel:
-    """The controller that a family and its numbers describe."""
-    model = controller_model(machine)
-    limits = _core.MotionLimits()
-    limits.law = getattr(_core.AccelerationLaw, family.law)
-    xy, z = values.get("acceleration_xy", _OFF), values.get("acceleration_z", _OFF)
-    limits.max_acceleration_mm_per_s2 = [xy, xy, z]
-    limits.max_feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in machine.axes.as_tuple()]
-    limits.jerk_time_s = values.get("jerk_time", 0.0)
-    limits.time_constant_s = max(values.get("time_constant", 0.0), model.period_s)
-    corner, corner_z = values.get("corner_xy", _OFF), values.get("corner_z", _OFF)
-    limits.corner_speed_difference_mm_per_s = [corner, corner, corner_z]
-    limits.centripetal_acceleration_mm_per_s2 = values.get("arc_acceleration", _OFF)
-    limits.junction_deviation_mm = values.get("deviation", _OFF)
-    limits.corner_stop_angle_rad = values.get("stop_angle", _OFF)
-    limits.block_time_s = values.get("block_time", 0.0)
-    model.limits = limits
-    model.motion = getattr(_core.MotionKind, family.motion)
-    model.filter_shape = _core.FilterShape.linear
-    model.time_constant_s = values.get("time_constant", 0.0)
-    model.bell_time_s = 0.0
-    model.look_ahead_filter_time_constant_s = 0.0
-    if math.isfinite(rapid_mm_per_s):
-        model.rapid_rate_mm_per_s = [rapid_mm_per_s] * 3
-    model.rapid_time_constant_s = [values["rapid_time"]] * 3
-    model.rapid_bell_time_s = 0.0
-    model.in_position = _core.InPosition.measured
-    model.in_position_s = [values["arrival"]] * 3
-    return model
+@dataclass(frozen=True)
+class MotionFit:
+    """A family with its numbers."""
 
+    family: LookAhead
+    values: dict[str, float]  # of its parameters by name, in mm, s and rad
+    rapid_mm_per_s: float  # rapid rate of every axis; NaN: the machine's
 
-def machine_values(family: LookAhead, values: Mapping[str, float], rapid_mm_per_s: float) -> dict[str, object]:
-    """The same as values of the machine file, by dotted key."""
-    corner = dict.fromkeys("xyz", 0.0)
-    found: dict[str, object] = {
-        "controller.motion": family.motion,
-        "controller.law": family.law,
-        "controller.corner_rule": family.rule,
-        "controller.look_ahead_filter_time_constant_s": 0.0,
-        "controller.rapid_bell_time_s": 0.0,
-        "controller.in_position": "measured",
-        "controller.contour_acceleration_mm_s2": None,
-        "controller.junction_deviation_mm": None,
-        "controller.corner_stop_angle_deg": None,
-        "controller.look_ahead_block_time_s": 0.0,
-        "controller.bell_time_s": 0.0,
-        "controller.polyline_acceleration_mm_s2": _NO_LIMIT,
-    }
-    for axis in "xyz":
-        found[f"axes.{axis}.max_jerk_mm_s3"] = None
+    def model(self, machine: Machine) -> _core.ControllerModel:
+        """The controller that the family and its numbers describe."""
+        family, values, rapid_mm_per_s = self.family, self.values, self.rapid_mm_per_s
+        model = controller_model(machine)
+        limits = _core.MotionLimits()
+        limits.law = getattr(_core.AccelerationLaw, family.law)
+        xy, z = values.get("acceleration_xy", _OFF), values.get("acceleration_z", _OFF)
+        limits.max_acceleration_mm_per_s2 = [xy, xy, z]
+        limits.max_feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in machine.axes.as_tuple()]
+        limits.jerk_time_s = values.get("jerk_time", 0.0)
+        limits.time_constant_s = max(values.get("time_constant", 0.0), model.period_s)
+        corner, corner_z = values.get("corner_xy", _OFF), values.get("corner_z", _OFF)
+        limits.corner_speed_difference_mm_per_s = [corner, corner, corner_z]
+        limits.centripetal_acceleration_mm_per_s2 = values.get("arc_acceleration", _OFF)
+        limits.junction_deviation_mm = values.get("deviation", _OFF)
+        limits.corner_stop_angle_rad = values.get("stop_angle", _OFF)
+        limits.block_time_s = values.get("block_time", 0.0)
+        model.limits = limits
+        model.motion = getattr(_core.MotionKind, family.motion)
+        model.filter_shape = _core.FilterShape.linear
+        model.time_constant_s = values.get("time_constant", 0.0)
+        model.bell_time_s = 0.0
+        model.look_ahead_filter_time_constant_s = 0.0
         if math.isfinite(rapid_mm_per_s):
-            found[f"axes.{axis}.rapid_mm_per_min"] = float(f"{rapid_mm_per_s * 60.0:.5g}")
-    for parameter in family.parameters:
-        value = float(f"{values[parameter.name] * parameter.scale:.5g}")
-        if parameter.key.startswith("controller.corner_speed"):
-            corner.update(dict.fromkeys(parameter.axes, value))
-        elif "{axis}" in parameter.key:
-            found.update({parameter.key.format(axis=axis): value for axis in parameter.axes})
-        else:
-            found[parameter.key] = value
-    if any(parameter.name == "corner_xy" for parameter in family.parameters):
-        found["controller.corner_speed_difference_mm_per_min"] = corner
-    if family.motion == "after_interpolation":
-        found["controller.after_interpolation_shape"] = "linear"
-    return found
+            model.rapid_rate_mm_per_s = [rapid_mm_per_s] * 3
+        model.rapid_time_constant_s = [values["rapid_time"]] * 3
+        model.rapid_bell_time_s = 0.0
+        model.in_position = _core.InPosition.measured
+        model.in_position_s = [values["arrival"]] * 3
+        return model
+
+    def file_values(self) -> dict[str, object]:
+        """The same as values of the machine file, by dotted key."""
+        family, values, rapid_mm_per_s = self.family, self.values, self.rapid_mm_per_s
+        corner = dict.fromkeys("xyz", 0.0)
+        found: dict[str, object] = {
+            "controller.motion": family.motion,
+            "controller.law": family.law,
+            "controller.corner_rule": family.rule,
+            "controller.look_ahead_filter_time_constant_s": 0.0,
+            "controller.rapid_bell_time_s": 0.0,
+            "controller.in_position": "measured",
+            "controller.contour_acceleration_mm_s2": None,
+            "controller.junction_deviation_mm": None,
+            "controller.corner_stop_angle_deg": None,
+            "controller.look_ahead_block_time_s": 0.0,
+            "controller.bell_time_s": 0.0,
+            "controller.polyline_acceleration_mm_s2": _NO_LIMIT,
+        }
+        for axis in "xyz":
+            found[f"axes.{axis}.max_jerk_mm_s3"] = None
+            if math.isfinite(rapid_mm_per_s):
+                found[f"axes.{axis}.rapid_mm_per_min"] = float(f"{rapid_mm_per_s * 60.0:.5g}")
+        for parameter in family.parameters:
+            value = float(f"{values[parameter.name] * parameter.scale:.5g}")
+            if parameter.key.startswith("controller.corner_speed"):
+                corner.update(dict.fromkeys(parameter.axes, value))
+            elif "{axis}" in parameter.key:
+                found.update({parameter.key.format(axis=axis): value for axis in parameter.axes})
+            else:
+                found[parameter.key] = value
+        if any(parameter.name == "corner_xy" for parameter in family.parameters):
+            found["controller.corner_speed_difference_mm_per_min"] = corner
+        if family.motion == "after_interpolation":
+            found["controller.after_interpolation_shape"] = "linear"
+        return found
 
 
 # --- how far a model is off -------------------------------------------------------------------------------------------
@@ -285,39 +292,33 @@ _PRIOR = 0.01
 _MIN_STEP = 0.02  # of the numeric derivatives, in the logarithm
 
 
-@dataclass(frozen=True)
-class MotionFit:
-    """A family with its numbers."""
-
-    family: LookAhead
-    values: dict[str, float]  # of its parameters by name, in mm, s and rad
-    rapid_mm_per_s: float  # rapid rate of every axis; NaN: the machine's
-
-
 def fit_motion(
-    sections: Sequence[SeenSection],
+    runs: Sequence[ObservedRun],
     family: LookAhead,
     machine: Machine,
     rapid_mm_per_s: float,
     *,
-    seen: Mapping[str, float],
     thorough: bool = True,
     on_step: Callable[[], None] | None = None,
 ) -> MotionFit:
     """Least misfit over the numbers of a family: Nelder-Mead, restarted from where it ended."""
     from scipy.optimize import minimize
 
+    sections = sections_of(runs)
+    across = seen_arc_acceleration(runs)
+    seen = {"arc_acceleration": across} if math.isfinite(across) else {}
     parameters = family.parameters
     low = np.log([parameter.low for parameter in parameters])
     high = np.log([parameter.high for parameter in parameters])
-    usual = {parameter.name: parameter.start for parameter in parameters} | dict(seen)
+    usual = {parameter.name: parameter.start for parameter in parameters} | seen
     typical = np.log([usual[parameter.name] for parameter in parameters])
     reach = np.array([_SEEN_SPREAD if parameter.name in seen else _TYPICAL_SPREAD for parameter in parameters])
     calls = 0
 
-    def values(place: FloatArray) -> dict[str, float]:
+    def fit(place: FloatArray) -> MotionFit:
         kept = np.clip(place, low, high)
-        return {parameter.name: math.exp(value) for parameter, value in zip(parameters, kept, strict=True)}
+        values = {parameter.name: math.exp(value) for parameter, value in zip(parameters, kept, strict=True)}
+        return MotionFit(family, values, rapid_mm_per_s)
 
     def cost(place: FloatArray) -> float:
         nonlocal calls
@@ -326,7 +327,7 @@ def fit_motion(
             on_step()
         beyond = float(np.abs(place - np.clip(place, low, high)).sum())
         usual = _PRIOR * float((((place - typical) / reach) ** 2).sum())
-        return misfit(sections, fitted_model(machine, family, values(place), rapid_mm_per_s)) + usual + 10.0 * beyond
+        return misfit(sections, fit(place).model(machine)) + usual + 10.0 * beyond
 
     def search(place: FloatArray, most: int) -> tuple[float, FloatArray]:
         simplex = np.vstack([place, place + _STEP * np.eye(len(parameters))])
@@ -347,11 +348,11 @@ def fit_motion(
     for _ in range(restarts):
         end = search(best[1] + generator.normal(0.0, 0.1, len(parameters)), _STEPS)
         best = min(best, end, key=lambda each: each[0])
-    return MotionFit(family, values(best[1]), rapid_mm_per_s)
+    return fit(best[1])
 
 
 def parameter_intervals(
-    fit: MotionFit, sections: Sequence[SeenSection], machine: Machine
+    fit: MotionFit, runs: Sequence[ObservedRun], machine: Machine
 ) -> dict[str, tuple[float, float]]:
     """95 % intervals of the numbers of a fit.
 
@@ -359,10 +360,11 @@ def parameter_intervals(
     counts as one (a sandwich of clusters), so that an error of the model is in it.
     """
     names = [parameter.name for parameter in fit.family.parameters]
+    sections = sections_of(runs)
     stretches = [_stretches(section) for section in sections]
 
     def taken(values: dict[str, float]) -> list[FloatArray]:
-        residual = section_residuals(sections, fitted_model(machine, fit.family, values, fit.rapid_mm_per_s))
+        residual = section_residuals(sections, replace(fit, values=values).model(machine))
         return [np.diff(each[places]) for each, places in zip(residual, stretches, strict=True)]
 
     centre = taken(fit.values)

@@ -6,7 +6,7 @@ import math
 import re
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -168,13 +168,20 @@ def lines_at(signal: Signal, log: RunLog, timed: TimedProgram) -> IntArray:
     return np.clip(np.where(at >= 0, line[np.maximum(at, 0)], 0), 0, timed.line_count + 1)
 
 
+def longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
+    """Of pairs of value and duration the value that held for the longest time, and its ratio of the whole time."""
+    held: dict[float, float] = defaultdict(float)
+    for value, duration in pairs:
+        held[value] += duration
+    value = max(held, key=lambda each: held[each], default=1.0)
+    return value, held[value] / sum(held.values()) if any(held.values()) else 1.0
+
+
 def held_longest(signal: Signal, end_s: float | None) -> float:
     """The value that a signal had for the longest time."""
-    held: dict[float, float] = defaultdict(float)
     until = np.append(signal.time_s[1:], end_s if end_s is not None else signal.time_s[-1])
-    for value, begin, end in zip(signal.value, signal.time_s, until, strict=True):
-        held[round(float(value), 3)] += max(0.0, float(end - begin))
-    return max(held, key=lambda value: held[value])
+    values = (round(value, 3) for value in signal.value.tolist())
+    return longest(zip(values, np.maximum(until - signal.time_s, 0.0).tolist(), strict=True))[0]
 
 
 def feed_unit(entry: RunEntry, log: RunLog, timed: TimedProgram) -> float:
@@ -294,30 +301,17 @@ def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine)
     _compare_tools(entry, log, timed, notes)
     unit = feed_unit(entry, log, timed)
     stretches = tuple(stretches_of(entry, log, timed, unit, notes))
-    run = ObservedRun(
-        timed=timed,
-        log=log,
-        entry=entry,
-        time_s=time_s,
-        line=line,
-        stretches=stretches,
-        rapid_override=_stated_rapid_override(entry, log),
-        feed_unit_mm_per_s=unit,
-        notes=tuple(notes),
-    )
+    rapid_override = math.nan
+    if entry.rapid_override_percent is not None:
+        rapid_override = entry.rapid_override_percent / 100.0
+    elif log.rapid_override is not None and len(log.rapid_override):
+        # The dial may be turned for a moment, at the start mostly: what held longest counts.
+        rapid_override = held_longest(log.rapid_override, log.duration_s) or math.nan
+    run = ObservedRun(timed, log, entry, time_s, line, stretches, rapid_override, unit, tuple(notes))
     starts = timed.starts(controller_model(machine))  # by the machine's own limits, before anything is learned
     whole = _is_whole(run, starts, notes)
     _require_same(run, starts)
     return replace(run, whole=whole, notes=tuple(notes))
-
-
-def _stated_rapid_override(entry: RunEntry, log: RunLog) -> float:
-    if entry.rapid_override_percent is not None:
-        return entry.rapid_override_percent / 100.0
-    if log.rapid_override is not None and len(log.rapid_override):
-        # The dial may be turned for a moment, at the start mostly: what held longest counts.
-        return held_longest(log.rapid_override, log.duration_s) or math.nan
-    return math.nan
 
 
 def _lines(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> tuple[FloatArray, IntArray]:
