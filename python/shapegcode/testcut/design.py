@@ -17,6 +17,7 @@ from shapegcode.cutting.tool import Tool
 from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
 from shapegcode.testcut.cut import (
+    FIGURES,
     CornerDetails,
     CuttingLaw,
     CutTool,
@@ -268,7 +269,7 @@ def _drawn(
     met: Edge | None = None,
 ) -> CutDesign:
     """The design of measuring passes over one edge."""
-    kinds = {TaperDetails: "taper", CornerDetails: "corner", IntervalDetails: "interval"}
+    kind = next(kind for kind, figures in FIGURES.items() if isinstance(about, figures))
     warnings = []
     if isinstance(about, CornerDetails) and about.deeper_than_corner is not None:
         deeper = about.deeper_than_corner
@@ -277,7 +278,7 @@ def _drawn(
             "the corner: there its edge is hollow more sharply than the tool is round; the side file has what is met"
         )
     cut = TestCut(
-        kind=kinds[type(about)],  # type: ignore[arg-type]
+        kind=kind,
         program="",
         machine=given.machine.name,
         tool=given._cut_tool(),

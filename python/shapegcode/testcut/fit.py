@@ -24,7 +24,7 @@ from shapegcode.testcut.forces import (
     straight_engagement,
 )
 from shapegcode.testcut.record import (
-    FEWEST_SAMPLES,
+    MIN_SAMPLES,
     ForceRecord,
     PlacedRecord,
     Revolutions,
@@ -94,7 +94,7 @@ def fit_test_cut(
 Array = npt.NDArray[np.float64]
 
 _BINS_PER_PASS = 60
-_FEWEST_TURNS = 4
+_MIN_TURNS = 4
 _ROUNDS = 2
 #: Standard error of the place of the tool, found from entry and exit, in feeds per revolution.
 _PLACE = 0.25
@@ -126,7 +126,7 @@ class _Reduced:
 
 def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: Thickness, edge: bool) -> TaperResult:
     law = cut.tool.cutting
-    sampled = any(_samples(cut, number, record) >= FEWEST_SAMPLES for number, record in measured.items())
+    sampled = any(_samples(cut, number, record) >= MIN_SAMPLES for number, record in measured.items())
     for _ in range(_ROUNDS if sampled else 1):
         # Where entry and exit lie in the record depends a little on the law.
         reduced = _reduced(cut, measured, law)
@@ -237,7 +237,7 @@ def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) 
     """Means over some revolutions each, chatter left out."""
     margin = 2.0 * found.feed_mm_per_min / found.record.spindle_rev_per_min
     kept = np.flatnonzero(fully_engaged(cut, measuring, found.x_mm, margin) & ~found.chatter)
-    if kept.size < _FEWEST_TURNS:
+    if kept.size < _MIN_TURNS:
         raise ArgumentError(f"{found.record.file}: {kept.size} revolutions in full engagement: too few")
     many = max(1, kept.size // _BINS_PER_PASS)
     # A bin holds neighbours only: none goes across what was left out.
@@ -328,10 +328,10 @@ _FEEDS = 40
 
 
 def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> IntervalResult:
-    records = {
-        number: placed(record, cut, cut.passes[number - 1], expected(cut, cut.passes[number - 1]))
-        for number, record in measured.items()
-    }
+    records = {}
+    for number, record in measured.items():
+        measuring = cut.passes[number - 1]
+        records[number] = placed(record, cut, measuring, expected(cut, measuring))
     found = sorted((_followed(cut, number, record) for number, record in records.items()), key=lambda p: p.interval_mm)
     good: float | None = None
     for each in reversed(found):
@@ -370,13 +370,17 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
         if record.by_time:
             speed = _speeds(measuring, time - entry, lag)
         else:
-            speed = _over_way(measuring, record.x_mm[within], lag)
+            speed = _speeds_at(measuring, record.x_mm[within], lag)
         return turned(np.interp(speed, feeds, levels)[:, None], record.samples)[:, 0]
 
     errors = [float(np.mean((course(lag) - size) ** 2)) for lag in _LAGS_S]
     lag = float(_LAGS_S[int(np.argmin(errors))])
     immediate = course(0.0)
-    ends, wanted, seen = _ends_of_blocks(measuring, record.x_mm[within], immediate, size, interval)
+    # Means over the second half of each block.
+    x = record.x_mm[within]
+    halves = [(end, (x > end - 0.5 * interval) & (x <= end)) for end, _ in measuring.feeds[1:-1]]
+    rows = [(end, immediate[half].mean(), size[half].mean()) for end, half in halves if half.any()]
+    ends, wanted, seen = np.array(rows).T
     off = np.abs(seen - wanted) / wanted
     noise = _noise(record.x_mm[straight], force[straight], 0.5 * interval)
     worst = int(np.argmax(off))
@@ -398,11 +402,8 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
 def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> tuple[Array, Array]:
     """Feeds below, between and above those of a pass, and the mean force at each."""
     commanded = [feed for _, feed in measuring.feeds]
-    feeds = np.sort(
-        np.concatenate(
-            [np.linspace(0.2, 0.98, _FEEDS) * min(commanded), np.linspace(0.5, 1.1, _FEEDS) * max(commanded)]
-        )
-    )
+    low, high = np.linspace(0.2, 0.98, _FEEDS) * min(commanded), np.linspace(0.5, 1.1, _FEEDS) * max(commanded)
+    feeds = np.sort(np.concatenate([low, high]))
     law = ForceLaw(cut.tool, cut.tool.cutting, cut.spindle_rev_per_min, cut.axial_depth_mm)
     met = straight_engagement(cut.tool, np.full(len(feeds), radial_depth_mm), up=cut.up)
     return feeds, np.linalg.norm(law.forces(met, feeds).mean_n, axis=1)
@@ -442,25 +443,13 @@ def _block_time(way: float, speed: float, command: float, lag: float) -> float:
     return time
 
 
-def _over_way(measuring: MeasuringPass, x_mm: Array, lag: float) -> Array:
+def _speeds_at(measuring: MeasuringPass, x_mm: Array, lag: float) -> Array:
     """The same where the record tells the position: at the X of each sample."""
     first, last = measuring.feeds[0][0], measuring.feeds[-1][0]
     fine = np.linspace(0.0, 1.5 * (last - first) / min(feed for _, feed in measuring.feeds) * _PER_MINUTE, 20000)
     speed = _speeds(measuring, fine, lag)
     way = first + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))]) / _PER_MINUTE
     return np.where(x_mm < first, measuring.feeds[0][1], np.interp(x_mm, way, speed))
-
-
-def _ends_of_blocks(
-    measuring: MeasuringPass, x: Array, wanted: Array, seen: Array, interval: float
-) -> tuple[Array, Array, Array]:
-    rows = []
-    for end, _ in measuring.feeds[1:-1]:
-        inside = (x > end - 0.5 * interval) & (x <= end)
-        if inside.sum() >= 1:
-            rows.append((end, float(wanted[inside].mean()), float(seen[inside].mean())))
-    table = np.array(rows)
-    return table[:, 0], table[:, 1], table[:, 2]
 
 
 def _noise(x: Array, force: Array, way: float) -> float:

@@ -32,7 +32,7 @@ _NAMES: tuple[tuple[str, Measured, str], ...] = (
     ("fy", "force", r"f_?y|force[ _]?y|y[ _]?force"),
     ("torque", "torque", r"torque|m_?z|moment"),
 )
-_FEWEST_ROWS = 4
+_MIN_ROWS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
     path = Path(path)
     table = TextTable(path)
     columns = _columns(table)
-    numbers = table.numbers([index for index, _ in columns.values()], _FEWEST_ROWS)
+    numbers = table.numbers([index for index, _ in columns.values()], _MIN_ROWS)
     values = {name: numbers[:, k] * factor for k, (name, (_, factor)) in enumerate(columns.items())}
     sign = -1.0 if on == "workpiece" else 1.0
     time = values.get("time")
@@ -102,21 +102,17 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
     if position is not None and "radial_depth" not in values and np.any(np.diff(position) < 0.0):
         row = int(np.argmax(np.diff(position) < 0.0)) + 1
         raise ArgumentError(f"{path}:{table.line_of(row)}: the position goes back: one pass per file, along +X")
-    return ForceRecord(
-        str(path),
-        sign * np.column_stack([values["fx"], values["fy"]]),
-        values.get("torque"),
-        time,
-        position,
-        values.get("radial_depth"),
-        values.get("feed"),
-    )
+    force = sign * np.column_stack([values["fx"], values["fy"]])
+    depth, feed = values.get("radial_depth"), values.get("feed")
+    return ForceRecord(str(path), force, values.get("torque"), time, position, depth, feed)
 
+
+# --- the position of each sample --------------------------------------------------------------------------------------
 
 _PER_MINUTE = 60.0
 #: Samples per revolution from which on a file is a record and not a table of means.
-FEWEST_SAMPLES = 6.0
-_LEAST_AIR_REVS = 5
+MIN_SAMPLES = 6.0
+_MIN_AIR_REVS = 5
 _FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
 _TELL_SPEED, _TELL_FEED = 0.002, 0.005
 _GUARD_REVS = 2
@@ -124,8 +120,8 @@ _GUARD_REVS = 2
 _ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04
 _SPEED_RANGE = 0.05
 _CLEAR_LINE = 8.0  # times the median of the spectrum around it
-_FEWEST_FOR_SPEED = 20.0
-_LARGEST_SHIFT_MM = 1.0
+_MIN_FOR_SPEED = 20.0
+_MAX_SHIFT_MM = 1.0
 _SHIFT_STEPS = 81
 #: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
 _OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
@@ -135,9 +131,9 @@ _OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
 class PlacedRecord:
     """A sampled record of one pass, offset and drift of the dynamometer taken off, with the place of each sample."""
 
-    file: str  # where it was read
-    cut: TestCut  # the test cut
-    measuring: MeasuringPass  # the pass
+    file: str
+    cut: TestCut
+    measuring: MeasuringPass
     time_s: Array  # (n,)
     x_mm: Array  # (n,) X of the tool's axis
     force_n: Array  # (n, 2) on the tool, along the feed and to its left
@@ -150,41 +146,14 @@ class PlacedRecord:
     notes: tuple[str, ...]  # what else the user should know, with the name of the file
 
 
-def _spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
-    """Spindle speed from the lines of a record at the revolution, the teeth, and their multiples."""
-    count = len(force_n)
-    turns = count * period_s * commanded / _PER_MINUTE
-    if turns < _FEWEST_FOR_SPEED:
-        return commanded, False
-    padded = 1 << int(np.ceil(np.log2(4 * count)))
-    window = np.hanning(count)[:, None]
-    power = np.sum(np.abs(np.fft.rfft((force_n - force_n.mean(axis=0)) * window, padded, axis=0)) ** 2, axis=1)
-    step = 1.0 / (padded * period_s)
-    best: tuple[float, float] | None = None
-    for order in (flutes, 1, 2 * flutes, 2):
-        centre = order * commanded / _PER_MINUTE
-        low, high = (round(centre * side / step) for side in (1.0 - _SPEED_RANGE, 1.0 + _SPEED_RANGE))
-        if high + 1 >= len(power) or high - low < 8:
-            continue
-        part = power[low : high + 1]
-        peak = int(np.argmax(part))
-        height = float(part[peak] / max(float(np.median(part)), 1e-300))
-        if 0 < peak < len(part) - 1 and height > _CLEAR_LINE**2 and (best is None or height > best[0]):
-            left, mid, right = np.log(np.maximum(part[peak - 1 : peak + 2], 1e-300))
-            bent = left - 2.0 * mid + right
-            fine = 0.5 * (left - right) / bent if bent < 0.0 else 0.0
-            best = height, (low + peak + fine) * step * _PER_MINUTE / order
-    return (commanded, False) if best is None else (float(best[1]), True)
-
-
 def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, hoped: Expected) -> PlacedRecord:
     """Take offset and drift off a sampled record of one pass, and find the place of each sample."""
     time, moved = _clock(record, measuring, cut.kind)
     period = float(time[-1] - time[0]) / (len(time) - 1)
     turn = _PER_MINUTE / cut.spindle_rev_per_min
-    if turn / period < FEWEST_SAMPLES:
+    if turn / period < MIN_SAMPLES:
         raise ArgumentError(
-            f"{record.file}: {turn / period:.1f} samples per revolution: must be {FEWEST_SAMPLES:g} or more, better "
+            f"{record.file}: {turn / period:.1f} samples per revolution: must be {MIN_SAMPLES:g} or more, better "
             f"{12 * cut.tool.flutes}; or give means over whole revolutions, at most one row per revolution"
         )
     begin, end = _contact(record, turn / period)
@@ -206,20 +175,9 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, hoped: E
     size = np.linalg.norm(turned(force, samples), axis=1)
     x = _placed(record, measuring, hoped, size, time, moved, (begin, end), notes)
     told = tuple(f"{record.file}: {note}" for note in notes)
+    by_time = record.position_mm is None
     return PlacedRecord(
-        record.file,
-        cut,
-        measuring,
-        time,
-        x,
-        force,
-        torque,
-        samples,
-        speed,
-        offset,
-        drift,
-        record.position_mm is None,
-        told,
+        record.file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, by_time, told
     )
 
 
@@ -239,19 +197,48 @@ def _clock(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[Ar
     return time, (time - time[0]) * measuring.feed_mm_per_min / _PER_MINUTE
 
 
+def _spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
+    """Spindle speed from the lines of a record at the revolution, the teeth, and their multiples."""
+    count = len(force_n)
+    turns = count * period_s * commanded / _PER_MINUTE
+    if turns < _MIN_FOR_SPEED:
+        return commanded, False
+    padded = 1 << int(np.ceil(np.log2(4 * count)))
+    window = np.hanning(count)[:, None]
+    power = np.sum(np.abs(np.fft.rfft((force_n - force_n.mean(axis=0)) * window, padded, axis=0)) ** 2, axis=1)
+    step = 1.0 / (padded * period_s)
+    best: tuple[float, float] | None = None
+    for order in (flutes, 1, 2 * flutes, 2):
+        centre = order * commanded / _PER_MINUTE
+        low, high = (round(centre * side / step) for side in (1.0 - _SPEED_RANGE, 1.0 + _SPEED_RANGE))
+        if high + 1 >= len(power) or high - low < 8:
+            continue
+        part = power[low : high + 1]
+        peak = int(np.argmax(part))
+        height = float(part[peak] / max(float(np.median(part)), 1e-300))
+        if 0 < peak < len(part) - 1 and height > _CLEAR_LINE**2 and (best is None or height > best[0]):
+            fine = _vertex(-np.log(np.maximum(part[peak - 1 : peak + 2], 1e-300)))
+            best = height, (low + peak + fine) * step * _PER_MINUTE / order
+    return (commanded, False) if best is None else (float(best[1]), True)
+
+
 def turned(force: Array, samples: float) -> Array:
     """Moving mean of each column over a stretch of a number of samples that need not be whole, centred."""
-    sums = np.vstack([np.zeros((1, force.shape[1])), np.cumsum(force, axis=0)])
-    at = np.arange(len(sums), dtype=np.float64)
     middle = np.arange(len(force)) + 0.5
     low, high = np.clip(middle - 0.5 * samples, 0, len(force)), np.clip(middle + 0.5 * samples, 0, len(force))
-    means = [(np.interp(high, at, column) - np.interp(low, at, column)) / (high - low) for column in sums.T]
-    return np.column_stack(means)
+    return np.asarray(_sums(force, low, high) / (high - low)[:, None])
+
+
+def _sums(table: Array, low: Array, high: Array) -> Array:
+    """Of each column between two places among the samples, which need not be whole."""
+    sums = np.vstack([np.zeros((1, table.shape[1])), np.cumsum(table, axis=0)])
+    at = np.arange(len(sums), dtype=np.float64)
+    return np.column_stack([np.interp(high, at, column) - np.interp(low, at, column) for column in sums.T])
 
 
 def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
     """First and last sample of the cut, roughly."""
-    air = round(_LEAST_AIR_REVS * samples)
+    air = round(_MIN_AIR_REVS * samples)
     if len(record) < 4 * air:
         raise ArgumentError(f"{record.file}: {len(record) / samples:.1f} revolutions: a pass has many more")
     smooth = turned(record.force_n, samples)
@@ -271,7 +258,7 @@ def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
     if begin < air or end > len(smooth) - air:
         where = "before" if begin < air else "after"
         raise ArgumentError(
-            f"{record.file}: no air {where} the cut: record at least {_LEAST_AIR_REVS} revolutions more there"
+            f"{record.file}: no air {where} the cut: record at least {_MIN_AIR_REVS} revolutions more there"
         )
     return begin, end
 
@@ -334,7 +321,7 @@ def _way_of_blocks(measuring: MeasuringPass, time_s: Array, entry_mm: float) -> 
 
 def _shift(hoped: Expected, x: Array, size: Array, side: float) -> float:
     """By how much X must be moved so that the course at one end of the cut is the expected one, whatever its scale."""
-    near = np.flatnonzero(np.abs(x - side) < 3.0 * _LARGEST_SHIFT_MM)
+    near = np.flatnonzero(np.abs(x - side) < 3.0 * _MAX_SHIFT_MM)
     near = near[:: max(1, len(near) // 400)]
     measured, place = size[near], x[near]
 
@@ -343,16 +330,23 @@ def _shift(hoped: Expected, x: Array, size: Array, side: float) -> float:
         factor = float(expected @ measured) / max(float(expected @ expected), 1e-300)
         return float(np.sum((measured - factor * expected) ** 2))
 
-    tried = np.linspace(-_LARGEST_SHIFT_MM, _LARGEST_SHIFT_MM, _SHIFT_STEPS)
+    tried = np.linspace(-_MAX_SHIFT_MM, _MAX_SHIFT_MM, _SHIFT_STEPS)
     errors = np.array([misfit(shift) for shift in tried])
     best = int(np.clip(np.argmin(errors), 1, _SHIFT_STEPS - 2))
-    left, mid, right = errors[best - 1 : best + 2]
-    bent = left - 2.0 * mid + right
-    return float(tried[best] + (0.5 * (left - right) / bent * (tried[1] - tried[0]) if bent > 0.0 else 0.0))
+    return float(tried[best] + _vertex(errors[best - 1 : best + 2]) * (tried[1] - tried[0]))
 
 
-_FEWEST = 20
-_CHATTER, _CHATTER_LEAST = 8.0, 0.02  # times the median deviation; the least that counts as one, of the median
+def _vertex(three: Array) -> float:
+    """Where the parabola through three values is lowest, in steps from the middle one."""
+    left, middle, right = three.tolist()
+    bend = left - 2.0 * middle + right
+    return 0.5 * (left - right) / bend if bend > 0.0 else 0.0
+
+
+# --- means over whole revolutions -------------------------------------------------------------------------------------
+
+_MIN_REVOLUTIONS = 20
+_CHATTER, _MIN_CHATTER = 8.0, 0.02  # times the median deviation; the least that counts as one, of the median
 _CHATTER_ROUNDS = 12
 
 
@@ -360,7 +354,7 @@ _CHATTER_ROUNDS = 12
 class Revolutions:
     """Means over whole revolutions of one pass."""
 
-    record: PlacedRecord  # what they are of
+    record: PlacedRecord
     x_mm: Array  # (n,) X of the tool's axis in the middle of each revolution
     mean_n: Array  # (n, 2) mean force on the tool along the feed and to its left
     torque_nm: Array | None  # (n,) mean torque; None: not recorded
@@ -383,9 +377,7 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     if record.torque_nm is not None:
         columns.append(record.torque_nm)
     table = np.hstack(columns)
-    sums = np.vstack([np.zeros((1, table.shape[1])), np.cumsum(table, axis=0)])
-    at = np.arange(len(sums), dtype=np.float64)
-    means = np.diff(np.column_stack([np.interp(edges, at, column) for column in sums.T]), axis=0) / record.samples
+    means = _sums(table, edges[:-1], edges[1:]) / record.samples
     peaks = np.maximum.reduceat(size[: int(edges[-1])], edges[:-1].astype(np.intp))
     middle = means[:, 4]
     uneven = np.sqrt(np.maximum(means[:, 3] - np.sum(means[:, :2] ** 2, axis=1), 0.0))
@@ -395,25 +387,17 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     feed = measuring.feed_mm_per_min
     if measuring.constant_feed:
         feed = float(np.polyfit(record.time_s[inside], x[inside], 1)[0]) * _PER_MINUTE
-    return Revolutions(
-        record,
-        middle,
-        means[:, :2],
-        np.abs(means[:, 5]) if record.torque_nm is not None else None,
-        means[:, 2],
-        peaks,
-        chatter,
-        feed,
-    )
+    torque = np.abs(means[:, 5]) if record.torque_nm is not None else None
+    return Revolutions(record, middle, means[:, :2], torque, means[:, 2], peaks, chatter, feed)
 
 
 def _swings(x: Array, uneven: Array, resultant: Array) -> npt.NDArray[np.bool_]:
     """Where the force within a revolution swings more, for its mean, than in the rest of the pass."""
-    if len(uneven) < _FEWEST:
+    if len(uneven) < _MIN_REVOLUTIONS:
         return np.zeros(len(uneven), dtype=bool)
     share = uneven / np.maximum(resultant, 1e-300)
     place = (x - x.mean()) / max(float(np.ptp(x)), 1e-300)
-    floor = _CHATTER_LEAST * float(np.median(share))
+    floor = _MIN_CHATTER * float(np.median(share))
     weight = np.ones(len(share))
     for _ in range(_CHATTER_ROUNDS):
         # Least absolute deviations: what stands out does not bend the curve of the rest.

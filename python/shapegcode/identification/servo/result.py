@@ -60,20 +60,13 @@ class ServoModel:
 
 @dataclass(frozen=True, eq=False)
 class ServoCurves:
-    """What the picture shows of an axis, one array for each stretch without a gap.
+    """What the picture shows of an axis, one array for each stretch without a gap."""
 
-    Attributes:
-        time_s: (n,).
-        speed: of the command, (n,).
-        lag: command less actual position, (n,).
-        deviation: the control's contour deviation, (n,); None: not recorded.
-        rest: what the best model leaves of the lag, each sample judged by the fit to the other half, (n,).
-    """
-
-    time_s: tuple[FloatArray, ...]
-    speed: tuple[FloatArray, ...]
-    lag: tuple[FloatArray, ...]
-    deviation: tuple[FloatArray, ...] | None
+    time_s: tuple[FloatArray, ...]  # (n,)
+    speed: tuple[FloatArray, ...]  # of the command, (n,)
+    lag: tuple[FloatArray, ...]  # command less actual position, (n,)
+    deviation: tuple[FloatArray, ...] | None  # the control's contour deviation, (n,); None: not recorded
+    # what the best model leaves of the lag, each sample judged by the fit to the other half, (n,)
     rest: tuple[FloatArray, ...]
 
 
