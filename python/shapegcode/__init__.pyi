@@ -58,33 +58,11 @@ from shapegcode.batching.result import (
     BatchRow as BatchRow,
 )
 from shapegcode.characterization.characterize import characterize as characterize
-from shapegcode.characterization.clock.learn import learn_clock as learn_clock
-from shapegcode.characterization.clock.plots import plot_clock as plot_clock
-from shapegcode.characterization.clock.result import (
-    FamilyScore as FamilyScore,
-    LearnedClock as LearnedClock,
-    LearnedNumber as LearnedNumber,
-    LearnedRun as LearnedRun,
-    LearnedShare as LearnedShare,
-)
 from shapegcode.characterization.programs import write_characterization_tests as write_characterization_tests
 from shapegcode.characterization.result import (
     Characterisation as Characterisation,
     CharacterisationTests as CharacterisationTests,
 )
-from shapegcode.characterization.runs_file import (
-    RunEntry as RunEntry,
-    RunsFile as RunsFile,
-    load_runs as load_runs,
-)
-from shapegcode.characterization.servo.fit import fit_servo as fit_servo
-from shapegcode.characterization.servo.plots import plot_servo as plot_servo
-from shapegcode.characterization.servo.record import (
-    ServoRecord as ServoRecord,
-    ServoTrace as ServoTrace,
-    read_servo_record as read_servo_record,
-)
-from shapegcode.characterization.servo.result import ServoAxis as ServoAxis, ServoFit as ServoFit
 from shapegcode.checking.check import (
     check as check,
     check_text as check_text,
@@ -150,6 +128,14 @@ from shapegcode.identification.plots import (
     plot_traces as plot_traces,
 )
 from shapegcode.identification.result import Identification as Identification
+from shapegcode.identification.servo.fit import fit_servo as fit_servo
+from shapegcode.identification.servo.plots import plot_servo as plot_servo
+from shapegcode.identification.servo.record import (
+    ServoRecord as ServoRecord,
+    ServoTrace as ServoTrace,
+    read_servo_record as read_servo_record,
+)
+from shapegcode.identification.servo.result import ServoAxis as ServoAxis, ServoFit as ServoFit
 from shapegcode.identification.update import MachineUpdate as MachineUpdate, update_machine as update_machine
 from shapegcode.io.edge_capture import (
     EdgeAxis as EdgeAxis,
@@ -249,20 +235,17 @@ from shapegcode.studies.plots import (
 from shapegcode.studies.result import MachineStudy as MachineStudy
 from shapegcode.studies.study import study as study
 from shapegcode.studies.study_file import load_study as load_study
-from shapegcode.testcut.conditions import (
-    CornerShape as CornerShape,
-    CutConditions as CutConditions,
-)
 from shapegcode.testcut.cut import (
     TestCut as TestCut,
     read_test_cut as read_test_cut,
 )
-from shapegcode.testcut.cuts import (
+from shapegcode.testcut.design import (
+    CornerShape as CornerShape,
+    CutConditions as CutConditions,
     corner_cut as corner_cut,
     interval_cut as interval_cut,
     taper_cut as taper_cut,
 )
-from shapegcode.testcut.design_result import CutDesign as CutDesign
 from shapegcode.testcut.fit import fit_test_cut as fit_test_cut
 from shapegcode.testcut.plots import (
     plot_coefficients as plot_coefficients,
@@ -273,8 +256,23 @@ from shapegcode.testcut.plots import (
 from shapegcode.testcut.program import write_test_cut as write_test_cut
 from shapegcode.testcut.result import (
     CornerResult as CornerResult,
+    CutDesign as CutDesign,
     IntervalResult as IntervalResult,
     TaperResult as TaperResult,
+)
+from shapegcode.timing.calibration.calibrate import learn_clock as learn_clock
+from shapegcode.timing.calibration.plots import plot_clock as plot_clock
+from shapegcode.timing.calibration.result import (
+    FamilyScore as FamilyScore,
+    LearnedClock as LearnedClock,
+    LearnedNumber as LearnedNumber,
+    LearnedRun as LearnedRun,
+    LearnedShare as LearnedShare,
+)
+from shapegcode.timing.calibration.runs_file import (
+    RunEntry as RunEntry,
+    RunsFile as RunsFile,
+    load_runs as load_runs,
 )
 from shapegcode.timing.cycle_time import cycle_time as cycle_time
 from shapegcode.timing.plots import plot_time as plot_time

@@ -19,13 +19,17 @@ import shapegcode as sg
 from command import run
 from judge.characterization import controllers, fill_in_logs, fill_in_times, write_csv
 from judge.controller_simulator import Hidden, play, servo_log
-from shapegcode.characterization.facts import ControllerFact
-from shapegcode.characterization.log import parse_units, read_log
-from shapegcode.characterization.plan import AirBox, Part
-from shapegcode.characterization.programs import program_text
-from shapegcode.characterization.sheet import read_sheet
-from shapegcode.characterization.tests import make_tests
-from shapegcode.characterization.timing import ControllerTiming, part_time_s, program_time_s
+from shapegcode.characterization.air_tests import (
+    AirBox,
+    ControllerTiming,
+    Part,
+    make_tests,
+    part_time_s,
+    program_time_s,
+)
+from shapegcode.characterization.programs import program_text, read_sheet
+from shapegcode.characterization.result import ControllerFact
+from shapegcode.io.servo_log import parse_units, read_log
 from shapegcode.model.controller import controller_model
 from shapegcode.results.json import schema
 

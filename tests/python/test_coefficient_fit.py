@@ -13,9 +13,7 @@ import cut_reference as reference
 from shapegcode._core import ArgumentError
 from shapegcode.testcut.coefficient_fit import CoefficientFit, fit_coefficients
 from shapegcode.testcut.cut import COEFFICIENTS, CuttingLaw, CutTool
-from shapegcode.testcut.engagement import Engagement, straight_engagement
-from shapegcode.testcut.force import ForceLaw, mean_chip_mm
-from shapegcode.testcut.mean_forces import MeanForces
+from shapegcode.testcut.forces import Engagement, ForceLaw, MeanForces, mean_chip_mm, straight_engagement
 
 Array = npt.NDArray[np.float64]
 

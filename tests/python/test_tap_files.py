@@ -16,13 +16,13 @@ import pyuff
 from hypothesis import given, strategies as st
 from scipy.io import wavfile
 
-from shapegcode.characterization.log import read_log
 from shapegcode.errors import RecordError
 from shapegcode.identification.identify import identify
 from shapegcode.io.columns import tap_label
 from shapegcode.io.read import ReadOptions, read_records
 from shapegcode.io.record import FloatArray, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
+from shapegcode.io.servo_log import read_log
 from shapegcode.io.units import find_unit
 from shapegcode.testcut.record import read_forces
 from tap_truth import TrueMode, acceleration

@@ -32,7 +32,7 @@ PARTS = {
     "comparison": "Two programs compared",
     "metrology": "Virtual metrology",
     "shaping": "Shapers",
-    "identification": "Modes from taps",
+    "identification": "Modes from taps, position loops from logs",
     "characterization": "Controllers from tests and logs",
     "feed": "Feeds by force",
     "cutting": "Tool, stock, materials",

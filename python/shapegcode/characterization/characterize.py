@@ -8,42 +8,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from shapegcode.characterization.facts import CUTTING_SUM, ControllerFact, combine, mean
-from shapegcode.characterization.log import parse_units, read_log
-from shapegcode.characterization.logfit import fit_logs
-from shapegcode.characterization.result import Characterisation
-from shapegcode.characterization.sheet import SHEET, FilledSheet, read_sheet
+from shapegcode.characterization.log_fit import fit_logs
+from shapegcode.characterization.programs import SHEET, FilledSheet, read_sheet
+from shapegcode.characterization.result import CUTTING_SUM, Characterisation, ControllerFact, combine, mean
 from shapegcode.characterization.stopwatch import fit_stopwatch
 from shapegcode.errors import ArgumentError
+from shapegcode.io.servo_log import parse_units, read_log
 from shapegcode.machine import Machine
 
-__all__ = ["characterize"]
-
+_CUTTING = ("cutting acceleration shape", "cutting time constant", "cutting bell time", CUTTING_SUM)
+_OF_AXES = ("in-position time", "rapid time constant", "rapid bell time", "position gain", "feed-forward")
 _ORDER = (
-    "interpolation period",
-    "block end",
-    "block time",
-    "cutting acceleration shape",
-    "cutting time constant",
-    "cutting bell time",
-    CUTTING_SUM,
-    *(
-        f"{what} {axis}"
-        for what in ("in-position time", "rapid time constant", "rapid bell time", "position gain", "feed-forward")
-        for axis in "XYZ"
-    ),
+    *("interpolation period", "block end", "block time", *_CUTTING),
+    *(f"{what} {axis}" for what in _OF_AXES for axis in "XYZ"),
 )
-_SHAPES = {"linear": "linear", "bell": "linear", "linear or bell": "linear", "exponential": "exponential"}
-_NOT_SEEN = ControllerFact(
-    "motion",
-    None,
-    None,
-    None,
-    "",
-    "",
-    "",
-    "straight moves between stops look the same with and without look-ahead: a setting, not a finding",
-)
+_SHAPES = {"bell": "linear", "linear or bell": "linear"}  # in the machine file
+_SAME = "straight moves between stops look the same with and without look-ahead: a setting, not a finding"
+_NOT_SEEN = ControllerFact("motion", None, None, None, "", "", "", _SAME)
 
 
 def characterize(
@@ -91,7 +72,7 @@ def characterize(
     fitted, remarks = _fitted(machine, facts)
     return Characterisation(
         machine=machine.name,
-        findings=tuple(replace(each, assumed=_assumed(machine, each)) for each in facts),
+        findings=tuple(replace(each, assumed=_assumed(machine, each.key)) for each in facts),
         files=(sheet.file, *(str(path) for path in sheet.logs.values())),
         fitted=fitted,
         remarks=remarks,
@@ -116,24 +97,20 @@ def _sheet(source: Path) -> FilledSheet:
     return replace(sheet, times_s={}, logs={name: source})
 
 
-def _assumed(machine: Machine, fact: ControllerFact) -> float | str | None:
-    """What the machine file has for a fact; None where it has no key for it."""
+def _assumed(machine: Machine, key: str) -> float | str | None:
+    """What the machine file has for a key; None where it has none."""
     place: Any = machine
-    for name in fact.key.split(".") if fact.key else []:
+    for name in key.split("."):
         inner = getattr(place, name, None)
         if inner is None:  # one value for all axes
-            return place if isinstance(place, int | float) else None
+            break
         place = inner
     return place if isinstance(place, int | float | str) else None
 
 
 def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine, dict[str, str]]:
-    """The machine with everything that is known, and a remark for each key that was set.
-
-    Raises:
-        MachineError: the values do not go with others of the machine file.
-    """
-    data = machine.model_dump(exclude_none=True)
+    """The machine with everything that is known, and a remark for each key that was set."""
+    values: dict[str, object] = {}
     remarks: dict[str, str] = {}
     for_all: dict[str, list[ControllerFact]] = defaultdict(list)
     split = any(each.quantity == "cutting time constant" and each.value is not None for each in facts)
@@ -141,41 +118,25 @@ def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine,
         if fact.value is None or not fact.key or (fact.quantity == CUTTING_SUM and split):
             continue
         head, _, last = fact.key.rpartition(".")
-        table = _table(data, head)
-        if not isinstance(table, dict):
+        of_axis = last in ("x", "y", "z")
+        if of_axis and _assumed(machine, head) is not None:
             for_all[head].append(fact)
             continue
-        table[last] = _value(data, fact)
-        key = head if last in ("x", "y", "z") else fact.key
-        text = f"{last} " if key == head else ""
+        values[fact.key] = (
+            round(fact.value, 7) if isinstance(fact.value, float) else _SHAPES.get(fact.value, fact.value)
+        )
+        if fact.quantity == CUTTING_SUM and isinstance(fact.value, float):
+            # The sum of both times leaves the file its bell time where that fits.
+            bell = machine.controller.bell_time_s if machine.controller.bell_time_s < fact.value else 0.0
+            values |= {"controller.bell_time_s": bell, fact.key: round(fact.value - bell, 7)}
+        key, text = (head, f"{last} ") if of_axis else (fact.key, "")
         text += f"{fact.low:.6g} ... {fact.high:.6g}" if fact.low is not None else "fitted"
         remarks[key] = f"{remarks[key]}, {text}" if key in remarks else f"measured ({fact.source}): {text}"
     for key, several in for_all.items():
         # One value for all axes in the file: their mean.
         halves = [((each.high or 0.0) - (each.low or 0.0)) / 2.0 + 1e-6 for each in several]
         centre, half = mean([float(each.value or 0.0) for each in several], halves)
-        head, _, last = key.rpartition(".")
-        _table(data, head)[last] = round(centre, 7)
+        values[key] = round(centre, 7)
         remarks[key] = f"measured ({several[0].source}), mean of the axes: ± {half:.2g}"
-    fitted = Machine.from_data(data, "the machine with the fitted values")
+    fitted = machine.with_values(values, source="the machine with the fitted values")
     return fitted.with_remarks(machine.all_remarks() | remarks), remarks
-
-
-def _table(data: dict[str, Any], dotted: str) -> Any:
-    """What stands under a dotted key."""
-    place: Any = data
-    for name in dotted.split("."):
-        place = place[name]
-    return place
-
-
-def _value(data: dict[str, Any], fact: ControllerFact) -> float | str | None:
-    """A fact as the machine file states it; the sum of both times leaves the file its bell time where that fits."""
-    if not isinstance(fact.value, float):
-        return _SHAPES.get(fact.value, fact.value) if isinstance(fact.value, str) else fact.value
-    value = fact.value
-    if fact.quantity == CUTTING_SUM:
-        bell = float(data["controller"]["bell_time_s"])
-        data["controller"]["bell_time_s"] = bell if bell < value else 0.0
-        value -= bell if bell < value else 0.0
-    return round(value, 7)

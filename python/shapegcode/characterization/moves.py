@@ -1,4 +1,4 @@
-"""Single moves in a servo log: where they are, when they pass their middle, what shape they have.
+"""Single moves in a servo log: when the command changes, where the moves are, what shape they have.
 
 A move that starts and ends at rest is a rectangle of speed, smoothed. Its way is a sum of powers of time for moving
 averages, and a closed form for an exponential; time constants come from fitting that to all moves of a part at once.
@@ -14,22 +14,98 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.characterization.hold import ticks
-from shapegcode.characterization.log import ServoLog
-from shapegcode.characterization.plan import AXES, AirTest, Part
+from shapegcode.characterization.air_tests import AXES, AirTest, Part
 from shapegcode.errors import ArgumentError
-
-__all__ = [
-    "PartLog",
-    "ShapeFit",
-    "fit_shape",
-    "lagged_share",
-    "line_slope",
-    "parts_of",
-    "smoothed_share",
-]
+from shapegcode.io.servo_log import ServoLog
 
 Array = npt.NDArray[np.float64]
+_HOLD_SHARE = 0.9
+_BEND_SHARE = 0.85
+_LONGEST_HOLD = 64
+
+
+def held_samples(log: ServoLog) -> tuple[int, int]:
+    """Over how many samples the command is held, and the index of a first sample; 1 if it is not held.
+
+    A command that changes only once per interpolation period has all its increments there.
+    """
+    command = np.nan_to_num(log.command_mm)
+    increments = np.diff(command, axis=0)
+    noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
+    increments = np.where(np.abs(increments) > 8.0 * noise, increments, 0.0)
+    energy = (increments**2).sum(axis=1)
+    total = float(energy.sum())
+    best = (1, 0)
+    if total > 0.0:
+        for count in range(2, _LONGEST_HOLD + 1):
+            sums = np.array([energy[first::count].sum() for first in range(count)])
+            first = int(sums.argmax())
+            if sums[first] > _HOLD_SHARE * total:
+                best = (count, (first + 1) % count)
+    return best
+
+
+@dataclass(frozen=True)
+class _Bends:
+    """How much of the bending of a command lies at every count-th sample and its successor."""
+
+    share: float  # of all bending
+    first: int  # index of such a sample
+    place: float  # of the bend between the two samples, 0 to 1
+    energy: float  # all bending above the noise
+
+
+def _bends(log: ServoLog, count: int) -> _Bends:
+    command = np.nan_to_num(log.command_mm)
+    bend = np.diff(command, 2, axis=0)
+    energy = (bend**2).sum(axis=1)
+    rest = max(3, round(0.1 / log.sampling_s))
+    energy = energy - energy[:rest].mean()
+    sums = np.array([energy[k::count].sum() for k in range(count)])
+    pairs = sums + np.roll(sums, -1)
+    k = int(pairs.argmax())
+    total = float(sums.sum())
+    one, two = (math.sqrt(max(float(each), 0.0)) for each in (sums[k], np.roll(sums, -1)[k]))
+    share = float(pairs[k]) / total if total > 0.0 else 0.0
+    return _Bends(share, (k + 1) % count, two / (one + two) if one + two > 0.0 else 0.0, max(total, 0.0))
+
+
+def bend_samples(logs: Sequence[ServoLog]) -> int:
+    """After how many samples the speed of a command changes that is interpolated between periods; 1: not seen.
+
+    Only periods of three samples or more can be told, and only where the command is not held.
+    """
+    best = 1
+    for count in range(3, _LONGEST_HOLD // 2):
+        every = [_bends(log, count) for log in logs]
+        total = sum(each.energy for each in every)
+        # A divisor of the true count shows all bends too: the largest counts.
+        if total > 0.0 and sum(each.share * each.energy for each in every) > _BEND_SHARE * total:
+            best = count
+    return best
+
+
+def ticks(log: ServoLog, bend: int) -> tuple[Array, Array]:
+    """Times and positions, one for each interpolation period where that shows."""
+    count, first = held_samples(log)
+    if count == 1 and bend > 1:
+        found = _bends(log, bend)
+        before = np.arange(found.first, len(log.times_s) - 2, bend)
+        before = before[before > 0]
+        times = log.times_s[before] + found.place * log.sampling_s
+        x = log.command_mm
+        # The straight pieces on both sides meet at the bend.
+        left = x[before] + found.place * (x[before] - x[before - 1])
+        right = x[before + 1] - (1.0 - found.place) * (x[before + 2] - x[before + 1])
+        return times, (left + right) / 2.0
+    if count == 1:
+        return log.times_s, log.command_mm
+    n = (len(log.times_s) - first) // count
+    times = log.times_s[first : first + n * count : count]
+    held = log.command_mm[first : first + n * count].reshape(n, count, 3)
+    return times, held.mean(axis=1)
+
+
 _PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
 _SHORTEST_BOX_S = 2e-5
 _STAMP = 0.03
@@ -38,19 +114,12 @@ _MOST_SAMPLES = 1500
 
 @dataclass(frozen=True)
 class PartLog:
-    """The samples of one part.
-
-    Attributes:
-        part: what it does.
-        times_s: time of the samples.
-        way_mm: way of the part's axis from its start, in the direction of the first move.
-        noise_mm: standard deviation of a sample at rest.
-    """
+    """The samples of one part."""
 
     part: Part
     times_s: Array
-    way_mm: Array
-    noise_mm: float
+    way_mm: Array  # way of the part's axis from its start, in the direction of the first move
+    noise_mm: float  # standard deviation of a sample at rest
 
     def middles_s(self) -> Array:
         """The times at which a there-and-back part passes the middle of its way, (n,)."""
@@ -78,19 +147,7 @@ class PartLog:
 
 
 def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
-    """Cut a log into the parts of its test.
-
-    Args:
-        log: the record.
-        test: what the program did.
-        bend: of :func:`bend_samples`, for all logs of the control.
-
-    Returns:
-        The parts in the order of the test.
-
-    Raises:
-        ArgumentError: an axis is missing, or the motion does not have as many parts or moves as the test.
-    """
+    """Cut a log into the parts of its test."""
     wanted = [part for part in test.parts if part.pattern != "pause"]
     for part in wanted:
         if np.isnan(log.command_mm[0, AXES.index(part.axis)]):
@@ -132,9 +189,9 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
     return out
 
 
-def smoothed_share(times: Array, boxes: Sequence[float]) -> Array:
+def smoothed_share(times: Array, boxes: Sequence[float] | Array) -> Array:
     """Share of the way at the times after the start, for a rectangle and moving averages of these lengths in s."""
-    used = [box for box in boxes if box > _SHORTEST_BOX_S]
+    used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power = len(used)
     if not power:
         return np.asarray(np.where(times > 0.0, 1.0, 0.0))
@@ -145,29 +202,24 @@ def smoothed_share(times: Array, boxes: Sequence[float]) -> Array:
     return np.asarray(out / (math.factorial(power) * math.prod(used)))
 
 
-def lagged_share(times: Array, rectangle_s: float, lag_s: float) -> Array:
-    """The same for a rectangle and an exponential of time constant *lag_s*."""
+def lagged_share(times: Array, values: Array) -> Array:
+    """The same for a rectangle and an exponential: duration and time constant in s."""
+    rectangle_s, lag_s = values
 
     def ramp(t: Array) -> Array:
         late = np.maximum(t, 0.0)
         return np.asarray(late + lag_s * np.expm1(-late / lag_s))
 
-    return (ramp(times) - ramp(times - rectangle_s)) / rectangle_s
+    return np.asarray((ramp(times) - ramp(times - rectangle_s)) / rectangle_s)
 
 
 @dataclass(frozen=True)
 class ShapeFit:
-    """A curve fitted to the moves of a part.
+    """A curve fitted to the moves of a part."""
 
-    Attributes:
-        values: the fitted parameters, without the start.
-        half: half-widths of their 95 % intervals.
-        rms_mm: what the fit leaves.
-    """
-
-    values: Array
-    half: Array
-    rms_mm: float
+    values: Array  # the fitted parameters, without the start
+    half: Array  # half-widths of their 95 % intervals
+    rms_mm: float  # what the fit leaves
 
 
 def fit_shape(
@@ -177,27 +229,15 @@ def fit_shape(
     low: Sequence[float],
     high: Sequence[float],
 ) -> ShapeFit:
-    """Fit one curve to all moves of a there-and-back part, laid over each other at their middles.
-
-    Args:
-        log: the part.
-        share: share of the way at times after the start, from parameters in s.
-        guess: the parameters to begin with.
-        low: their lower bounds.
-        high: their upper bounds.
-
-    Returns:
-        The curve, its times in s and how well it fits.
-    """
+    """Fit one curve to all moves of a there-and-back part, laid over each other at their middles."""
     from scipy.optimize import least_squares
 
     middles = log.middles_s()
     length = abs(log.part.length_mm)
     pieces_t, pieces_y = [], []
-    edges = (middles[1:] + middles[:-1]) / 2.0
-    bounds = [log.times_s[0], *edges, log.times_s[-1]]
+    edges = [log.times_s[0], *((middles[1:] + middles[:-1]) / 2.0), log.times_s[-1]]
     for k, middle in enumerate(middles):
-        inside = (log.times_s >= bounds[k]) & (log.times_s <= bounds[k + 1])
+        inside = (log.times_s >= edges[k]) & (log.times_s <= edges[k + 1])
         way = log.way_mm[inside] / length
         pieces_t.append(log.times_s[inside] - middle)
         pieces_y.append(way if k % 2 == 0 else 1.0 - way)
@@ -211,19 +251,12 @@ def fit_shape(
     grid = np.linspace(0.0, 2.0, 20001)
     middle = float(grid[np.searchsorted(share(grid, np.array(guess)), 0.5)])
     begin = np.array([*guess, -middle])
-    found = least_squares(
-        residual,
-        begin,
-        bounds=(np.array([*low, -2.0]), np.array([*high, 2.0])),
-        x_scale=np.maximum(np.abs(begin), 1e-3),
-        max_nfev=60,
-    )
+    bounds = (np.array([*low, -2.0]), np.array([*high, 2.0]))
+    found = least_squares(residual, begin, bounds=bounds, x_scale=np.maximum(np.abs(begin), 1e-3), max_nfev=60)
     n = len(guess)
-    freedom = max(1, len(t) - len(begin))
-    variance = float(found.fun @ found.fun) / freedom
+    variance = float(found.fun @ found.fun) / max(1, len(t) - len(begin))
     jacobian = np.asarray(found.jac)
-    normal = jacobian.T @ jacobian
-    covariance = variance * np.linalg.pinv(normal)
+    covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
     # Time stamps are no better than a part of the sampling time, however many samples agree.
     stamp = _STAMP * float(np.median(np.diff(log.times_s)))
     half = np.hypot(1.96 * np.sqrt(np.maximum(np.diag(covariance)[:n], 0.0)), stamp)
@@ -231,15 +264,7 @@ def fit_shape(
 
 
 def line_slope(log: PartLog, settle_s: float) -> tuple[float, float] | None:
-    """Mean speed in mm/s of the way out, and its 95 % half-width; None if too little of it is steady.
-
-    Args:
-        log: the part.
-        settle_s: how long the smoothing lasts; so much is left out at both ends.
-
-    Returns:
-        Speed and half-width in mm/s, or None.
-    """
+    """Mean speed in mm/s of the way out, and its 95 % half-width; None if too little of it is steady."""
     top = int(np.argmax(log.way_mm))
     begin = int(np.argmax(log.way_mm > max(8.0 * log.noise_mm, 0.003)))
     first, last = log.times_s[begin] + settle_s, log.times_s[top] - settle_s

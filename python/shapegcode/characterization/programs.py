@@ -1,25 +1,37 @@
-"""The tests as FANUC programs that any control can run from memory or by DNC, with what the operator needs."""
+"""The tests as FANUC programs, what the operator needs, and ``RESULTS.toml``: written here, read for the fit."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from shapegcode.characterization.plan import AXES, AirBox, AirTest, steps
+from pydantic import Field, model_validator
+
+from shapegcode.characterization.air_tests import (
+    AXES,
+    AirBox,
+    AirTest,
+    ControllerTiming,
+    Kind,
+    Part,
+    Pattern,
+    make_tests,
+    program_time_s,
+    steps,
+)
 from shapegcode.characterization.result import CharacterisationTests, WrittenTest
-from shapegcode.characterization.sheet import SHEET, sheet_text
-from shapegcode.characterization.tests import make_tests
-from shapegcode.characterization.timing import ControllerTiming, program_time_s
-from shapegcode.errors import ArgumentError
+from shapegcode.errors import ArgumentError, FileError, Problem
 from shapegcode.io.atomic import write_text
+from shapegcode.settings.keys import Count, Float, InlineTable, Positive, Text, TomlTable, key
+from shapegcode.settings.load import parsed, read_text, validated
+from shapegcode.settings.problems import KeyProblem, line_of
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
-
-__all__ = ["program_text", "readme_text", "write_characterization_tests"]
 
 _HEADER = "G21 G17 G91 G94 G64"
 
@@ -64,17 +76,8 @@ def write_characterization_tests(
 
 
 def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
-    """The program of a test: incremental, no spindle, no reference point, no tool change, written out.
-
-    Args:
-        test: what to do.
-        box: said in the header.
-        machine: for the least increment and the expected time.
-
-    Returns:
-        The program.
-    """
-    step = machine.controller.least_increment_mm
+    """The program of a test: incremental, no spindle, no reference point, no tool change, written out."""
+    decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
     shared = test.name.startswith("override")  # one program, run at several overrides
     title = "OVERRIDE" if shared else test.name.upper().replace("_", "-")
     seconds = program_time_s(replace(test, override_percent=100), ControllerTiming.of(machine))
@@ -97,12 +100,12 @@ def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
             if block.length_mm == 0.0:
                 lines.append(f"G04 P{round(block.dwell_s * 1000.0)}")
                 continue
-            word = _word(part.axis, block.length_mm, step)
+            word = _word(part.axis, block.length_mm, decimals)
             now = ("G00" if part.pattern == "rapid" else "G01", block.feed_mm_per_min)
             if mode is None or now[0] != mode[0]:
                 word = f"{now[0]} {word}"
             if now[0] == "G01" and (mode is None or now[1] != mode[1]):
-                word = f"{word} {_feed(block.feed_mm_per_min)}"
+                word = f"{word} {_word('F', block.feed_mm_per_min, 1)}"
             mode = now
             lines.append(word)
         if part.pattern == "exact":
@@ -111,31 +114,15 @@ def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _number(value: float, decimals: int) -> str:
+def _word(address: str, value: float, decimals: int) -> str:
+    """A word with a decimal point and no zero before it."""
     text = f"{value:.{decimals}f}".rstrip("0")
-    return text.replace("-0.", "-.") if text.startswith("-0.") and text != "-0." else text.removeprefix("0")
-
-
-def _word(address: str, value: float, step: float) -> str:
-    decimals = max(0, round(-math.log10(step)))
-    return f"{address}{_number(value, max(decimals, 1))}"
-
-
-def _feed(value: float) -> str:
-    return f"F{value:.1f}".rstrip("0")
+    text = text.replace("-0.", "-.") if text.startswith("-0.") and text != "-0." else text.removeprefix("0")
+    return f"{address}{text}"
 
 
 def readme_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
-    """Instructions for the operator.
-
-    Args:
-        tests: what was written.
-        machine: for the expected times.
-        box: where the tests move.
-
-    Returns:
-        The text in Markdown.
-    """
+    """Instructions for the operator."""
     timing = ControllerTiming.of(machine)
     watch = [test for test in tests if test.kind == "stopwatch"]
     logs = [test for test in tests if test.kind == "log"]
@@ -183,3 +170,126 @@ def readme_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
         "",
     ]
     return "\n".join(text)
+
+
+SHEET = "RESULTS.toml"
+"""Name of the file."""
+
+_Whole = Annotated[Count, Field(ge=1, le=1_000_000)]
+_Length = Annotated[Float, Field(ge=-1e5, le=1e5)]
+_Feed = Annotated[Float, Field(ge=0, le=1e6)]
+_Dwell = Annotated[Float, Field(ge=0, le=1e4)]
+_Time = Annotated[Positive, Field(lt=86_400)]
+_PROGRAM = r"O(\d{1,8})\.nc$"
+
+
+class _PartTable(InlineTable):
+    """What a part does, as `plan.Part`."""
+
+    pattern: Pattern = key("kind of move")
+    axis: Literal["X", "Y", "Z"] = key("of the moves", default="X")
+    count: _Whole = key("number of moves", default=1)
+    length_mm: _Length = key("of a move", unit="mm", default=0.0)
+    feed_mm_per_min: _Feed = key("cutting feed, or the rapid rate", unit="mm/min", default=0.0)
+    stride: _Whole = key("moves in one direction", default=1)
+    dwell_s: _Dwell = key("after each move, or the pause", unit="s", default=0.0)
+
+    @model_validator(mode="after")
+    def _moves(self) -> _PartTable:
+        for name in ("length_mm", "feed_mm_per_min"):
+            if self.pattern != "pause" and getattr(self, name) == 0.0:
+                raise KeyProblem(name, 0.0, "must not be 0 where something moves")
+        return self
+
+
+class _TestTable(TomlTable):
+    """One test."""
+
+    program: Annotated[Text, Field(pattern=_PROGRAM)] = key("name of its file, such as O7001.nc")
+    override_percent: Annotated[Count, Field(ge=1, le=254)] = key("feed override", unit="%", default=100)
+    times_s: tuple[_Time, ...] = key("stopwatch times", unit="s", default=())
+    log: Text | None = key("file of the servo log", default=None)
+    parts: Annotated[tuple[_PartTable, ...], Field(min_length=1)] = key("what the program does")
+
+
+class _SheetTable(TomlTable):
+    """The file."""
+
+    resolution_s: Annotated[Float, Field(ge=1e-6, le=10)] = key("step of the stopwatch", unit="s", default=0.1)
+    reaction_s: Annotated[Float, Field(ge=0, le=10)] = key("scatter of start and stop", unit="s", default=0.1)
+    tests: Annotated[dict[str, _TestTable], Field(min_length=1)] = key(
+        "as `shapegcode characterize --write` wrote them"
+    )
+
+
+@dataclass(frozen=True)
+class FilledSheet:
+    """What was measured."""
+
+    file: str  # where it was read
+    tests: dict[str, AirTest]  # every test of the file
+    times_s: dict[str, tuple[float, ...]]  # stopwatch times by test; a test without times is left out
+    logs: dict[str, Path]  # servo log by test
+    resolution_s: float  # step of the stopwatch
+    reaction_s: float  # standard deviation of the operator's start and stop together
+    lines: dict[str, int]  # line of each test in the file
+
+
+def read_sheet(path: Path) -> FilledSheet:
+    """Read ``RESULTS.toml``; a log test without a name takes ``<test>.csv`` beside the file, if it is there."""
+    text = read_text(path, FileError)
+    sheet = validated(_SheetTable, parsed(text, str(path), FileError), str(path), text, FileError)
+    logs: dict[str, Path] = {}
+    tests: dict[str, AirTest] = {}
+    for name, test in sheet.tests.items():
+        kind: Kind = "stopwatch" if test.log is None else "log"
+        parts = tuple(Part(**part.model_dump()) for part in test.parts)
+        tests[name] = AirTest(name, int(test.program[1:-3]), kind, "", parts, test.override_percent)
+        if test.log is None:
+            continue
+        file = path.parent / (test.log or f"{name}.csv")
+        if file.is_file():
+            logs[name] = file
+        elif test.log:
+            place = f"tests.{name}.log"
+            raise FileError(str(path), (Problem(place, test.log, f"no such file: {file}", line_of(place, text)),))
+    return FilledSheet(
+        file=str(path),
+        tests=tests,
+        times_s={name: test.times_s for name, test in sheet.tests.items() if test.times_s},
+        logs=logs,
+        resolution_s=sheet.resolution_s,
+        reaction_s=sheet.reaction_s,
+        lines={name: line_of(f"tests.{name}", text) or 1 for name in sheet.tests},
+    )
+
+
+def sheet_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
+    """The file to fill in."""
+    timing = ControllerTiming.of(machine)
+    lines = [
+        f"# Results of the characterization tests of {machine.name}; box from the start point, mm: {box}",
+        "# Fill in times_s (one or more times in s, from cycle start to the end of the program), or put the servo log",
+        "# of a log test beside this file and name it. Tests that were not run stay empty. Leave parts as they are.",
+        "",
+        "resolution_s = 0.1  # step of the stopwatch",
+        "reaction_s = 0.1  # scatter (standard deviation) of starting and stopping by hand; 0 if read off the control",
+        "",
+    ]
+    for test in tests:
+        lines.append(f"[tests.{test.name}]  # {test.purpose.lower()}")
+        lines.append(f'program = "{test.program}"')
+        if test.kind == "stopwatch":
+            lines.append(f"override_percent = {test.override_percent}")
+            lines.append(f"times_s = []  # expected: about {program_time_s(test, timing):.1f} s")
+        else:
+            lines.append(f'log = ""  # for example "{test.name}.csv"; about {program_time_s(test, timing):.0f} s')
+        lines.append("parts = [")
+        for part in test.parts:
+            values = [
+                f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {round(value, 9)!r}"
+                for name, value in dataclasses.asdict(part).items()
+            ]
+            lines.append(f"  {{ {', '.join(values)} }},")
+        lines += ["]", ""]
+    return "\n".join(lines)

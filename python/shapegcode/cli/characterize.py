@@ -107,9 +107,9 @@ def _check_options(args: argparse.Namespace) -> None:
 
 
 def _runs(args: argparse.Namespace, machine: Machine) -> int:
-    from shapegcode.characterization.clock.learn import learn_clock
-    from shapegcode.characterization.runs_file import load_runs
     from shapegcode.cli import runner
+    from shapegcode.timing.calibration.calibrate import learn_clock
+    from shapegcode.timing.calibration.runs_file import load_runs
 
     file = load_runs(args.runs)
     read = [str(path) for entry in file.entries for path in (entry.program, *entry.logs)]
@@ -121,8 +121,8 @@ def _runs(args: argparse.Namespace, machine: Machine) -> int:
 
 
 def _servo(args: argparse.Namespace, machine: Machine) -> int:
-    from shapegcode.characterization.servo.fit import fit_servo
     from shapegcode.cli import runner
+    from shapegcode.identification.servo.fit import fit_servo
 
     with runner.progress(f"fitting {args.servo}", args) as bar:
         found = fit_servo(

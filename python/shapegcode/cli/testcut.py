@@ -10,8 +10,8 @@ from shapegcode.cli.options import add_machine_argument, add_plots_argument, add
 from shapegcode.cli.typed import positive, program_number
 
 if TYPE_CHECKING:
-    from shapegcode.testcut.conditions import CornerShape, CutConditions
-    from shapegcode.testcut.design_result import CutDesign
+    from shapegcode.testcut.design import CornerShape, CutConditions
+    from shapegcode.testcut.result import CutDesign
 
 __all__ = ["add_arguments", "run"]
 
@@ -127,33 +127,33 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _taper(args: argparse.Namespace) -> int:
-    from shapegcode.testcut.cuts import taper_cut
+    from shapegcode.testcut.design import taper_cut
 
     feeds = args.feeds if len(args.feeds) > 1 else None
     return _written(args, taper_cut(_conditions(args, args.feeds[0]), feeds, args.radial_depth, args.length))
 
 
 def _corner(args: argparse.Namespace) -> int:
-    from shapegcode.testcut.cuts import corner_cut
+    from shapegcode.testcut.design import corner_cut
 
     return _written(args, corner_cut(_conditions(args, args.feed), _shape(args), args.interval))
 
 
 def _interval(args: argparse.Namespace) -> int:
-    from shapegcode.testcut.cuts import interval_cut
+    from shapegcode.testcut.design import interval_cut
 
     return _written(args, interval_cut(_conditions(args, args.feed), _shape(args), args.intervals, args.feeds))
 
 
 def _conditions(args: argparse.Namespace, feed: float) -> CutConditions:
     from shapegcode.cutting.tool import Tool
-    from shapegcode.testcut.conditions import CutConditions
+    from shapegcode.testcut.design import CutConditions
 
     return CutConditions(load_machine(args), Tool.load(args.tool), feed, args.axial_depth, args.spindle, args.up)
 
 
 def _shape(args: argparse.Namespace) -> CornerShape:
-    from shapegcode.testcut.conditions import CornerShape
+    from shapegcode.testcut.design import CornerShape
 
     return CornerShape(args.allowance, args.rough_radius, args.finish_radius)
 

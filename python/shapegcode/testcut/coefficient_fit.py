@@ -15,10 +15,7 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 from shapegcode.testcut.cut import COEFFICIENTS, CuttingLaw, CutTool
-from shapegcode.testcut.mean_forces import ForceModel, MeanForces, Thickness, chips_mm
-from shapegcode.testcut.noise import neighbour_correlation, noise_of
-
-__all__ = ["Coefficient", "CoefficientFit", "fit_coefficients"]
+from shapegcode.testcut.forces import ForceModel, MeanForces, Thickness, chips_mm
 
 Array = npt.NDArray[np.float64]
 
@@ -59,31 +56,19 @@ class Coefficient:
 
 @dataclass(frozen=True, eq=False)
 class CoefficientFit:
-    """What a fit found.
+    """What a fit found."""
 
-    Attributes:
-        coefficients: in the order of ``[cutting]``.
-        thickness: "mean" or "local": to which chip thickness they belong.
-        middle_chip_mm: geometric mean of the mean chip thicknesses.
-        at_chip: k1 in N/mm² and k2 there: much better known than the factors, which are those of a chip of 1 mm.
-        chip_mm: (n,) mean chip thickness of each row.
-        predicted_n: (n, 2) mean force of the fit.
-        outlier: (n,) rows that were left out, as their force is not that of the others.
-        rms_n: (2,) root mean square of what the fit leaves of the others, along the feed and to its left.
-        rms_percent: the same, of both, as a share of the resultant.
-        correlation: how far neighbours share what the fit leaves, 0 to 1; the intervals allow for it.
-    """
-
-    coefficients: tuple[Coefficient, ...]
-    thickness: Thickness
-    middle_chip_mm: float
+    coefficients: tuple[Coefficient, ...]  # in the order of `[cutting]`
+    thickness: Thickness  # "mean" or "local": to which chip thickness they belong
+    middle_chip_mm: float  # geometric mean of the mean chip thicknesses
+    # k1 in N/mm² and k2 there: much better known than the factors, which are those of a chip of 1 mm
     at_chip: tuple[Coefficient, ...]
-    chip_mm: Array
-    predicted_n: Array
-    outlier: npt.NDArray[np.bool_]
-    rms_n: Array
-    rms_percent: float
-    correlation: float
+    chip_mm: Array  # (n,) mean chip thickness of each row
+    predicted_n: Array  # (n, 2) mean force of the fit
+    outlier: npt.NDArray[np.bool_]  # (n,) rows that were left out, as their force is not that of the others
+    rms_n: Array  # (2,) root mean square of what the fit leaves of the others, along the feed and to its left
+    rms_percent: float  # the same, of both, as a share of the resultant
+    correlation: float  # how far neighbours share what the fit leaves, 0 to 1; the intervals allow for it
 
     @property
     def law(self) -> CuttingLaw:
@@ -94,21 +79,7 @@ class CoefficientFit:
 def fit_coefficients(
     data: MeanForces, tool: CutTool, axial_depth_mm: float, *, thickness: Thickness = "mean", edge: bool = False
 ) -> CoefficientFit:
-    """Fit k1(t) and k2(t), and if asked the edge forces.
-
-    Args:
-        data: mean forces; at several radial depths or feeds.
-        tool: the end mill.
-        axial_depth_mm: of all of them.
-        thickness: the chip thickness that the power laws are of, "mean" of the engagement or "local".
-        edge: with edge forces.
-
-    Returns:
-        The coefficients with their intervals, in N and mm.
-
-    Raises:
-        ArgumentError: too few forces, chips too alike to tell the exponents, forces that no cut gives (sign or axes).
-    """
+    """Fit k1(t) and k2(t), and if asked the edge forces."""
     count = 6 if edge else 4
     chip = chips_mm(tool, axial_depth_mm, data)
     _check(data, chip, count, edge)
@@ -285,3 +256,51 @@ def _with_intervals(
         best, low, high = (math.exp(each) for each in ends) if factor else ends
         found.append(Coefficient(name, best, low, high, unit))
     return tuple(found)
+
+
+_MEDIAN = 0.4549
+_LARGEST_CORRELATION = 0.95
+
+
+def noise_of(left: Array, predicted: Array, revolutions: Array, robust: Array) -> Array:
+    """Standard deviation of each value: a constant and a share of the value, as the residuals show them."""
+    found = np.empty_like(left)
+    many = revolutions / float(np.mean(revolutions))
+    for k in range(left.shape[1]):
+        square = predicted[:, k] ** 2
+        columns = np.column_stack([np.ones(len(square)), square])
+        weight = np.ones(len(square))
+        level = np.full(len(square), float(np.mean((robust[:, k] * left[:, k]) ** 2)))
+        observed = robust[:, k] * left[:, k] ** 2 * many
+        for _ in range(4):
+            weight = 1.0 / np.maximum(level, 1e-300)
+            constant, share = _not_negative(columns * weight[:, None], observed * weight)
+            level = constant + share * square
+            level = np.maximum(level, 1e-4 * float(level.max()) + 1e-300)
+        # The median is not moved by outliers; of squares of a normal variable it is _MEDIAN of the mean.
+        level *= float(np.median(left[:, k] ** 2 * many / level)) / _MEDIAN
+        found[:, k] = np.sqrt(level / many)
+    return found
+
+
+def _not_negative(matrix: Array, right: Array) -> tuple[float, float]:
+    """Least squares with two unknowns, none below 0."""
+    both, *_ = np.linalg.lstsq(matrix, right, rcond=None)
+    if both.min() >= 0.0:
+        return float(both[0]), float(both[1])
+    alone = [max(float(column @ right) / float(column @ column), 0.0) for column in matrix.T]
+    errors = [float(np.sum((right - value * column) ** 2)) for value, column in zip(alone, matrix.T, strict=True)]
+    return (alone[0], 0.0) if errors[0] <= errors[1] else (0.0, alone[1])
+
+
+def neighbour_correlation(scaled: Array, group: npt.NDArray[np.intp], outlier: npt.NDArray[np.bool_]) -> float:
+    """Correlation of neighbours within each group, of what the fit leaves; not below 0."""
+    pairs = (group[1:] == group[:-1]) & ~outlier[1:] & ~outlier[:-1]
+    if pairs.sum() < 8:
+        return 0.0
+    product = float(np.mean(scaled[1:][pairs] * scaled[:-1][pairs]))
+    square = float(np.mean(scaled[~outlier] ** 2))
+    # By chance alone it is up to twice this.
+    chance = 2.0 / math.sqrt(2.0 * pairs.sum())
+    found = product / max(square, 1e-300)
+    return min(found, _LARGEST_CORRELATION) if found > chance else 0.0

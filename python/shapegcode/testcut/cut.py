@@ -18,22 +18,9 @@ from shapegcode import _core
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import DataFile
 
-__all__ = [
-    "COEFFICIENTS",
-    "CornerDetails",
-    "CutTool",
-    "CuttingLaw",
-    "DeeperStretch",
-    "Deepest",
-    "IntervalDetails",
-    "MeasuringPass",
-    "TaperDetails",
-    "TestCut",
-    "read_test_cut",
-]
-
 Array = npt.NDArray[np.float64]
 _FORMAT = "shapegcode test cut 1"
+_Kind = Literal["taper", "corner", "interval"]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -247,7 +234,7 @@ class TestCut:
 
     __test__ = False  # not for pytest, whatever its name
 
-    kind: Literal["taper", "corner", "interval"]
+    kind: _Kind
     program: str
     machine: str
     tool: CutTool
@@ -267,7 +254,7 @@ class TestCut:
         return {"format": _FORMAT, **asdict(self)}
 
 
-_FIGURES = {"taper": TaperDetails, "corner": CornerDetails, "interval": IntervalDetails}
+FIGURES: dict[_Kind, type] = {"taper": TaperDetails, "corner": CornerDetails, "interval": IntervalDetails}
 
 
 def read_test_cut(path: str | Path) -> TestCut:
@@ -296,7 +283,7 @@ def read_test_cut(path: str | Path) -> TestCut:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))
         raise ArgumentError(f"{path}: {place}: {first['msg']}: write the test cut again") from error
-    if type(cut.about) is not _FIGURES[cut.kind]:
+    if type(cut.about) is not FIGURES[cut.kind]:
         raise ArgumentError(f"{path}: the figures in 'about' are not those of a {cut.kind}: write the test cut again")
     for number, each in enumerate(cut.passes, start=1):
         if not each.consistent:

@@ -14,8 +14,6 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 
-__all__ = ["Edge", "left_edge", "on_increments", "reduced", "tool_path", "unrolled_edge"]
-
 Array = npt.NDArray[np.float64]
 
 _GRID_MM = 0.004
@@ -25,15 +23,10 @@ _MOVED = 9  # increments
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """A line of points, ascending in X; straight between them, and beyond the ends on as at the ends.
+    """A line of points, ascending in X; straight between them, and beyond the ends on as at the ends."""
 
-    Attributes:
-        x_mm: (n,) at least 2.
-        height_mm: (n,).
-    """
-
-    x_mm: Array
-    height_mm: Array
+    x_mm: Array  # (n,) at least 2
+    height_mm: Array  # (n,)
 
     def at(self, x_mm: Array) -> Array:
         """Height at each X."""
@@ -52,19 +45,6 @@ def unrolled_edge(s_mm: Array, radial_depth_mm: Array, radius_mm: float, stock_m
 
     Where the axis stands at X, the front of the tool comes out of the edge at X + sqrt(R² - (R - depth)²), as high
     above the wall as the depth: these points are the edge.
-
-    Args:
-        s_mm: (n,) ascending distances along the other path.
-        radial_depth_mm: (n,) its radial depth there; above 0 and below the radius.
-        radius_mm: of the tool, R.
-        stock_mm: length of the stock, from X = 0 on.
-        at_mm: X at which the distance is 0.
-
-    Returns:
-        Points of the edge, mm.
-
-    Raises:
-        ArgumentError: the depth reaches the radius, or falls faster than a straight pass can.
     """
     depth = radial_depth_mm
     if depth.max() >= radius_mm:
@@ -84,17 +64,7 @@ def unrolled_edge(s_mm: Array, radial_depth_mm: Array, radius_mm: float, stock_m
 
 
 def tool_path(edge: Edge, radius_mm: float, start_mm: float, end_mm: float) -> Edge:
-    """The line of the tool's axis that mills an edge without cutting into it, within 0.1 µm of what is possible.
-
-    Args:
-        edge: what must stay lies below it.
-        radius_mm: of the tool.
-        start_mm: X at which the path begins.
-        end_mm: X at which it ends.
-
-    Returns:
-        Points of the line, mm.
-    """
+    """The line of the tool's axis that mills an edge without cutting into it, within 0.1 µm of what is possible."""
     return reduced(_envelope(edge, radius_mm, start_mm, end_mm, 1.0))
 
 
@@ -123,15 +93,7 @@ def _envelope(line: Edge, radius: float, start: float, end: float, side: float) 
 
 
 def on_increments(line: Edge, step_mm: float) -> Edge:
-    """The points of a line moved along it, by a few increments, to where both coordinates are increments, or nearly.
-
-    Args:
-        line: its inner points may move; those at its ends are rounded.
-        step_mm: the least increment.
-
-    Returns:
-        Points of the line, mm.
-    """
+    """The points of a line moved along it, by a few increments, to where both coordinates are increments, or nearly."""
     tried = step_mm * (np.round(line.x_mm / step_mm)[:, None] + np.arange(-_MOVED, _MOVED + 1))
     tried[[0, -1]] = step_mm * np.round(line.x_mm[[0, -1]] / step_mm)[:, None]
     # Neighbours stay apart.

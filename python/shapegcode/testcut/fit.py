@@ -1,20 +1,51 @@
-"""From the records of a test cut's passes to what they tell."""
+"""What the records of a test cut tell: coefficients of a taper, resultant of a corner, interval that is followed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from shapegcode.errors import ArgumentError
-from shapegcode.testcut.corner import fit_corner
-from shapegcode.testcut.cut import TestCut, read_test_cut
-from shapegcode.testcut.interval import fit_interval
-from shapegcode.testcut.mean_forces import Thickness
-from shapegcode.testcut.record import ForceRecord, read_forces
-from shapegcode.testcut.result import CornerResult, IntervalResult, TaperResult
-from shapegcode.testcut.taper import fit_taper
+import numpy as np
+import numpy.typing as npt
 
-__all__ = ["fit_test_cut"]
+from shapegcode.errors import ArgumentError
+from shapegcode.testcut.coefficient_fit import CoefficientFit, fit_coefficients
+from shapegcode.testcut.cut import CuttingLaw, IntervalDetails, MeasuringPass, TestCut, read_test_cut
+from shapegcode.testcut.forces import (
+    Engagement,
+    ForceLaw,
+    MeanForces,
+    Thickness,
+    engagement,
+    expected,
+    fully_engaged,
+    straight_engagement,
+)
+from shapegcode.testcut.record import (
+    MIN_SAMPLES,
+    ForceRecord,
+    PlacedRecord,
+    Revolutions,
+    placed,
+    read_forces,
+    revolutions,
+    turned,
+)
+from shapegcode.testcut.result import (
+    EXPONENT_LIMIT,
+    FACTOR_LIMIT,
+    ChipRange,
+    CornerPass,
+    CornerResult,
+    FollowedPass,
+    ForceRatio,
+    IntervalResult,
+    LeftOut,
+    TaperPass,
+    TaperResult,
+)
 
 _Record = str | Path | ForceRecord
 
@@ -56,5 +87,374 @@ def fit_test_cut(
         for number, record in by_pass.items()
     }
     if known.kind == "taper":
-        return fit_taper(known, measured, thickness=chip_thickness, edge=edge_forces)
-    return fit_corner(known, measured) if known.kind == "corner" else fit_interval(known, measured)
+        return _fit_taper(known, measured, thickness=chip_thickness, edge=edge_forces)
+    return _fit_corner(known, measured) if known.kind == "corner" else _fit_interval(known, measured)
+
+
+Array = npt.NDArray[np.float64]
+
+_BINS_PER_PASS = 60
+_MIN_TURNS = 4
+_ROUNDS = 2
+#: Standard error of the place of the tool, found from entry and exit, in feeds per revolution.
+_PLACE = 0.25
+_PER_MINUTE = 60.0
+
+
+@dataclass(eq=False)
+class _TaperRows:
+    """Mean forces of one file."""
+
+    met: Engagement
+    displaced: Engagement
+    feed: float | Array
+    speed: float
+    force_n: Array
+    torque_nm: Array | None
+    revolutions: float
+
+
+@dataclass
+class _Reduced:
+    """The records of all passes."""
+
+    rows: list[_TaperRows] = field(default_factory=list)
+    passes: list[TaperPass] = field(default_factory=list)
+    left_out: list[LeftOut] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+
+def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: Thickness, edge: bool) -> TaperResult:
+    law = cut.tool.cutting
+    sampled = any(_samples(cut, number, record) >= MIN_SAMPLES for number, record in measured.items())
+    for _ in range(_ROUNDS if sampled else 1):
+        # Where entry and exit lie in the record depends a little on the law.
+        reduced = _reduced(cut, measured, law)
+        data = _joined(reduced.rows)
+        fit = fit_coefficients(data, cut.tool, cut.axial_depth_mm, thickness=thickness, edge=edge)
+        law = fit.law
+    warnings = reduced.warnings
+    if fit.outlier.any():
+        count = int(fit.outlier.sum())
+        warnings = [*warnings, f"{count} of {len(fit.outlier)} mean forces do not fit the others: left out"]
+    return TaperResult(
+        program=cut.program,
+        machine=cut.machine,
+        cutting=fit.law,
+        coefficients=fit.coefficients,
+        at_chip=fit.at_chip,
+        chip_mm=ChipRange(float(fit.chip_mm.min()), float(fit.chip_mm.max()), fit.middle_chip_mm),
+        mean_forces=len(fit.chip_mm),
+        outliers=int(fit.outlier.sum()),
+        rms_n=(float(fit.rms_n[0]), float(fit.rms_n[1])),
+        rms_percent=fit.rms_percent,
+        neighbour_correlation=fit.correlation,
+        passes=tuple(reduced.passes),
+        left_out=tuple(reduced.left_out),
+        poor=tuple(_poor(fit)),
+        warnings=tuple(warnings),
+        cut=cut,
+        fit=fit,
+        data=data,
+    )
+
+
+def _poor(fit: CoefficientFit) -> Iterator[str]:
+    """Coefficients of the power laws that are not known well, in words."""
+    for each in fit.coefficients[:4]:
+        half = 0.5 * (each.high - each.low)
+        if each.name.endswith("exponent"):
+            if half > EXPONENT_LIMIT:
+                yield f"{each.name} is known to +-{half:.3f} only (wanted: +-{EXPONENT_LIMIT:g})"
+        elif half > FACTOR_LIMIT * each.value:
+            share = 100.0 * half / each.value
+            yield f"{each.name} is known to +-{share:.0f} % only (wanted: +-{100 * FACTOR_LIMIT:g} %)"
+
+
+def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
+    """Rows per revolution."""
+    if record.radial_depth_mm is not None:
+        return 0.0
+    turn = _PER_MINUTE / cut.spindle_rev_per_min
+    if record.time_s is not None:
+        return float(turn / np.mean(np.diff(record.time_s)))
+    assert record.position_mm is not None
+    way = float(np.ptp(record.position_mm)) / (len(record) - 1)
+    return cut.passes[number - 1].feed_mm_per_min / cut.spindle_rev_per_min / max(way, 1e-12)
+
+
+def _reduced(cut: TestCut, measured: Mapping[int, ForceRecord], law: CuttingLaw) -> _Reduced:
+    """The records as mean forces: as they are, or of the revolutions in full engagement without chatter."""
+    out = _Reduced()
+    for number, record in measured.items():
+        measuring = cut.passes[number - 1]
+        if _samples(cut, number, record) <= 1.0 + 1e-6:
+            out.rows.append(_of_means(cut, measuring, record))
+            continue
+        found = revolutions(placed(record, cut, measuring, expected(cut, measuring, law)))
+        shown = found.record
+        offset, drift = ((float(along), float(left)) for along, left in (shown.offset_n, shown.drift_n))
+        out.passes.append(TaperPass(shown.file, found.feed_mm_per_min, shown.spindle_rev_per_min, offset, drift))
+        out.warnings += shown.notes
+        out.rows.append(_of_revolutions(cut, measuring, found))
+        marks = np.flatnonzero(np.diff(np.concatenate([[0], found.chatter.astype(int), [0]])))
+        for first, behind in zip(marks[::2], marks[1::2], strict=True):
+            low, high = float(found.x_mm[first]), float(found.x_mm[behind - 1])
+            out.left_out.append(LeftOut(number, low, high))
+            out.warnings.append(
+                f"{shown.file}: X {low:.1f} to {high:.1f} mm left out: the force swings far more there than in the "
+                "rest of the pass (chatter?)"
+            )
+    return out
+
+
+def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> _TaperRows:
+    """Rows that are means already: at the radial depth that the file tells, or at its positions."""
+    if record.radial_depth_mm is not None:
+        depth = record.radial_depth_mm
+        wrong = np.flatnonzero((depth <= 0.0) | (depth >= 2.0 * cut.tool.radius_mm))
+        if wrong.size:
+            raise ArgumentError(
+                f"{record.file}: a radial depth of {depth[wrong[0]]:g} mm: must be above 0 and below the diameter, "
+                f"{cut.tool.diameter_mm:g} mm"
+            )
+        row = np.ones(len(depth), dtype=bool)
+        met = straight_engagement(cut.tool, depth, up=cut.up)
+    else:
+        if record.position_mm is None:
+            raise ArgumentError(
+                f"{record.file}: means over time do not tell where they were taken: needed is position_mm or "
+                "radial_depth_mm"
+            )
+        row = fully_engaged(cut, measuring, record.position_mm)
+        met = engagement(cut.tool, measuring, record.position_mm[row], up=cut.up)
+    feed = measuring.feed_mm_per_min if record.feed_mm_per_min is None else record.feed_mm_per_min[row]
+    torque = None if record.torque_nm is None else np.abs(record.torque_nm[row])
+    return _TaperRows(met, met, feed, cut.spindle_rev_per_min, record.force_n[row], torque, 1.0)
+
+
+def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) -> _TaperRows:
+    """Means over some revolutions each, chatter left out."""
+    margin = 2.0 * found.feed_mm_per_min / found.record.spindle_rev_per_min
+    kept = np.flatnonzero(fully_engaged(cut, measuring, found.x_mm, margin) & ~found.chatter)
+    if kept.size < _MIN_TURNS:
+        raise ArgumentError(f"{found.record.file}: {kept.size} revolutions in full engagement: too few")
+    many = max(1, kept.size // _BINS_PER_PASS)
+    # A bin holds neighbours only: none goes across what was left out.
+    runs = np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1)
+    bins = np.vstack([run[: len(run) // many * many].reshape(-1, many) for run in runs])
+    x = found.x_mm[bins].mean(axis=1)
+    met = engagement(cut.tool, measuring, x, up=cut.up)
+    speed = found.record.spindle_rev_per_min
+    displaced = engagement(cut.tool, measuring, x + _PLACE * found.feed_mm_per_min / speed, up=cut.up)
+    force = found.mean_n[bins].mean(axis=1)
+    torque = None if found.torque_nm is None else found.torque_nm[bins].mean(axis=1)
+    return _TaperRows(met, displaced, found.feed_mm_per_min, speed, force, torque, float(many))
+
+
+def _joined(rows: Sequence[_TaperRows]) -> MeanForces:
+    def repeated(values: Sequence[float | Array]) -> Array:
+        return np.concatenate([np.broadcast_to(v, len(each.force_n)) for v, each in zip(values, rows, strict=True)])
+
+    # A torque that only some of the files have does not help the others.
+    torques = [each.torque_nm for each in rows if each.torque_nm is not None]
+    return MeanForces(
+        Engagement.joined([each.met for each in rows]),
+        repeated([each.feed for each in rows]),
+        repeated([each.speed for each in rows]),
+        np.concatenate([each.force_n for each in rows]),
+        repeated([each.revolutions for each in rows]),
+        np.repeat(np.arange(len(rows)), [len(each.force_n) for each in rows]),
+        Engagement.joined([each.displaced for each in rows]),
+        np.concatenate(torques) if len(torques) == len(rows) else None,
+    )
+
+
+# --- corner: measured against expected resultant (paper 001, figure 7) ------------------------------------------------
+
+_MARGIN_REVS = 4.0
+
+
+def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResult:
+    passes = {number: _pass(cut, number, record) for number, record in measured.items()}
+    first = passes[min(passes)]
+    seen = _inside(cut, first.number, first.record.x_mm) & ~first.record.chatter
+    there = np.interp(first.record.x_mm[seen], first.hoped.x_mm, first.hoped.mean_resultant_n)
+    ratio = None
+    if {1, 2} <= set(passes):
+        before, after = passes[1], passes[2]
+        ratio = ForceRatio(
+            after.measured_mean_n / before.measured_mean_n, after.expected_mean_n / before.expected_mean_n
+        )
+    return CornerResult(
+        program=cut.program,
+        machine=cut.machine,
+        peaks=tuple(passes.values()),
+        ratio=ratio,
+        scale=float(there @ first.record.resultant_n[seen] / (there @ there)),
+        warnings=tuple(note for each in passes.values() for note in each.record.record.notes),
+    )
+
+
+def _pass(cut: TestCut, number: int, record: ForceRecord) -> CornerPass:
+    measuring = cut.passes[number - 1]
+    hoped = expected(cut, measuring)
+    found = revolutions(placed(record, cut, measuring, hoped))
+    seen = _inside(cut, number, found.x_mm) & ~found.chatter
+    far = _inside(cut, number, hoped.x_mm)
+    return CornerPass(
+        number=number,
+        measured_mean_n=float(found.resultant_n[seen].max()),
+        measured_peak_n=float(found.peak_n[seen].max()),
+        expected_mean_n=float(hoped.mean_resultant_n[far].max()),
+        expected_peak_n=float(hoped.peak_resultant_n[far].max()),
+        record=found,
+        hoped=hoped,
+    )
+
+
+def _inside(cut: TestCut, number: int, x_mm: Array) -> npt.NDArray[np.bool_]:
+    measuring = cut.passes[number - 1]
+    margin = _MARGIN_REVS * measuring.feed_mm_per_min / cut.spindle_rev_per_min
+    return fully_engaged(cut, measuring, x_mm, margin)
+
+
+# --- interval test: at which interval the controller follows the commanded feeds --------------------------------------
+
+_DEVIATION_LIMIT = 0.05
+_NOISE_SHARE = 2.0
+_LAGS_S = np.concatenate([[0.0], np.geomspace(2e-3, 0.5, 49)])
+_FEEDS = 40
+
+
+def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> IntervalResult:
+    records = {}
+    for number, record in measured.items():
+        measuring = cut.passes[number - 1]
+        records[number] = placed(record, cut, measuring, expected(cut, measuring))
+    found = sorted((_followed(cut, number, record) for number, record in records.items()), key=lambda p: p.interval_mm)
+    good: float | None = None
+    for each in reversed(found):
+        if not each.ok:
+            break
+        good = each.interval_mm
+    fastest = max(feed for each in cut.passes for _, feed in each.feeds)
+    lag = float(np.median([each.lag_s for each in found]))
+    return IntervalResult(
+        program=cut.program,
+        machine=cut.machine,
+        interval_mm=good,
+        lag_interval_mm=lag * math.log(10.0) * fastest / _PER_MINUTE,
+        passes=tuple(found),
+        warnings=tuple(note for each in found for note in records[each.number].notes),
+    )
+
+
+def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
+    assert isinstance(cut.about, IntervalDetails)
+    measuring, interval = cut.passes[number - 1], cut.about.intervals_mm[number - 1]
+    first, last = measuring.feeds[0][0], measuring.feeds[-2][0]
+    feeds, levels = _levels(cut, measuring, cut.about.radial_depth_mm)
+
+    force = np.linalg.norm(turned(record.force_n, record.samples), axis=1)
+    straight = fully_engaged(cut, measuring, record.x_mm, 1.0) & (record.x_mm < first - 0.5)
+    if not straight.any():
+        raise ArgumentError(f"{record.file}: nothing was recorded before the feed changes")
+    force = force * float(np.interp(measuring.feed_mm_per_min, feeds, levels) / force[straight].mean())
+
+    entry = float(np.interp(first, record.x_mm, record.time_s))
+    within = (record.time_s > entry - 0.2) & (record.x_mm < last + 2.0)
+    time, size = record.time_s[within], force[within]
+
+    def course(lag: float) -> Array:
+        if record.by_time:
+            speed = _speeds(measuring, time - entry, lag)
+        else:
+            speed = _speeds_at(measuring, record.x_mm[within], lag)
+        return turned(np.interp(speed, feeds, levels)[:, None], record.samples)[:, 0]
+
+    errors = [float(np.mean((course(lag) - size) ** 2)) for lag in _LAGS_S]
+    lag = float(_LAGS_S[int(np.argmin(errors))])
+    immediate = course(0.0)
+    # Means over the second half of each block.
+    x = record.x_mm[within]
+    halves = [(end, (x > end - 0.5 * interval) & (x <= end)) for end, _ in measuring.feeds[1:-1]]
+    rows = [(end, immediate[half].mean(), size[half].mean()) for end, half in halves if half.any()]
+    ends, wanted, seen = np.array(rows).T
+    off = np.abs(seen - wanted) / wanted
+    noise = _noise(record.x_mm[straight], force[straight], 0.5 * interval)
+    worst = int(np.argmax(off))
+    return FollowedPass(
+        number=number,
+        interval_mm=interval,
+        deviation=float(off[worst]),
+        at_mm=float(ends[worst]),
+        noise=noise,
+        lag_s=lag,
+        ok=bool(off[worst] <= _DEVIATION_LIMIT + _NOISE_SHARE * noise),
+        time_s=time,
+        force_n=size,
+        immediate_n=immediate,
+        lagging_n=course(lag),
+    )
+
+
+def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> tuple[Array, Array]:
+    """Feeds below, between and above those of a pass, and the mean force at each."""
+    commanded = [feed for _, feed in measuring.feeds]
+    low, high = np.linspace(0.2, 0.98, _FEEDS) * min(commanded), np.linspace(0.5, 1.1, _FEEDS) * max(commanded)
+    feeds = np.sort(np.concatenate([low, high]))
+    law = ForceLaw(cut.tool, cut.tool.cutting, cut.spindle_rev_per_min, cut.axial_depth_mm)
+    met = straight_engagement(cut.tool, np.full(len(feeds), radial_depth_mm), up=cut.up)
+    return feeds, np.linalg.norm(law.forces(met, feeds).mean_n, axis=1)
+
+
+def _speeds(measuring: MeasuringPass, time_s: Array, lag: float) -> Array:
+    """Feed over time, from 0 at the first change, that follows each block's F with a first-order lag, mm/min."""
+    begins, starts = [0.0], [measuring.feeds[0][1]]
+    commands: list[float] = []
+    length = np.diff([end for end, _ in measuring.feeds])
+    for way, (_, feed) in zip(length, measuring.feeds[1:], strict=True):
+        speed, command = starts[-1] / _PER_MINUTE, feed / _PER_MINUTE
+        commands.append(feed)
+        duration = _block_time(float(way), speed, command, lag)
+        begins.append(begins[-1] + duration)
+        left = math.exp(-duration / lag) if lag > 0.0 else 0.0
+        starts.append((command + (speed - command) * left) * _PER_MINUTE)
+    block = np.clip(np.searchsorted(begins, time_s, side="right") - 1, 0, len(commands) - 1)
+    into = time_s - np.array(begins)[block]
+    wanted, begun = np.array(commands)[block], np.array(starts)[block]
+    share = np.exp(-np.maximum(into, 0.0) / lag) if lag > 0.0 else np.zeros(len(into))
+    return np.where(time_s < 0.0, measuring.feeds[0][1], wanted + (begun - wanted) * share)
+
+
+def _block_time(way: float, speed: float, command: float, lag: float) -> float:
+    """Time for a way at a speed that approaches the commanded one: way = c t + (v - c) lag (1 - exp(-t / lag))."""
+    time = way / command
+    if lag <= 0.0:
+        return time
+    for _ in range(60):
+        decay = math.exp(-time / lag)
+        off = command * time + (speed - command) * lag * (1.0 - decay) - way
+        step = off / (command + (speed - command) * decay)
+        time = max(time - step, 0.5 * time)
+        if abs(step) < 1e-12:
+            break
+    return time
+
+
+def _speeds_at(measuring: MeasuringPass, x_mm: Array, lag: float) -> Array:
+    """The same where the record tells the position: at the X of each sample."""
+    first, last = measuring.feeds[0][0], measuring.feeds[-1][0]
+    fine = np.linspace(0.0, 1.5 * (last - first) / min(feed for _, feed in measuring.feeds) * _PER_MINUTE, 20000)
+    speed = _speeds(measuring, fine, lag)
+    way = first + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))]) / _PER_MINUTE
+    return np.where(x_mm < first, measuring.feeds[0][1], np.interp(x_mm, way, speed))
+
+
+def _noise(x: Array, force: Array, way: float) -> float:
+    """Standard deviation of means over a way, as a share of the mean."""
+    place = ((x - x[0]) / way).astype(int)
+    sums, counts = np.bincount(place, force), np.bincount(place)
+    means = sums[counts > 0] / counts[counts > 0]
+    return float(np.std(means) / np.mean(means)) if len(means) > 2 else 0.0

@@ -15,8 +15,6 @@ from shapegcode.testcut.result import CornerResult, IntervalResult, TaperResult
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_coefficients", "plot_corner", "plot_interval", "plot_taper", "plots_of"]
-
 _MEASURED, _EXPECTED, _LAGGING = plot.GREY, plot.COLOURS[0], plot.COLOURS[1]
 
 
@@ -87,10 +85,7 @@ def plot_coefficients(result: TaperResult, ax: Axes | None = None) -> Axes:
         ("before", result.cut.tool.cutting, _MEASURED, "--"),
         ("fitted", result.cutting, _EXPECTED, "-"),
     ):
-        curves = (
-            law.specific_n_per_mm2 * chip**law.specific_exponent,
-            law.ratio * chip**law.ratio_exponent,
-        )
+        curves = (law.specific_n_per_mm2 * chip**law.specific_exponent, law.ratio * chip**law.ratio_exponent)
         for panel, curve in zip(panels, curves, strict=True):
             panel.plot(1e3 * chip, curve, style, color=colour, label=name)
     for panel, label in zip(panels, ("k1 in N/mm²", "k2"), strict=True):

@@ -13,10 +13,8 @@ from shapegcode.io.atomic import write_text
 from shapegcode.program.operating import OVERRIDE
 from shapegcode.results.json import to_text
 from shapegcode.testcut.cut import CornerDetails, MeasuringPass
-from shapegcode.testcut.design_result import CutDesign
 from shapegcode.testcut.edges import Edge, on_increments, tool_path
-
-__all__ = ["program_text", "write_test_cut"]
+from shapegcode.testcut.result import CutDesign
 
 _SKIM_MM = 0.2
 _ROUGH_SHARE = 0.1  # of the diameter: largest radial depth of the cuts that mill the edge
@@ -57,15 +55,7 @@ def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> C
 
 
 def program_text(design: CutDesign, number: int = 7101) -> str:
-    """The program of a test cut.
-
-    Args:
-        design: what to cut.
-        number: of the program, O.
-
-    Returns:
-        The program.
-    """
+    """The program of a test cut."""
     writer = _Writer(design)
     lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})"]
     lines += [f"({line})" for line in writer.head()]

@@ -1,4 +1,4 @@
-"""Reads measured cutting forces: CSV with a header, samples over time or position, or means at radial depths."""
+"""Measured forces: the file, the position of each sample, without offset and drift, and means over revolutions."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ from shapegcode.io.columns import Meaning, read_label, unit_of
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.table import TextTable
 from shapegcode.io.units import Measured, factor_between
-
-__all__ = ["FORCES_ON", "ForceRecord", "read_forces"]
+from shapegcode.testcut.cut import MeasuringPass, TestCut
+from shapegcode.testcut.forces import Expected, fully_engaged
 
 Array = npt.NDArray[np.float64]
 
-FORCES_ON = ("workpiece", "tool")
 _EXAMPLE = "time_s,fx_n,fy_n"
 #: Unit of `ForceRecord`, and of a column that states none.
 _UNITS = {"time": "s", "displacement": "mm", "velocity": "mm/min", "force": "N", "torque": "N·m"}
@@ -33,30 +32,20 @@ _NAMES: tuple[tuple[str, Measured, str], ...] = (
     ("fy", "force", r"f_?y|force[ _]?y|y[ _]?force"),
     ("torque", "torque", r"torque|m_?z|moment"),
 )
-_FEWEST_ROWS = 4
+_MIN_ROWS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class ForceRecord:
-    """Measured forces, turned so that they act on the tool.
+    """Measured forces, turned so that they act on the tool."""
 
-    Attributes:
-        file: where they were read.
-        force_n: (n, 2) along the feed and to its left, in N.
-        torque_nm: (n,) magnitude as measured; None: not recorded.
-        time_s: (n,), evenly spaced; None: not recorded.
-        position_mm: (n,) X of the tool's axis in the program's coordinates; None: not recorded.
-        radial_depth_mm: (n,) of means at known depths; None: the test cut's description tells it.
-        feed_mm_per_min: (n,) where the file tells it.
-    """
-
-    file: str
-    force_n: Array
-    torque_nm: Array | None = None
-    time_s: Array | None = None
-    position_mm: Array | None = None
-    radial_depth_mm: Array | None = None
-    feed_mm_per_min: Array | None = None
+    file: str  # where they were read
+    force_n: Array  # (n, 2) along the feed and to its left, in N
+    torque_nm: Array | None = None  # (n,) magnitude as measured; None: not recorded
+    time_s: Array | None = None  # (n,), evenly spaced; None: not recorded
+    position_mm: Array | None = None  # (n,) X of the tool's axis in the program's coordinates; None: not recorded
+    radial_depth_mm: Array | None = None  # (n,) of means at known depths; None: the test cut's description tells it
+    feed_mm_per_min: Array | None = None  # (n,) where the file tells it
 
     def __len__(self) -> int:
         return len(self.force_n)
@@ -95,23 +84,11 @@ def _columns(table: TextTable) -> dict[str, tuple[int, float]]:
 
 
 def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
-    """Read measured forces.
-
-    Args:
-        path: CSV with a header (delimiter and decimal comma are found out); units in the header, else s, mm, N, N m.
-        on: "workpiece": what a dynamometer under the work piece measures; "tool": forces on the tool.
-
-    Returns:
-        The forces in N, and their times in s where the file has them.
-
-    Raises:
-        ArgumentError: what was found and what is needed, with file and line.
-        OSError: the file cannot be read.
-    """
+    """Read measured forces."""
     path = Path(path)
     table = TextTable(path)
     columns = _columns(table)
-    numbers = table.numbers([index for index, _ in columns.values()], _FEWEST_ROWS)
+    numbers = table.numbers([index for index, _ in columns.values()], _MIN_ROWS)
     values = {name: numbers[:, k] * factor for k, (name, (_, factor)) in enumerate(columns.items())}
     sign = -1.0 if on == "workpiece" else 1.0
     time = values.get("time")
@@ -125,12 +102,306 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
     if position is not None and "radial_depth" not in values and np.any(np.diff(position) < 0.0):
         row = int(np.argmax(np.diff(position) < 0.0)) + 1
         raise ArgumentError(f"{path}:{table.line_of(row)}: the position goes back: one pass per file, along +X")
-    return ForceRecord(
-        str(path),
-        sign * np.column_stack([values["fx"], values["fy"]]),
-        values.get("torque"),
-        time,
-        position,
-        values.get("radial_depth"),
-        values.get("feed"),
+    force = sign * np.column_stack([values["fx"], values["fy"]])
+    depth, feed = values.get("radial_depth"), values.get("feed")
+    return ForceRecord(str(path), force, values.get("torque"), time, position, depth, feed)
+
+
+# --- the position of each sample --------------------------------------------------------------------------------------
+
+_PER_MINUTE = 60.0
+#: Samples per revolution from which on a file is a record and not a table of means.
+MIN_SAMPLES = 6.0
+_MIN_AIR_REVS = 5
+_FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
+_TELL_SPEED, _TELL_FEED = 0.002, 0.005
+_GUARD_REVS = 2
+#: Of the noise in the air, and of the largest force: what is more is a cut.
+_ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04
+_SPEED_RANGE = 0.05
+_CLEAR_LINE = 8.0  # times the median of the spectrum around it
+_MIN_FOR_SPEED = 20.0
+_MAX_SHIFT_MM = 1.0
+_SHIFT_STEPS = 81
+#: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
+_OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedRecord:
+    """A sampled record of one pass, offset and drift of the dynamometer taken off, with the place of each sample."""
+
+    file: str
+    cut: TestCut
+    measuring: MeasuringPass
+    time_s: Array  # (n,)
+    x_mm: Array  # (n,) X of the tool's axis
+    force_n: Array  # (n, 2) on the tool, along the feed and to its left
+    torque_nm: Array | None  # (n, 1); None: not recorded
+    samples: float  # per revolution
+    spindle_rev_per_min: float  # as the record shows it, or as commanded
+    offset_n: Array  # (2,) force that was shown in the air before the cut
+    drift_n: Array  # (2,) change of it until after the cut
+    by_time: bool  # the place comes from the time and the feed; else it was recorded
+    notes: tuple[str, ...]  # what else the user should know, with the name of the file
+
+
+def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, hoped: Expected) -> PlacedRecord:
+    """Take offset and drift off a sampled record of one pass, and find the place of each sample."""
+    time, moved = _clock(record, measuring, cut.kind)
+    period = float(time[-1] - time[0]) / (len(time) - 1)
+    turn = _PER_MINUTE / cut.spindle_rev_per_min
+    if turn / period < MIN_SAMPLES:
+        raise ArgumentError(
+            f"{record.file}: {turn / period:.1f} samples per revolution: must be {MIN_SAMPLES:g} or more, better "
+            f"{12 * cut.tool.flutes}; or give means over whole revolutions, at most one row per revolution"
+        )
+    begin, end = _contact(record, turn / period)
+    speed, sure = _spindle_speed(record.force_n[begin:end], period, cut.spindle_rev_per_min, cut.tool.flutes)
+    notes = []
+    if sure and abs(speed / cut.spindle_rev_per_min - 1.0) > _TELL_SPEED:
+        notes.append(f"the spindle turned at {speed:.1f} rev/min, {cut.spindle_rev_per_min:g} were commanded")
+    samples = _PER_MINUTE / speed / period
+    per_tooth = samples / cut.tool.flutes
+    if per_tooth < _FEW_PER_TOOTH and abs(per_tooth - round(per_tooth)) < _IN_STEP:
+        notes.append(
+            f"{per_tooth:.1f} samples per tooth fall on the same angles over and over: means may be off by some "
+            "percent; record with more samples, or with a rate that is no multiple of the tooth passing frequency"
+        )
+    force, offset, drift = _without_offset(record.force_n, begin, end, round(_GUARD_REVS * samples))
+    torque = None
+    if record.torque_nm is not None:
+        torque = _without_offset(record.torque_nm[:, None], begin, end, round(_GUARD_REVS * samples))[0]
+    size = np.linalg.norm(turned(force, samples), axis=1)
+    x = _placed(record, measuring, hoped, size, time, moved, (begin, end), notes)
+    told = tuple(f"{record.file}: {note}" for note in notes)
+    by_time = record.position_mm is None
+    return PlacedRecord(
+        record.file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, by_time, told
     )
+
+
+def _clock(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[Array, Array]:
+    """Time of each sample, and the way gone since the first one at the commanded feeds (or as measured)."""
+    if record.position_mm is not None:
+        x = record.position_mm
+        if record.time_s is not None:
+            return record.time_s, x - x[0]
+        pace = _PER_MINUTE / measuring.commanded_feed(0.5 * (x[1:] + x[:-1]))
+        return np.concatenate([[0.0], np.cumsum(np.diff(x) * pace)]), x - x[0]
+    if record.time_s is None:
+        raise ArgumentError(
+            f"{record.file}: a table of means: a {kind} needs sampled records with time_s or position_mm"
+        )
+    time = record.time_s
+    return time, (time - time[0]) * measuring.feed_mm_per_min / _PER_MINUTE
+
+
+def _spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
+    """Spindle speed from the lines of a record at the revolution, the teeth, and their multiples."""
+    count = len(force_n)
+    turns = count * period_s * commanded / _PER_MINUTE
+    if turns < _MIN_FOR_SPEED:
+        return commanded, False
+    padded = 1 << int(np.ceil(np.log2(4 * count)))
+    window = np.hanning(count)[:, None]
+    power = np.sum(np.abs(np.fft.rfft((force_n - force_n.mean(axis=0)) * window, padded, axis=0)) ** 2, axis=1)
+    step = 1.0 / (padded * period_s)
+    best: tuple[float, float] | None = None
+    for order in (flutes, 1, 2 * flutes, 2):
+        centre = order * commanded / _PER_MINUTE
+        low, high = (round(centre * side / step) for side in (1.0 - _SPEED_RANGE, 1.0 + _SPEED_RANGE))
+        if high + 1 >= len(power) or high - low < 8:
+            continue
+        part = power[low : high + 1]
+        peak = int(np.argmax(part))
+        height = float(part[peak] / max(float(np.median(part)), 1e-300))
+        if 0 < peak < len(part) - 1 and height > _CLEAR_LINE**2 and (best is None or height > best[0]):
+            fine = _vertex(-np.log(np.maximum(part[peak - 1 : peak + 2], 1e-300)))
+            best = height, (low + peak + fine) * step * _PER_MINUTE / order
+    return (commanded, False) if best is None else (float(best[1]), True)
+
+
+def turned(force: Array, samples: float) -> Array:
+    """Moving mean of each column over a stretch of a number of samples that need not be whole, centred."""
+    middle = np.arange(len(force)) + 0.5
+    low, high = np.clip(middle - 0.5 * samples, 0, len(force)), np.clip(middle + 0.5 * samples, 0, len(force))
+    return np.asarray(_sums(force, low, high) / (high - low)[:, None])
+
+
+def _sums(table: Array, low: Array, high: Array) -> Array:
+    """Of each column between two places among the samples, which need not be whole."""
+    sums = np.vstack([np.zeros((1, table.shape[1])), np.cumsum(table, axis=0)])
+    at = np.arange(len(sums), dtype=np.float64)
+    return np.column_stack([np.interp(high, at, column) - np.interp(low, at, column) for column in sums.T])
+
+
+def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
+    """First and last sample of the cut, roughly."""
+    air = round(_MIN_AIR_REVS * samples)
+    if len(record) < 4 * air:
+        raise ArgumentError(f"{record.file}: {len(record) / samples:.1f} revolutions: a pass has many more")
+    smooth = turned(record.force_n, samples)
+    before, after = smooth[:air], smooth[-air:]
+    line = np.linspace(0.0, 1.0, len(smooth))[:, None]
+    base = np.median(before, axis=0) * (1.0 - line) + np.median(after, axis=0) * line
+    size = np.linalg.norm(smooth - base, axis=1)
+    noise = float(np.sqrt(np.mean(np.var(before, axis=0) + np.var(after, axis=0))))
+    level = max(_ABOVE_NOISE * noise, _ABOVE_SHARE * float(np.max(size)))
+    cutting = np.flatnonzero(size > level)
+    if cutting.size < 10 * samples:
+        raise ArgumentError(
+            f"{record.file}: no cut is seen: force {np.max(size):.3g} N, noise in the air {noise:.3g} N; the record "
+            "must begin and end in the air"
+        )
+    begin, end = int(cutting[0]), int(cutting[-1])
+    if begin < air or end > len(smooth) - air:
+        where = "before" if begin < air else "after"
+        raise ArgumentError(
+            f"{record.file}: no air {where} the cut: record at least {_MIN_AIR_REVS} revolutions more there"
+        )
+    return begin, end
+
+
+def _without_offset(force: Array, begin: int, end: int, guard: int) -> tuple[Array, Array, Array]:
+    """Force without what the air before and after shows, in between on a straight line; offset and drift."""
+    places, levels = [], []
+    for low, high in ((0, max(begin - guard, 1)), (min(end + guard, len(force) - 1), len(force))):
+        places.append(0.5 * (low + high))
+        levels.append(force[low:high].mean(axis=0))
+    at = np.arange(len(force), dtype=np.float64)
+    share = ((at - places[0]) / (places[1] - places[0]))[:, None]
+    return force - (levels[0] * (1.0 - share) + levels[1] * share), levels[0], levels[1] - levels[0]
+
+
+def _placed(
+    record: ForceRecord,
+    measuring: MeasuringPass,
+    hoped: Expected,
+    size: Array,
+    time: Array,
+    moved: Array,
+    contact: tuple[int, int],
+    notes: list[str],
+) -> Array:
+    """X of the axis at each sample: entry and exit of the record laid over those that are expected."""
+    seen = np.flatnonzero(hoped.mean_n > _ABOVE_SHARE * hoped.mean_n.max())
+    wanted = hoped.x_mm[seen[0]], hoped.x_mm[seen[-1]]
+    if record.position_mm is None and not measuring.constant_feed:
+        # The way over time is that of the blocks; only where it begins is looked for.
+        moved = _way_of_blocks(measuring, time - time[contact[0]], wanted[0])
+    scale = (wanted[1] - wanted[0]) / (moved[contact[1]] - moved[contact[0]])
+    free = record.position_mm is None and measuring.constant_feed
+    if abs(scale - 1.0) > (_OTHER_FEED if free else _OTHER_LENGTH):
+        raise ArgumentError(
+            f"{record.file}: the cut is {moved[contact[1]] - moved[contact[0]]:.2f} mm long, it should be "
+            f"{wanted[1] - wanted[0]:.2f} mm: is it the right pass, and was the feed override 100 %?"
+        )
+    x = wanted[0] + (moved - moved[contact[0]]) * (scale if free else 1.0)
+    ends = [_shift(hoped, x, size, side) for side in wanted]
+    if free:
+        # Both ends: offset and rate.
+        share = (x - wanted[0]) / (wanted[1] - wanted[0])
+        x = x + ends[0] * (1.0 - share) + ends[1] * share
+        rate = float(np.polyfit(time, x, 1)[0]) * _PER_MINUTE
+        if abs(rate / measuring.feed_mm_per_min - 1.0) > _TELL_FEED:
+            notes.append(f"the feed was {rate:.1f} mm/min, {measuring.feed_mm_per_min:g} were commanded")
+    else:
+        x = x + ends[0]
+    return np.asarray(x)
+
+
+def _way_of_blocks(measuring: MeasuringPass, time_s: Array, entry_mm: float) -> Array:
+    """X over time at the commanded feeds, at `entry_mm` at time 0."""
+    ends = np.array([measuring.start_mm, *(end for end, _ in measuring.feeds)])
+    pace = _PER_MINUTE / np.array([feed for _, feed in measuring.feeds])
+    at = np.concatenate([[0.0], np.cumsum(np.diff(ends) * pace)])
+    return np.asarray(np.interp(time_s + np.interp(entry_mm, ends, at), at, ends))
+
+
+def _shift(hoped: Expected, x: Array, size: Array, side: float) -> float:
+    """By how much X must be moved so that the course at one end of the cut is the expected one, whatever its scale."""
+    near = np.flatnonzero(np.abs(x - side) < 3.0 * _MAX_SHIFT_MM)
+    near = near[:: max(1, len(near) // 400)]
+    measured, place = size[near], x[near]
+
+    def misfit(shift: float) -> float:
+        expected = np.interp(place + shift, hoped.x_mm, hoped.mean_n)
+        factor = float(expected @ measured) / max(float(expected @ expected), 1e-300)
+        return float(np.sum((measured - factor * expected) ** 2))
+
+    tried = np.linspace(-_MAX_SHIFT_MM, _MAX_SHIFT_MM, _SHIFT_STEPS)
+    errors = np.array([misfit(shift) for shift in tried])
+    best = int(np.clip(np.argmin(errors), 1, _SHIFT_STEPS - 2))
+    return float(tried[best] + _vertex(errors[best - 1 : best + 2]) * (tried[1] - tried[0]))
+
+
+def _vertex(three: Array) -> float:
+    """Where the parabola through three values is lowest, in steps from the middle one."""
+    left, middle, right = three.tolist()
+    bend = left - 2.0 * middle + right
+    return 0.5 * (left - right) / bend if bend > 0.0 else 0.0
+
+
+# --- means over whole revolutions -------------------------------------------------------------------------------------
+
+_MIN_REVOLUTIONS = 20
+_CHATTER, _MIN_CHATTER = 8.0, 0.02  # times the median deviation; the least that counts as one, of the median
+_CHATTER_ROUNDS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Revolutions:
+    """Means over whole revolutions of one pass."""
+
+    record: PlacedRecord
+    x_mm: Array  # (n,) X of the tool's axis in the middle of each revolution
+    mean_n: Array  # (n, 2) mean force on the tool along the feed and to its left
+    torque_nm: Array | None  # (n,) mean torque; None: not recorded
+    resultant_n: Array  # (n,) mean magnitude
+    peak_n: Array  # (n,) largest magnitude
+    # (n,) whether the force swings more than its mean lets expect from the rest of the pass
+    chatter: npt.NDArray[np.bool_]
+    # the feed between entry and exit, as the record shows it; of a pass with changing feeds the first one
+    feed_mm_per_min: float
+
+
+def revolutions(record: PlacedRecord) -> Revolutions:
+    """Means over whole revolutions of a pass."""
+    cut, measuring, x = record.cut, record.measuring, record.x_mm
+    inside = np.flatnonzero((x >= measuring.start_mm) & (x <= measuring.end_mm))
+    turns = int((inside[-1] - inside[0]) / record.samples)
+    edges = inside[0] + np.arange(turns + 1) * record.samples
+    size = np.linalg.norm(record.force_n, axis=1)
+    columns = [record.force_n, size[:, None], size[:, None] ** 2, x[:, None]]
+    if record.torque_nm is not None:
+        columns.append(record.torque_nm)
+    table = np.hstack(columns)
+    means = _sums(table, edges[:-1], edges[1:]) / record.samples
+    peaks = np.maximum.reduceat(size[: int(edges[-1])], edges[:-1].astype(np.intp))
+    middle = means[:, 4]
+    uneven = np.sqrt(np.maximum(means[:, 3] - np.sum(means[:, :2] ** 2, axis=1), 0.0))
+    full = np.flatnonzero(fully_engaged(cut, measuring, middle))[_GUARD_REVS:-_GUARD_REVS]
+    chatter = np.zeros(len(middle), dtype=bool)
+    chatter[full] = _swings(middle[full], uneven[full], means[full, 2])
+    feed = measuring.feed_mm_per_min
+    if measuring.constant_feed:
+        feed = float(np.polyfit(record.time_s[inside], x[inside], 1)[0]) * _PER_MINUTE
+    torque = np.abs(means[:, 5]) if record.torque_nm is not None else None
+    return Revolutions(record, middle, means[:, :2], torque, means[:, 2], peaks, chatter, feed)
+
+
+def _swings(x: Array, uneven: Array, resultant: Array) -> npt.NDArray[np.bool_]:
+    """Where the force within a revolution swings more, for its mean, than in the rest of the pass."""
+    if len(uneven) < _MIN_REVOLUTIONS:
+        return np.zeros(len(uneven), dtype=bool)
+    share = uneven / np.maximum(resultant, 1e-300)
+    place = (x - x.mean()) / max(float(np.ptp(x)), 1e-300)
+    floor = _MIN_CHATTER * float(np.median(share))
+    weight = np.ones(len(share))
+    for _ in range(_CHATTER_ROUNDS):
+        # Least absolute deviations: what stands out does not bend the curve of the rest.
+        off = share - np.polyval(np.polyfit(place, share, 2, w=np.sqrt(weight)), place)
+        weight = 1.0 / np.maximum(np.abs(off), floor)
+    spread = 1.4826 * float(np.median(np.abs(off))) + floor
+    return np.asarray(off > _CHATTER * spread)

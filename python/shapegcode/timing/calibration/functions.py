@@ -6,7 +6,6 @@ they divide among codes that always come together is a choice, and the one with 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,20 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.characterization.clock.families import fitted_model
-from shapegcode.characterization.clock.motion_fit import MotionFit
-from shapegcode.characterization.clock.observed import ObservedRun
-from shapegcode.characterization.clock.windows import line_starts
 from shapegcode.machine import Machine
-
-__all__ = ["FunctionFit", "fit_functions", "whole_model"]
+from shapegcode.timing.calibration.motion import MotionFit, starts_of
+from shapegcode.timing.calibration.observed import ObservedRun
 
 FloatArray = npt.NDArray[np.float64]
 
 _READING_S = 0.1  # scatter of the time between two readings
 _OUTLIER = 3.0  # of it: what is further off counts less
 _RIDGE = 0.02  # pull of every number to 0, against its scatter of a reading
-_MOST_S = 60.0
+_MAX_S = 60.0
 _UNSEEN = 1e-3  # sum of derivatives, in scatters of a reading
 _TOOL_CHANGE = 6
 _SPEEDS_KRPM = (0.0, 60.0)
@@ -37,29 +32,20 @@ _TABLE_KRPM = 30.0  # a spindle's table is written up to so far above where its 
 
 @dataclass(frozen=True)
 class FunctionFit:
-    """Times beside the motion.
+    """Times beside the motion."""
 
-    Attributes:
-        values: by name: "start", "tool change", "M8", "way xy", "way z" in s; "spindle start from" and "spindle stop
-            from" in 1000/min, "spindle start" and "spindle stop" in s per 1000/min above.
-        low: least values of the 95 % intervals by name.
-        high: largest ones.
-        last_tool_in_spindle: whether the tool that a program ends with is in the spindle when it starts anew.
-        scatter_s: root mean square of what a stretch between two cuts took otherwise.
-        groups: how many such stretches there were.
-    """
-
+    # by name: "start", "tool change", "M8", "way xy", "way z" in s; "spindle start from" and "spindle stop from" in
+    # 1000/min, "spindle start" and "spindle stop" in s per 1000/min above
     values: dict[str, float]
-    low: dict[str, float]
+    low: dict[str, float]  # of the 95 % intervals by name
     high: dict[str, float]
-    last_tool_in_spindle: bool
-    scatter_s: float
-    groups: int
+    last_tool_in_spindle: bool  # whether the tool that a program ends with is in the spindle when it starts anew
+    scatter_s: float  # root mean square of what a stretch between two cuts took otherwise
 
 
 @dataclass(frozen=True, eq=False)
 class _Span:
-    """A stretch of a run from one reading to another, with functions between; end None: the end of the run."""
+    """A stretch of a run from one reading to another, with functions between."""
 
     run: ObservedRun
     begin: int  # line; 0: the start key
@@ -70,23 +56,13 @@ class _Span:
 def whole_model(
     machine: Machine, motion: MotionFit, values: dict[str, float], last_tool_in_spindle: bool
 ) -> _core.ControllerModel:
-    """The controller with motion and functions.
-
-    Args:
-        machine: for everything else.
-        motion: fitted.
-        values: of functions by name.
-        last_tool_in_spindle: see `FunctionFit`.
-
-    Returns:
-        The core's model.
-    """
-    model = fitted_model(machine, motion.family, motion.values, motion.rapid_mm_per_s)
+    """The controller with motion and functions."""
+    model = motion.model(machine)
     model.program_start_s = values.get("start", 0.0)
     model.tool_change_s = values.get("tool change", 0.0)
     model.last_tool_in_spindle = last_tool_in_spindle
     model.m_function_s = 0.0
-    model.m_code_s = {int(name[1:]): value for name, value in values.items() if name[0] == "M" and name[1:].isdigit()}
+    model.m_code_s = dict(m_codes(values).items())
     xy = values.get("way xy", 0.0)
     model.unknown_move_s = [xy, xy, values.get("way z", 0.0)]
     model.spindle_start_s = spindle_rows(values, "spindle start")
@@ -94,16 +70,13 @@ def whole_model(
     return model
 
 
+def m_codes(values: dict[str, float]) -> dict[int, float]:
+    """Times of M codes."""
+    return {int(name[1:]): value for name, value in values.items() if name[0] == "M" and name[1:].isdigit()}
+
+
 def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float]]:
-    """The table of a spindle's time: none up to a speed, in proportion above.
-
-    Args:
-        values: of functions by name.
-        name: "spindle start" or "spindle stop".
-
-    Returns:
-        (speed in 1/min, s), empty where it takes no time.
-    """
+    """The table of a spindle's time: none up to a speed, in proportion above."""
     slope, begin = values.get(name, 0.0), values.get(f"{name} from", 0.0)
     if slope <= 1e-6:
         return []
@@ -112,38 +85,24 @@ def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float
 
 
 def fit_functions(runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> FunctionFit:
-    """Least squares over the stretches between cuts, robust against what an operator does there.
-
-    Args:
-        runs: of the machine.
-        motion: fitted to their sections.
-        machine: for everything else.
-
-    Returns:
-        Times of functions, none below 0.
-    """
+    """Least squares over the stretches between cuts, robust against what an operator does there."""
     spans = [span for run in runs for span in _spans(run)]
     names = _names(runs)
-    fits = [_fit(spans, names, motion, machine, kept) for kept in ((False, True) if _returns(runs) else (False,))]
+    kept = (False, True) if any(map(_returns, runs)) else (False,)
+    fits = [_fit(spans, names, motion, machine, each) for each in kept]
     return min(fits, key=lambda fit: fit.scatter_s * (0.98 if not fit.last_tool_in_spindle else 1.0))
 
 
-def _returns(runs: Sequence[ObservedRun]) -> bool:
+def _returns(run: ObservedRun) -> bool:
     """Whether a program ends with the tool that it begins with: only then it matters what is in the spindle."""
-    for run in runs:
-        used = [tool for tool in run.played.tools.tolist() if tool >= 0]
-        if used and used[0] == used[-1]:
-            return True
-    return False
+    used = [tool for tool in run.timed.tools.tolist() if tool >= 0]
+    return bool(used) and used[0] == used[-1]
 
 
 def _names(runs: Sequence[ObservedRun]) -> list[str]:
-    codes: set[int] = set()
-    spins = False
-    for played in {id(run.played): run.played for run in runs}.values():
-        for m_codes, _, speed in played.program.core.functions:
-            codes.update(m_codes)
-            spins = spins or speed > 0.0
+    functions = [each for run in runs for each in run.timed.program.core.functions]
+    codes = {code for codes, _, _ in functions for code in codes}
+    spins = any(speed > 0.0 for _, _, speed in functions)
     names = ["start", "way xy", "way z"]
     names += ["tool change"] if _TOOL_CHANGE in codes else []
     names += [f"M{code}" for code in sorted(codes - {_TOOL_CHANGE})]
@@ -156,18 +115,18 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
 
 def _spans(run: ObservedRun) -> list[_Span]:
     """Readings next to each other with a function between, and whole ways from cut to cut; start and end of the run."""
-    line, time_s, function = run.line, run.time_s, run.played.function
+    line, time_s, function = run.line, run.time_s, run.timed.function
     spans = []
 
     def add(first: int, last: int) -> None:
         begin = int(line[first]) if first >= 0 else 0
-        end = int(line[last]) if last < len(line) else run.played.line_count + 1
+        end = int(line[last]) if last < len(line) else run.timed.line_count + 1
         since = float(time_s[first]) if first >= 0 else 0.0
         until = float(time_s[last]) if last < len(line) else run.duration_s
         if until is not None and until > since and function[max(begin, 1) : end].any():
             spans.append(_Span(run, begin, end, until - since))
 
-    cuts = np.flatnonzero(np.isfinite(run.played.feed_mm_per_s[line]))
+    cuts = np.flatnonzero(np.isfinite(run.timed.feed_mm_per_s[line]))
     # How the way to the first cut divides differs from run to run: a control reports its first lines late.
     for index in range(int(cuts[0]) if len(cuts) else -1, len(line)):
         add(index, index + 1)
@@ -185,21 +144,17 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     from scipy.optimize import least_squares
 
     seconds = np.array([span.seconds for span in spans])
-    scale = np.array([_MOST_S if not name.endswith("from") else _SPEEDS_KRPM[1] for name in names])
+    scale = np.array([_MAX_S if not name.endswith("from") else _SPEEDS_KRPM[1] for name in names])
     pull = np.array([0.0 if name.endswith("from") else _RIDGE for name in names]) / _READING_S
 
     def errors(place: FloatArray) -> FloatArray:
         model = whole_model(machine, motion, dict(zip(names, place.tolist(), strict=True)), kept)
-        starts: dict[tuple[int, float], FloatArray] = {}
-        taken = np.empty(len(spans))
-        for index, span in enumerate(spans):
-            key = id(span.run.played), span.run.rapid_override
-            if key not in starts:
-                model.rapid_override = span.run.rapid_override
-                starts[key] = line_starts(span.run.played, model)
-            begin = starts[key][span.begin] if span.begin > 0 else 0.0
-            taken[index] = starts[key][span.end] - begin
-        return np.concatenate([(taken - seconds) / _READING_S, pull * place])
+        starts = starts_of(model)
+        taken = [
+            starts(span.run, 1.0)[span.end] - (starts(span.run, 1.0)[span.begin] if span.begin > 0 else 0.0)
+            for span in spans
+        ]
+        return np.concatenate([(np.array(taken) - seconds) / _READING_S, pull * place])
 
     begin = np.array([4.0 if name.endswith("from") else 0.3 for name in names])
     found = least_squares(
@@ -214,7 +169,7 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     spread = np.linalg.pinv(slope.T @ slope) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
     # A number that changes nothing is not told.
     unseen = np.abs(slope[: len(spans)]).sum(axis=0) < _UNSEEN
-    reach = np.where(unseen, _MOST_S, 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0)))
+    reach = np.where(unseen, _MAX_S, 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0)))
     low = {name: max(0.0, values[name] - float(each)) for name, each in zip(names, reach, strict=True)}
-    high = {name: min(_MOST_S, values[name] + float(each)) for name, each in zip(names, reach, strict=True)}
-    return FunctionFit(values, low, high, kept, middle if math.isfinite(middle) else 0.0, len(spans))
+    high = {name: min(_MAX_S, values[name] + float(each)) for name, each in zip(names, reach, strict=True)}
+    return FunctionFit(values, low, high, kept, middle)

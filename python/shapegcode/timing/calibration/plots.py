@@ -1,32 +1,23 @@
-"""The picture of a learned clock: predicted against measured, by run and by tool."""
+"""The picture of a calibrated cycle-time model: predicted against measured, by run and by tool."""
 
 from __future__ import annotations
 
 from functools import partial
 from typing import TYPE_CHECKING
 
-from shapegcode.characterization.clock.result import TOLERANCE_PERCENT, LearnedClock
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
+from shapegcode.timing.calibration.result import TOLERANCE_PERCENT, LearnedClock
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_clock", "plots_of"]
-
 _TOOL_PERCENT = 5.0
-_MOST_RUNS = 20
+_MAX_RUNS = 20
 
 
 def plots_of(found: LearnedClock) -> dict[str, Plot]:
-    """Its pictures by name.
-
-    Args:
-        found: what was learned.
-
-    Returns:
-        What draws each picture, by the name of its file without ending; none without a whole run.
-    """
+    """Its pictures by name."""
     return {"clock": partial(plot_clock, found)} if any(run.measured_s for run in found.runs) else {}
 
 
@@ -43,12 +34,9 @@ def plot_clock(found: LearnedClock, ax: Axes | None = None) -> Axes:
     Returns:
         The axes drawn into.
     """
-    runs = [run for run in found.runs if run.measured_s is not None and run.measured_s > run.held_s][:_MOST_RUNS]
-    panel = plot.axes(
-        ax,
-        size_inch=(9.0, 1.6 + 0.42 * len(runs)),
-        title=f"Predicted against measured: {found.machine}, {found.family}",
-    )
+    runs = [run for run in found.runs if run.measured_s is not None and run.measured_s > run.held_s][:_MAX_RUNS]
+    title = f"Predicted against measured: {found.machine}, {found.family}"
+    panel = plot.axes(ax, size_inch=(9.0, 1.6 + 0.42 * len(runs)), title=title)
     panel.axvspan(-_TOOL_PERCENT, _TOOL_PERCENT, color=plot.GREY, alpha=0.12, label="5 %, of a tool's share")
     panel.axvspan(-TOLERANCE_PERCENT, TOLERANCE_PERCENT, color=plot.GREY, alpha=0.25, label="2 %, of a run")
     labelled: set[str] = set()
@@ -63,20 +51,11 @@ def plot_clock(found: LearnedClock, ax: Axes | None = None) -> Axes:
         took = (run.measured_s or 0.0) - run.held_s
         error = 100.0 * (run.predicted_s / took - 1.0)
         reach = 100.0 * (run.high_s - run.predicted_s) / took
-        panel.errorbar(
-            error,
-            row,
-            xerr=reach,
-            fmt="o",
-            color=plot.COLOURS[1],
-            capsize=3,
-            label=once("whole run, with its interval"),
-        )
+        label = once("whole run, with its interval")
+        panel.errorbar(error, row, xerr=reach, fmt="o", color=plot.COLOURS[1], capsize=3, label=label)
         if run.left_out_percent is not None:
-            panel.plot(
-                run.left_out_percent, row, "D", color=plot.COLOURS[0], markersize=5,
-                label=once("whole run, learned from the others"),
-            )  # fmt: skip
+            label = once("whole run, learned from the others")
+            panel.plot(run.left_out_percent, row, "D", color=plot.COLOURS[0], markersize=5, label=label)
         for share in run.tools:
             if share.measured_s > 0.02 * took:
                 panel.plot(share.error_percent, row + 0.22, "|", color=plot.COLOURS[2], label=once("tools"))

@@ -1,4 +1,4 @@
-"""What was learned of a machine's clock, and how well it says what the machine did: figures, tables, next step."""
+"""A cycle-time model calibrated from run logs, and how well it says what the machine did."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
-
-__all__ = ["FamilyScore", "LearnedClock", "LearnedNumber", "LearnedRun", "LearnedShare"]
 
 TOLERANCE_PERCENT = 2.0
 

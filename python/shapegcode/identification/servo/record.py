@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.characterization.log import parse_units, read_log
 from shapegcode.errors import ArgumentError, RecordError
 from shapegcode.io.data_file import open_file
 from shapegcode.io.edge_capture import EdgeCapture
 from shapegcode.io.edge_json import is_edge_json, read_edge_json
-
-__all__ = ["ServoRecord", "ServoTrace", "read_servo_record"]
+from shapegcode.io.servo_log import parse_units, read_log
 
 FloatArray = npt.NDArray[np.float64]
 _GAP = 1.5  # of the usual step
@@ -51,6 +52,11 @@ class ServoTrace:
         """Of all stretches."""
         return sum(map(len, self.command))
 
+    @cached_property
+    def lag(self) -> tuple[FloatArray, ...]:
+        """Command less actual position."""
+        return tuple(r - x for r, x in zip(self.command, self.actual, strict=True))
+
     def liveliest(self, most: int) -> ServoTrace:
         """The windows with most changes of speed, where there are more samples than can be fitted in a short time.
 
@@ -74,21 +80,14 @@ class ServoTrace:
             elif end - at >= _FEWEST:
                 kept.append((rank, at, end))
 
-        def cut(values: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
-            return tuple(values[rank][start:end] for rank, start, end in kept)
+        return self._parts([(rank, slice(start, end)) for rank, start, end in kept])
 
-        def cut_if(values: tuple[FloatArray, ...] | None) -> tuple[FloatArray, ...] | None:
-            return None if values is None else cut(values)
-
-        return ServoTrace(
-            self.name,
-            self.unit,
-            cut(self.time_s),
-            cut(self.command),
-            cut(self.actual),
-            cut_if(self.deviation),
-            cut_if(self.torque),
-        )
+    def _parts(self, kept: Sequence[tuple[int, slice]]) -> ServoTrace:
+        """Parts of stretches, as stretches of their own."""
+        names = ("time_s", "command", "actual", "deviation", "torque")
+        columns = {name: values for name in names if (values := getattr(self, name)) is not None}
+        cut: dict[str, Any] = {n: tuple(values[rank][part] for rank, part in kept) for n, values in columns.items()}
+        return replace(self, **cut)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,46 +135,32 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
     notes = list(capture.notes)
     axes = []
     for axis in capture.axes:
+        label = f"axis {axis.number} ({axis.name})"
         lacks = [each for each in ("DES_POS", "ENC_POS") if each not in axis.signals]
         if lacks:
-            notes.append(f"axis {axis.number} ({axis.name}): no {' and no '.join(lacks)} was recorded")
+            notes.append(f"{label}: no {' and no '.join(lacks)} was recorded")
             continue
         command, actual = capture.position(axis.number), capture.position(axis.number, actual=True)
         bad = np.flatnonzero(~np.isfinite(command + actual))
         if bad.size:
-            notes.append(f"axis {axis.number} ({axis.name}): left out: values are missing from {bad[0]} on")
+            notes.append(f"{label}: left out: values are missing from {bad[0]} on")
             continue
-
         ranges = _ranges(command, capture.stretches, capture.cycle_s)
         if len(ranges) > len(capture.stretches):
             where = f"{capture.time_s[ranges[1].start]:.3f} s"
-            notes.append(f"axis {axis.number} ({axis.name}): its command jumps, first at {where}: divided there")
+            notes.append(f"{label}: its command jumps, first at {where}: divided there")
         ranges = tuple(each for each in ranges if each.stop - each.start >= _FEWEST)
         if not ranges:
-            notes.append(f"axis {axis.number} ({axis.name}): left out: no {_FEWEST} samples without gap or jump")
+            notes.append(f"{label}: left out: no {_FEWEST} samples without gap or jump")
             continue
 
-        def cut(values: FloatArray, ranges: tuple[slice, ...] = ranges) -> tuple[FloatArray, ...]:
-            return tuple(values[each] for each in ranges)
-
-        def other(signal: str, number: int = axis.number) -> tuple[FloatArray, ...] | None:
-            found = capture.columns.get(f"{signal}|{number}")
-            return None if found is None or not np.isfinite(found).all() else cut(found)
-
+        others = [capture.columns.get(f"{signal}|{axis.number}") for signal in ("CONT_DEV", "TORQUE")]
+        deviation, torque = (None if each is None or not np.isfinite(each).all() else (each,) for each in others)
         turns = capture.is_rotary(axis.number) or axis.name[:1].upper() in ("A", "B", "C")
         unit = "deg" if turns else "mm"
         name = f"{axis.number} ({axis.name})" if axis.name != str(axis.number) else axis.name
-        axes.append(
-            ServoTrace(
-                name,
-                unit,
-                cut(capture.time_s),
-                cut(command),
-                cut(actual),
-                other("CONT_DEV"),
-                other("TORQUE"),
-            )
-        )
+        whole = ServoTrace(name, unit, (capture.time_s,), (command,), (actual,), deviation, torque)
+        axes.append(whole._parts([(0, each) for each in ranges]))
     return _checked(ServoRecord(capture.source, capture.cycle_s, tuple(axes), tuple(notes)))
 
 
@@ -203,15 +188,8 @@ def _of_log(path: Path, units: tuple[float, float] | None) -> ServoRecord:
     for index, name in enumerate("XYZ"):
         command, actual = log.command_mm[:, index], log.actual_mm[:, index]
         if np.isfinite(command + actual).all():
-            axes.append(
-                ServoTrace(
-                    name,
-                    "mm",
-                    tuple(log.times_s[each] for each in ranges),
-                    tuple(command[each] for each in ranges),
-                    tuple(actual[each] for each in ranges),
-                )
-            )
+            whole = ServoTrace(name, "mm", (log.times_s,), (command,), (actual,))
+            axes.append(whole._parts([(0, each) for each in ranges]))
     return _checked(ServoRecord(str(path), log.sampling_s, tuple(axes), tuple(notes)))
 
 

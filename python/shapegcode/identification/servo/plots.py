@@ -6,27 +6,18 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.characterization.servo.result import ServoFit
+from shapegcode.identification.servo.result import ServoFit
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_servo", "plots_of"]
-
 _OWN, _OURS = "control: contour deviation", "left by our model, not fitted there"
 
 
 def plots_of(found: ServoFit) -> dict[str, Plot]:
-    """Its pictures by name.
-
-    Args:
-        found: what the log says.
-
-    Returns:
-        What draws each picture, by the name of its file without ending.
-    """
+    """Its pictures by name."""
     return {"servo": partial(plot_servo, found)} if any(axis.models for axis in found.axes) else {}
 
 
@@ -41,31 +32,17 @@ def plot_servo(found: ServoFit, ax: Axes | None = None) -> Axes:
         The first of the axes drawn into.
     """
     shown = [axis for axis in found.axes if axis.models and axis.curves is not None]
-    panels = [
-        row[0]
-        for row in plot.grid(
-            ax,
-            len(shown),
-            1,
-            size_inch=(9.0, 0.8 + 1.3 * len(shown)),
-            title=f"How far each axis is off: {Path(found.source).name}",
-            sharex=True,
-        )
-    ]
+    title, size_inch = f"How far each axis is off: {Path(found.source).name}", (9.0, 0.8 + 1.3 * len(shown))
+    panels = [row[0] for row in plot.grid(ax, len(shown), 1, size_inch=size_inch, title=title, sharex=True)]
     for panel, axis in zip(panels, shown, strict=True):
         curves = axis.curves
         assert curves is not None
-        unit = "µm" if axis.unit == "mm" else "mdeg"
         for rank, time in enumerate(curves.time_s):
-            first = rank == 0
+            own, ours = (_OWN, _OURS) if rank == 0 else (None, None)
             if curves.deviation is not None:
-                panel.plot(
-                    time, 1e3 * curves.deviation[rank], color=plot.GREY, linewidth=0.8, label=_OWN if first else None
-                )
-            panel.plot(
-                time, 1e3 * curves.rest[rank], color=plot.COLOURS[0], linewidth=0.8, label=_OURS if first else None
-            )
-        panel.set_ylabel(f"{axis.name}, {unit}")
+                panel.plot(time, 1e3 * curves.deviation[rank], color=plot.GREY, linewidth=0.8, label=own)
+            panel.plot(time, 1e3 * curves.rest[rank], color=plot.COLOURS[0], linewidth=0.8, label=ours)
+        panel.set_ylabel(f"{axis.name}, {axis.small_unit}")
     panels[-1].set_xlabel("time in s")
     plot.legend_above(panels[0])
     return plot.aligned(panels)

@@ -7,15 +7,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.cutting.tool import Tool
 from shapegcode.errors import ArgumentError
-from shapegcode.testcut.conditions import CornerShape, CutConditions
+from shapegcode.machine import Machine
 from shapegcode.testcut.cut import (
+    FIGURES,
     CornerDetails,
+    CuttingLaw,
+    CutTool,
     DeeperStretch,
     Deepest,
     IntervalDetails,
@@ -23,21 +28,110 @@ from shapegcode.testcut.cut import (
     TaperDetails,
     TestCut,
 )
-from shapegcode.testcut.design_result import CutDesign
 from shapegcode.testcut.edges import Edge, left_edge, reduced, tool_path, unrolled_edge
-from shapegcode.testcut.engagement import engagement, straight_engagement
-from shapegcode.testcut.force import ForceLaw
-
-__all__ = ["corner_cut", "interval_cut", "taper_cut"]
+from shapegcode.testcut.forces import ForceLaw, engagement, straight_engagement
+from shapegcode.testcut.result import CutDesign
 
 Array = npt.NDArray[np.float64]
+_Sizes = tuple[float, float, float]  # of a corner: allowance, rough and finish radius
+_Block = tuple[float | None, float]  # X up to which a feed holds (None: the end of the pass), feed in mm/min
+
+_MIN_AIR_MM = 5.0
+_AIR_REVS = 20.0
+_MAX_DEPTH_RATIO = 0.95  # of the radius, up to which a radial depth is taken
+
+
+@dataclass(frozen=True)
+class CutConditions:
+    """What every test cut needs to know; what machine and tool cannot do is refused when a cut is drawn up.
+
+    Attributes:
+        machine: whose controller runs the program.
+        tool: the tool file.
+        feed_mm_per_min: of the measuring passes; of a corner that of its straight part.
+        axial_depth_mm: of every pass.
+        spindle_rev_per_min: of every pass; None: `feed.spindle_rev_per_min` of the tool.
+        up: up milling, the material on the left of the feed.
+    """
+
+    machine: Machine
+    tool: Tool
+    feed_mm_per_min: float
+    axial_depth_mm: float
+    spindle_rev_per_min: float | None = None
+    up: bool = False
+
+    @property
+    def spindle(self) -> float:
+        """Spindle speed, rev/min.
+
+        Raises:
+            ArgumentError: neither conditions nor tool state one.
+        """
+        known = self.tool.feed.spindle_rev_per_min if self.spindle_rev_per_min is None else self.spindle_rev_per_min
+        if known is None:
+            raise ArgumentError("the tool has no feed.spindle_rev_per_min: state the spindle speed (-S)")
+        return known
+
+    @property
+    def diameter_mm(self) -> float:
+        """Of the tool."""
+        return 2.0 * self.tool.radius_mm
+
+    def _cut_tool(self) -> CutTool:
+        """The tool as the side file holds it."""
+        cutter = self.tool.tool
+        runout = tuple(0.001 * value for value in cutter.runout_um or ())
+        return CutTool(
+            cutter.diameter_mm, cutter.flutes, cutter.helix_deg, runout, CuttingLaw.of(self.tool.coefficients())
+        )
+
+    def _check_feeds(self, feeds_mm_per_min: Sequence[float]) -> None:
+        """Refuse what the machine or the tool cannot do."""
+        low, high = self.machine.controller.minimum_feed_mm_per_min, self.machine.axes.x.max_feed_mm_per_min
+        for feed in feeds_mm_per_min:
+            if not low <= feed <= high:
+                raise ArgumentError(f"a feed of {feed:g} mm/min: this machine takes {low:g} to {high:g} mm/min")
+        long = self.tool.tool.flute_length_mm
+        if self.axial_depth_mm > long:
+            raise ArgumentError(f"an axial depth of {self.axial_depth_mm:g} mm: the flutes are {long:g} mm long")
+        if self.tool.sense() != _core.SpindleSense.clockwise:
+            raise ArgumentError("the tool turns counter-clockwise: test cuts are written for M03 only")
+
+    def _check_depths(self, low_mm: float, high_mm: float) -> None:
+        """Refuse radial depths that the round tool cannot have on a straight pass."""
+        limit = _MAX_DEPTH_RATIO * self.tool.radius_mm
+        if not 0.0 < low_mm <= high_mm <= limit:
+            raise ArgumentError(
+                f"radial depths from {low_mm:g} to {high_mm:g} mm: must ascend, above 0, at most {limit:g} mm"
+            )
+
+
+@dataclass(frozen=True)
+class CornerShape:
+    """An inside corner between two straight walls at a right angle (paper 001, figure 1; docs/evidence/references.md).
+
+    Attributes:
+        allowance_mm: radial depth on the walls; None: 0.1 D of the tool.
+        rough_radius_mm: of the corner that roughing left; None: D.
+        finish_radius_mm: of the finished corner; None: D.
+    """
+
+    allowance_mm: float | None = None
+    rough_radius_mm: float | None = None
+    finish_radius_mm: float | None = None
+
+    def _sizes_mm(self, diameter_mm: float) -> _Sizes:
+        """The three values for a tool; of what is not given, case 1 of the paper."""
+        given = (self.allowance_mm, self.rough_radius_mm, self.finish_radius_mm)
+        usual = (0.1 * diameter_mm, diameter_mm, diameter_mm)
+        allowance, rough, finish = (other if own is None else own for own, other in zip(given, usual, strict=True))
+        return allowance, rough, finish
+
 
 _STATION_MM = 0.01
 _FEW_UM = 1e-3  # mm
 _SAME_MM = 1e-6
-
-_Sizes = tuple[float, float, float]  # of a corner: allowance, rough and finish radius
-_Block = tuple[float | None, float]  # X up to which a feed holds (None: the end of the pass), feed in mm/min
 
 
 def taper_cut(
@@ -61,9 +155,9 @@ def taper_cut(
         ArgumentError: what the tool or the machine cannot do.
     """
     feeds = feeds_mm_per_min or [given.feed_mm_per_min * share for share in (0.5, 1.0, 2.0)]
-    given.check_feeds(feeds)
+    given._check_feeds(feeds)
     low, high = depths_mm or (0.05 * given.diameter_mm, 0.35 * given.diameter_mm)
-    given.check_depths(low, high)
+    given._check_depths(low, high)
     if low == high:
         raise ArgumentError(f"a taper with {low:g} mm at both ends: the radial depth must grow")
     if high - low > 0.2 * length_mm:
@@ -89,10 +183,10 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     Raises:
         ArgumentError: the corner cannot be unrolled, or is more than the tool or the machine can do.
     """
-    sizes = (corner or CornerShape()).sizes_mm(given.diameter_mm)
+    sizes = (corner or CornerShape())._sizes_mm(given.diameter_mm)
     interval = given.machine.feed_control.interval_mm if interval_mm is None else interval_mm
     constant: _Block = (None, given.feed_mm_per_min)
-    given.check_feeds([given.feed_mm_per_min])
+    given._check_feeds([given.feed_mm_per_min])
     radius = given.tool.radius_mm
     straight = max(10.0, 3.0 * radius)
     s, depth = _corner_depth(given, sizes)
@@ -105,17 +199,20 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     edge = reduced(left_edge(path, radius, -radius, stock + radius), 1e-4)
     x = np.arange(0.0, stock - radius, _STATION_MM)
     probe = _measuring_pass(given, edge, stock, "probe", [constant])
-    met = engagement(given.cut_tool(), probe, x, up=given.up).radial_depth_mm
+    met = engagement(given._cut_tool(), probe, x, up=given.up).radial_depth_mm
     off = np.flatnonzero(np.abs(met - sizes[0]) > _FEW_UM)
     begin, end = _rounded(min(straight, float(x[off[0]]))), max(straight + float(s[-1]), float(x[off[-1]]))
     blocks = _blocks(x, _corner_feeds(given, met), interval, begin, end)
-    given.check_feeds([feed for _, feed in blocks])
+    given._check_feeds([feed for _, feed in blocks])
+    excess = met - np.interp(x, s + straight, depth)
+    more = np.flatnonzero(excess > _FEW_UM)
+    deeper = DeeperStretch(float(x[more[0]]), float(x[more[-1]]), float(excess.max())) if more.size else None
     about = CornerDetails(
         *sizes,
         interval_mm=interval,
         corner_begins_at_mm=straight,
         radial_depth_mm=Deepest(float(met.max()), float(x[int(np.argmax(met))])),
-        deeper_than_corner=_stretch(x, met - np.interp(x, s + straight, depth)),
+        deeper_than_corner=deeper,
     )
     modified = [(begin, given.feed_mm_per_min), *blocks, constant]
     passes = [("CONSTANT FEED", [constant]), ("MODIFIED FEED", modified)]
@@ -142,11 +239,15 @@ def interval_cut(
     Raises:
         ArgumentError: what the tool or the machine cannot do.
     """
-    sizes = (corner or CornerShape()).sizes_mm(given.diameter_mm)
+    sizes = (corner or CornerShape())._sizes_mm(given.diameter_mm)
     depth, feed = sizes[0], given.feed_mm_per_min
-    sequences = [feeds_mm_per_min or _corner_feed_sequence(given, sizes, step) for step in intervals_mm]
-    given.check_feeds([feed, *(each for sequence in sequences for each in sequence)])
-    given.check_depths(depth, depth)
+    sequences = [list(feeds_mm_per_min or ())] * len(intervals_mm)
+    if not feeds_mm_per_min:
+        s, depths = _corner_depth(given, sizes)
+        needed = _corner_feeds(given, depths)
+        sequences = [[each for _, each in _blocks(s, needed, step, 0.0, float(s[-1]))] for step in intervals_mm]
+    given._check_feeds([feed, *(each for sequence in sequences for each in sequence)])
+    given._check_depths(depth, depth)
     straight = max(10.0, 4.0 * given.tool.radius_mm)
     longest = max(len(feeds) * step for feeds, step in zip(sequences, intervals_mm, strict=True))
     stock = float(math.ceil(longest + 2.0 * straight))
@@ -167,17 +268,8 @@ def _drawn(
     *,
     met: Edge | None = None,
 ) -> CutDesign:
-    """The design of measuring passes over one edge.
-
-    Args:
-        given: tool, spindle, axial depth.
-        edge: to be milled before each pass.
-        stock_mm: length of the stock along X.
-        passes: name and blocks of each.
-        about: figures of this kind of cut.
-        met: the edge that the round tool leaves; None: the same.
-    """
-    kinds = {TaperDetails: "taper", CornerDetails: "corner", IntervalDetails: "interval"}
+    """The design of measuring passes over one edge."""
+    kind = next(kind for kind, figures in FIGURES.items() if isinstance(about, figures))
     warnings = []
     if isinstance(about, CornerDetails) and about.deeper_than_corner is not None:
         deeper = about.deeper_than_corner
@@ -186,10 +278,10 @@ def _drawn(
             "the corner: there its edge is hollow more sharply than the tool is round; the side file has what is met"
         )
     cut = TestCut(
-        kind=kinds[type(about)],  # type: ignore[arg-type]
+        kind=kind,
         program="",
         machine=given.machine.name,
-        tool=given.cut_tool(),
+        tool=given._cut_tool(),
         spindle_rev_per_min=given.spindle,
         axial_depth_mm=given.axial_depth_mm,
         milling="up" if given.up else "down",
@@ -205,7 +297,9 @@ def _measuring_pass(
     """One pass over an edge, from air to air."""
     inside = (edge.x_mm > 0.0) & (edge.x_mm < stock_mm)
     x = np.concatenate([[0.0], edge.x_mm[inside], [stock_mm]])
-    air = given.air_mm(max(feed for _, feed in blocks)) + given.tool.radius_mm
+    # How far the pass goes through the air at both ends, by its largest feed.
+    air = max(_MIN_AIR_MM, math.ceil(_AIR_REVS * max(feed for _, feed in blocks) / given.spindle))
+    air += given.tool.radius_mm
     end = round(stock_mm + air, 3)
     return MeasuringPass(
         name=name,
@@ -218,13 +312,8 @@ def _measuring_pass(
 
 
 def _corner_feeds(given: CutConditions, radial_depth_mm: Array) -> Array:
-    """Feeds at which the mean resultant is that of the first depth (paper 001, eq. 7), mm/min.
-
-    Args:
-        given: tool, spindle, axial depth, feed of the first depth.
-        radial_depth_mm: (n,).
-    """
-    tool = given.cut_tool()
+    """Feeds at which the mean resultant is that of the first depth (paper 001, eq. 7), mm/min."""
+    tool = given._cut_tool()
     law = ForceLaw(tool, tool.cutting, given.spindle, given.axial_depth_mm)
     met = straight_engagement(tool, radial_depth_mm, up=given.up)
     force = law.forces(met, np.full(len(radial_depth_mm), given.feed_mm_per_min)).mean_resultant_n
@@ -232,7 +321,7 @@ def _corner_feeds(given: CutConditions, radial_depth_mm: Array) -> Array:
 
 
 def _blocks(x_mm: Array, feed: Array, interval_mm: float, begin: float, end: float) -> list[tuple[float, float]]:
-    """_Blocks of one length, each with the least feed within it."""
+    """Blocks of one length, each with the least feed within it."""
     count = max(1, math.ceil((end - begin) / interval_mm - 1e-9))
     blocks = []
     for k in range(count):
@@ -243,11 +332,7 @@ def _blocks(x_mm: Array, feed: Array, interval_mm: float, begin: float, end: flo
 
 
 def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[Array, Array]:
-    """Distance along the corner's path from the beginning of S2 on, and the radial depth until it is constant again.
-
-    Raises:
-        ArgumentError: not a corner, or none that changes the radial depth.
-    """
+    """Distance along the corner's path from the beginning of S2 on, and the radial depth until it is constant again."""
     allowance, rough, finish = sizes
     before = 2.0 * (rough + finish)
     cut = _core.CornerCut(given.tool.radius_mm, rough, finish, allowance, before_mm=before, after_mm=before)
@@ -262,20 +347,6 @@ def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[Array, Array]:
         raise ArgumentError("the radial depth of this corner does not change: nothing to unroll")
     last = min(int(off[-1]) + 2, len(s))
     return s[:last], depth[:last]
-
-
-def _corner_feed_sequence(given: CutConditions, sizes: _Sizes, interval_mm: float) -> list[float]:
-    """Feeds of a corner in blocks of one length, mm/min."""
-    s, depth = _corner_depth(given, sizes)
-    return [feed for _, feed in _blocks(s, _corner_feeds(given, depth), interval_mm, 0.0, float(s[-1]))]
-
-
-def _stretch(x_mm: Array, excess_mm: Array) -> DeeperStretch | None:
-    """Where the passes meet more than the corner has, by more than 1 µm."""
-    off = np.flatnonzero(excess_mm > _FEW_UM)
-    if off.size == 0:
-        return None
-    return DeeperStretch(float(x_mm[off[0]]), float(x_mm[off[-1]]), float(excess_mm.max()))
 
 
 def _rounded(value: float) -> float:

@@ -14,8 +14,6 @@ from shapegcode.io.columns import Label, Meaning, read_label, unit_of, words_of
 from shapegcode.io.table import TextTable
 from shapegcode.io.units import factor_between, find_unit, units_of
 
-__all__ = ["ServoLog", "parse_units", "read_log"]
-
 Array = npt.NDArray[np.float64]
 _ACTUAL = {"act", "actual", "fb", "feedback", "fbk", "measured", "meas", "ist", "real"}
 _TIME = {"time", "t", "timestamp", "zeit"}
@@ -26,19 +24,12 @@ _SHORTEST_S, _LONGEST_S = 2e-5, 0.05
 
 @dataclass(frozen=True)
 class ServoLog:
-    """One record.
+    """One record."""
 
-    Attributes:
-        file: where it was read.
-        times_s: time of each row, from 0 on.
-        command_mm: shape (n, 3), commanded X, Y, Z; NaN for an axis that was not recorded.
-        actual_mm: the same for actual positions; None if none was recorded.
-    """
-
-    file: str
-    times_s: Array
-    command_mm: Array
-    actual_mm: Array | None
+    file: str  # where it was read
+    times_s: Array  # time of each row, from 0 on
+    command_mm: Array  # shape (n, 3), commanded X, Y, Z; NaN for an axis that was not recorded
+    actual_mm: Array | None  # the same for actual positions; None if none was recorded
 
     @property
     def sampling_s(self) -> float:
@@ -47,17 +38,7 @@ class ServoLog:
 
 
 def parse_units(text: str) -> tuple[float, float]:
-    """Read ``TIME,LENGTH``, for example ``ms,um``: the factors to s and mm.
-
-    Args:
-        text: of the option ``--units``.
-
-    Returns:
-        Factors to s and to mm.
-
-    Raises:
-        ArgumentError: a unit is not known.
-    """
+    """Read ``TIME,LENGTH``, for example ``ms,um``: the factors to s and mm."""
     units = [find_unit(word) for word in text.split(",")]
     if [unit and unit.measures for unit in units] != ["time", "displacement"]:
         raise ArgumentError(
@@ -138,20 +119,7 @@ def _length_units(table: TextTable, columns: _Columns) -> list[float]:
 
 
 def read_log(path: Path, units: tuple[float, float] | None = None) -> ServoLog:
-    """Read a servo log.
-
-    Args:
-        path: CSV with a header; delimiter, decimal comma, lines above the header and a row of units are found out.
-        units: factors to s and mm; None: from the header (``time_ms``, ``X [um]``), else a time step from 0.02 to 50 ms
-            and mm.
-
-    Returns:
-        Times in s, commanded and actual positions in mm.
-
-    Raises:
-        ArgumentError: what is wrong, with file, line, value and limit.
-        OSError: the file cannot be read.
-    """
+    """Read a servo log."""
     table = TextTable(path)
     columns = _columns(table)
     values = table.numbers(columns.used, _FEWEST_ROWS)

@@ -15,8 +15,6 @@ from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
 
-__all__ = ["ServoAxis", "ServoCurves", "ServoEstimate", "ServoFit", "ServoModel"]
-
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -62,20 +60,13 @@ class ServoModel:
 
 @dataclass(frozen=True, eq=False)
 class ServoCurves:
-    """What the picture shows of an axis, one array for each stretch without a gap.
+    """What the picture shows of an axis, one array for each stretch without a gap."""
 
-    Attributes:
-        time_s: (n,).
-        speed: of the command, (n,).
-        lag: command less actual position, (n,).
-        deviation: the control's contour deviation, (n,); None: not recorded.
-        rest: what the best model leaves of the lag, each sample judged by the fit to the other half, (n,).
-    """
-
-    time_s: tuple[FloatArray, ...]
-    speed: tuple[FloatArray, ...]
-    lag: tuple[FloatArray, ...]
-    deviation: tuple[FloatArray, ...] | None
+    time_s: tuple[FloatArray, ...]  # (n,)
+    speed: tuple[FloatArray, ...]  # of the command, (n,)
+    lag: tuple[FloatArray, ...]  # command less actual position, (n,)
+    deviation: tuple[FloatArray, ...] | None  # the control's contour deviation, (n,); None: not recorded
+    # what the best model leaves of the lag, each sample judged by the fit to the other half, (n,)
     rest: tuple[FloatArray, ...]
 
 
@@ -111,6 +102,11 @@ class ServoAxis:
     def best(self) -> ServoModel | None:
         """The model that leaves least in samples that it was not fitted to."""
         return min(self.models, key=lambda each: each.rest, default=None)
+
+    @property
+    def small_unit(self) -> str:
+        """A thousandth of the unit."""
+        return "µm" if self.unit == "mm" else "mdeg"
 
     def model(self, name: str) -> ServoModel | None:
         """A model.
@@ -169,7 +165,7 @@ class ServoFit(Result):
         if not fitted:
             return f"{self.source}: no axis changes its speed: nothing follows but the lag at constant speed"
         said = ", ".join(
-            f"{axis.name} {1e3 * axis.lag_rms:.4g} to {1e3 * best.rest:.3g} {_small(axis)}"
+            f"{axis.name} {1e3 * axis.lag_rms:.4g} to {1e3 * best.rest:.3g} {axis.small_unit}"
             for axis in fitted
             if (best := axis.best) is not None
         )
@@ -213,19 +209,14 @@ class ServoFit(Result):
         """What the models explain, and their parameters."""
         explained = (
             Column("axis", value="name", left=True),
-            Column("unit", value=_small, left=True),
+            Column("unit", value="small_unit", left=True),
             Column("top speed", "/s", "top_speed", digits=1),
             Column("lag", value=lambda axis: _milli(axis.lag_rms)),
-            *(
-                Column(heading, value=lambda axis, name=name: _rest(axis, name))  # type: ignore[misc]
-                for name, heading in (
-                    ("servo lag", "servo lag"),
-                    ("dead time and servo lag", "and dead time"),
-                    ("drive", "drive"),
-                )
-            ),
+            Column("servo lag", value=partial(_rest, "servo lag")),
+            Column("and dead time", value=partial(_rest, "dead time and servo lag")),
+            Column("drive", value=partial(_rest, "drive")),
             Column("control's model", value=lambda axis: _milli(axis.deviation_rms)),
-            Column("of that explained", "%", _explained, digits=1),
+            Column("of that explained", "%", lambda axis: axis.best and axis.best.explained_percent, digits=1),
         )
         fitted = [axis for axis in self.axes if axis.parameters]
         drives = [axis for axis in fitted if axis.model("drive")]
@@ -244,21 +235,13 @@ class ServoFit(Result):
         return self._drawn_beside()
 
 
-def _small(axis: ServoAxis) -> str:
-    return "µm" if axis.unit == "mm" else "mdeg"
-
-
 def _milli(value: float | None) -> str:
     return "" if value is None else f"{1e3 * value:.4g}"
 
 
-def _rest(axis: ServoAxis, name: str) -> str:
+def _rest(name: str, axis: ServoAxis) -> str:
     found = axis.model(name)
     return "" if found is None else _milli(found.rest)
-
-
-def _explained(axis: ServoAxis) -> float | None:
-    return None if axis.best is None else axis.best.explained_percent
 
 
 _LAG = (

@@ -23,8 +23,6 @@ from shapegcode.settings.keys import Positive, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem, line_of
 
-__all__ = ["RunEntry", "RunsFile", "load_runs"]
-
 Use = Literal["fit", "test"]
 _HEAD_BYTES = 4096
 _Path = Annotated[str, Strict(), Field(min_length=1)]
@@ -199,23 +197,20 @@ class _Found:
         program = self._folder / row.program
         if row.leave_out is None and not program.is_file():
             self._problem(f"{place}.program", row.program, "no such file")
+        key = "log" if row.logs is None else "logs"
         logs = tuple(
             log
-            for key, pattern in [("log", row.log)] * (row.log is not None) + [("logs", each) for each in row.logs or ()]
-            for log in self._logs(f"{place}.{key}", pattern or "", number, program, row.leave_out is None)
+            for pattern in row.logs or [row.log or ""]
+            for log in self._logs(f"{place}.{key}", pattern, number, program, row.leave_out is None)
         )
+        same = ("use", "format", "override_percent", "rapid_override_percent", "leave_out", "logged_as")
         return RunEntry(
-            program=program,
-            logs=logs,
-            use=row.use,
+            program,
+            logs,
             feed_unit=None if row.feed_unit is None else stated_feed_unit(row.feed_unit),
             items=tuple((row.items or {}).items()),
-            format=row.format,
-            logged_as=row.logged_as,
-            override_percent=row.override_percent,
-            rapid_override_percent=row.rapid_override_percent,
-            leave_out=row.leave_out,
             line=line_of(place, self._text),
+            **{name: getattr(row, name) for name in same},
         )
 
     def shared(self, entry: RunEntry) -> tuple[Path, ...]:

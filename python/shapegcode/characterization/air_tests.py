@@ -1,0 +1,379 @@
+"""The tests: parts of equal moves in the air, those for a machine and a box, and how long they last.
+
+A test is one program. A part of it is a number of equal moves on one axis that go out and come back, so that every
+program ends where it began. The fit needs only these facts, which ``RESULTS.toml`` repeats.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+from shapegcode.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+
+AXES = ("X", "Y", "Z")
+BlockEnd = Literal["ceil", "carry"]  # what becomes of the rest of a period at the end of a block
+Kind = Literal["stopwatch", "log"]
+Pattern = Literal["pause", "continuous", "dwell", "exact", "rapid", "feed_steps"]
+_LARGEST_BOX_MM = 10_000.0
+
+
+@dataclass(frozen=True)
+class AirBox:
+    """Where the tests may move, relative to the point at which the operator starts them."""
+
+    low: tuple[float, float, float] = (0.0, 0.0, 0.0)  # smallest X, Y, Z in mm, 0 or below
+    high: tuple[float, float, float] = (100.0, 100.0, 20.0)  # largest X, Y, Z in mm, 0 or above
+
+    @classmethod
+    def parse(cls, text: str) -> AirBox:
+        """Read ``X0:X1,Y0:Y1,Z0:Z1`` in mm from the start point, for example ``0:100,-50:50,0:20``."""
+        number = r"([-+]?\d+(?:\.\d*)?)"
+        found = re.fullmatch(",".join([rf"\s*{number}:{number}\s*"] * 3), text)
+        if not found:
+            raise ArgumentError(f"--box {text}: must be X0:X1,Y0:Y1,Z0:Z1 in mm from the start point")
+        values = [float(word) for word in found.groups()]
+        for axis, low, high in zip(AXES, values[::2], values[1::2], strict=True):
+            if not low <= 0.0 <= high or low == high:
+                raise ArgumentError(
+                    f"--box {text}: {axis} from {low:g} to {high:g} mm does not hold the start point, which is 0"
+                )
+            if max(-low, high) > _LARGEST_BOX_MM:
+                raise ArgumentError(f"--box {text}: {axis} reaches {max(-low, high):g} mm, the limit is 10000")
+        return cls(tuple(values[::2]), tuple(values[1::2]))  # type: ignore[arg-type]
+
+    def travel_mm(self, axis: str) -> float:
+        """Signed way from the start point to the farther side, in mm."""
+        index = AXES.index(axis)
+        low, high = self.low[index], self.high[index]
+        return high if high >= -low else low
+
+    def __str__(self) -> str:
+        """As :meth:`parse` reads it."""
+        return ",".join(f"{low:g}:{high:g}" for low, high in zip(self.low, self.high, strict=True))
+
+
+@dataclass(frozen=True)
+class Part:
+    """A number of equal moves on one axis."""
+
+    # `continuous`: cutting moves that overlap; `dwell`: a dwell after each; `exact`: exact stop (G61) after each;
+    # `rapid`: G00; `feed_steps`: cutting moves, alternately at the feed and at half of it; `pause`: one dwell, no
+    # motion
+    pattern: Pattern
+    axis: str = "X"
+    count: int = 1
+    length_mm: float = 0.0  # negative if the first goes in the negative direction
+    feed_mm_per_min: float = 0.0  # cutting feed; the rapid rate at 100 % for a rapid, as the machine file has it
+    stride: int = 1  # moves in one direction before the direction turns
+    dwell_s: float = 0.0  # dwell after each move (`dwell`), or the pause
+
+    @property
+    def duration_s(self) -> float:
+        """Length over feed of one move, in s, at 100 % override."""
+        return abs(self.length_mm) / self.feed_mm_per_min * 60.0 if self.feed_mm_per_min else 0.0
+
+
+@dataclass(frozen=True)
+class AirTest:
+    """One run of one program."""
+
+    name: str  # of the test, as in `RESULTS.toml`
+    number: int  # O number of its program
+    kind: Kind  # `stopwatch`: timed from start to end; `log`: recorded by the control
+    purpose: str  # what it is for, in one line
+    parts: tuple[Part, ...]
+    override_percent: int = 100
+
+    @property
+    def program(self) -> str:
+        """Name of the program's file."""
+        return f"O{self.number:04d}.nc"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One block of a part: a move, or a dwell where ``length_mm`` is 0."""
+
+    length_mm: float
+    feed_mm_per_min: float  # its feed; 0 for a rapid and for a dwell
+    dwell_s: float = 0.0
+
+
+def steps(part: Part) -> Iterator[Step]:
+    """The blocks of a part in their order."""
+    if part.pattern == "pause":
+        yield Step(0.0, 0.0, part.dwell_s)
+        return
+    for index in range(part.count):
+        sign = 1 if index // part.stride % 2 == 0 else -1
+        slow = part.pattern == "feed_steps" and index % 2 == 1
+        feed = 0.0 if part.pattern == "rapid" else part.feed_mm_per_min * (0.5 if slow else 1.0)
+        yield Step(sign * part.length_mm, feed)
+        if part.pattern == "dwell":
+            yield Step(0.0, 0.0, part.dwell_s)
+
+
+def check(test: AirTest, box: AirBox) -> None:
+    """Make sure that a test stays inside the box and ends where it began."""
+    at = dict.fromkeys(AXES, 0.0)
+    for part in test.parts:
+        index = AXES.index(part.axis)
+        for step in steps(part):
+            at[part.axis] += step.length_mm
+            place = at[part.axis]
+            if not box.low[index] - 1e-6 <= place <= box.high[index] + 1e-6:
+                raise ArgumentError(
+                    f"test {test.name}: {part.axis} would go to {place:.3f} mm, the box is "
+                    f"{box.low[index]:g} to {box.high[index]:g} mm"
+                )
+    if not all(math.isclose(place, 0.0, abs_tol=1e-6) for place in at.values()):
+        raise ArgumentError(f"test {test.name} would not end where it began: {at}")
+
+
+#: Feeds to choose from, mm/min: in each, 1 µm is a small and exact part of a period.
+_FEEDS = (3000.0, 1200.0, 600.0, 300.0, 120.0, 60.0)
+_FIRST_NUMBER = 7001  # 8000 and 9000 are often locked
+_STOP_S = 0.032  # a whole multiple of every usual interpolation period
+_LOG_STOP_S = 0.160
+_STOP_DWELL_S = 0.008
+_LOG_DWELL_S = 0.096
+_LOG_PAUSE_S = 0.5
+_STEPS_WAY_S = 0.8  # at full feed: longer than the ramps at both ends
+_LOG_RATIOS = (1.0, 0.5, 0.25, 0.1, 0.05)
+_MORE_RATIOS = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.45, 0.4, 0.35)
+_LONG_RAPID_S = 0.2
+_LONG_RAPIDS = ((1.0, 100), (0.5, 100), (0.2, 60), (0.14, 60), (0.1, 60), (0.07, 60), (0.05, 60), (0.03, 60))
+_SHORT_RAPIDS = ((1.0, 100), (0.85, 60), (0.7, 60), (0.55, 60), (0.4, 60), (0.3, 60), (0.2, 60), (0.1, 60), (0.05, 60))
+_PER_MINUTE = 60.0
+
+
+class _Maker:
+    """Draws up the parts of tests for one machine and one box."""
+
+    def __init__(self, machine: Machine, box: AirBox) -> None:
+        self._box = box
+        self._step = machine.controller.least_increment_mm
+        axes = machine.axes.as_tuple()
+        largest = 0.5 * min(axis.max_feed_mm_per_min for axis in axes)
+        usable = [feed for feed in _FEEDS if feed <= largest]
+        if not usable:
+            raise ArgumentError(f"half of the smallest max_feed is {largest:g} mm/min; the tests need 60 or more")
+        self.feed = usable[0]
+        self.rapid = {name: axis.rapid_mm_per_min for name, axis in zip(AXES, axes, strict=True)}
+
+    def _room(self, axis: str) -> float:
+        return abs(self._box.travel_mm(axis)) + 1e-9
+
+    def _signed(self, axis: str, increments: int) -> float:
+        """A length towards the farther side of the box."""
+        length = round(increments * self._step, 9)
+        if not 0.0 < length <= self._room(axis):
+            needed, room = max(length, self._step), abs(self._box.travel_mm(axis))
+            raise ArgumentError(f"--box {self._box}: {axis} has {room:g} mm, a test needs {needed:.3f} mm")
+        return math.copysign(length, self._box.travel_mm(axis))
+
+    def _length(self, axis: str, duration_s: float, feed: float, side: int) -> float:
+        """Signed length for a duration; *side* -1 and +1: just below and just above it, whatever the increment."""
+        exact = duration_s * feed / _PER_MINUTE
+        margin = max(self._step, 0.0005 * exact) if side else 0.0
+        increments = round((exact + side * margin) / self._step)
+        if side and (increments * self._step - exact) * side <= 0.0:
+            increments += side
+        return self._signed(axis, max(increments, 1))
+
+    def stops(
+        self, pattern: Pattern, axis: str, count: int, side: int, *, log: bool = False, slower: float = 1.0
+    ) -> Part:
+        """Moves of nearly the same duration, each ending in a stop."""
+        base, dwell = (_LOG_STOP_S, _LOG_DWELL_S) if log else (_STOP_S, _STOP_DWELL_S)
+        feed = self.feed / slower
+        length = self._length(axis, base, feed, side)
+        return Part(pattern, axis, count, length, feed, dwell_s=dwell if pattern == "dwell" else 0.0)
+
+    def run(self, axis: str, count: int, duration_s: float, side: int = 0) -> Part:
+        """Continuous moves, there and back over as much of the box as they fill evenly."""
+        length = self._length(axis, duration_s, self.feed, side)
+        stride = min(int(self._room(axis) / abs(length)), count // 2)
+        turns = max(1, round(count / (2 * stride)))
+        return Part("continuous", axis, 2 * stride * turns, length, self.feed, stride)
+
+    def rapids(self, axis: str, ratio: float, count: int) -> Part:
+        """Rapids over a part of the box."""
+        increments = math.floor(ratio * abs(self._box.travel_mm(axis)) / self._step + 1e-9)
+        return Part("rapid", axis, count, self._signed(axis, increments), self.rapid[axis])
+
+    def rate_is_reached(self, axis: str) -> bool:
+        """Whether rapids over the box reach their rate.
+
+        Where they may not, each gives only a bracket, so there are more of them. Half a short rapid lasts whole
+        periods: lengths that round differently tell the time constant.
+        """
+        return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
+
+    def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
+        """Pieces of one length, alternately fast and slow, and back."""
+        room = int(self._room(axis) / length_mm)
+        wanted = max(8, 2 * math.ceil(_STEPS_WAY_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
+        stride = min(wanted, room - room % 2)
+        if stride < 4:
+            return []
+        length = self._signed(axis, round(length_mm / self._step))
+        return [Part("feed_steps", axis, 2 * stride, length, self.feed, stride), Part("pause", dwell_s=_LOG_PAUSE_S)]
+
+
+def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
+    """The tests for a machine: those for a stopwatch first, then the shorter ones for a servo log."""
+    make = _Maker(machine, box)
+    tests: list[AirTest] = []
+
+    def add(
+        kind: Kind, name: str, purpose: str, parts: Iterable[Part], override: int = 100, same: bool = False
+    ) -> None:
+        number = tests[-1].number if same else _FIRST_NUMBER + len({test.number for test in tests})
+        test = AirTest(name, number, kind, purpose, tuple(parts), override)
+        check(test, box)
+        tests.append(test)
+
+    def stopwatch(name: str, purpose: str, part: Part, override: int = 100, same: bool = False) -> None:
+        add("stopwatch", name, purpose, [part], override, same)
+
+    stopwatch("overhead", "TIME OF START AND END OF A PROGRAM", Part("pause", dwell_s=10.0))
+    stopwatch("stop_below", "TIME CONSTANT", make.stops("dwell", "X", 200, -1))
+    stopwatch("stop_above", "INTERPOLATION PERIOD", make.stops("dwell", "X", 200, +1))
+    stopwatch("stop_slow", "SHAPE OF THE ACCELERATION", make.stops("dwell", "X", 200, -1, slower=5.0))
+    stopwatch("stop_slower", "SHAPE OF THE ACCELERATION", make.stops("dwell", "X", 200, -1, slower=20.0))
+    stopwatch("run_above", "CEIL OR CARRY", make.run("X", 600, _STOP_S, +1))
+    for axis in AXES:
+        stopwatch(f"exact_{axis.lower()}", f"IN-POSITION TIME OF {axis}", make.stops("exact", axis, 200, -1))
+    stopwatch("blocks_tiny", "BLOCK TIME", make.run("X", 2000, 0.0002))
+    stopwatch("blocks_short", "BLOCK TIME, KNEE", make.run("X", 1000, 0.0041))
+    stopwatch("blocks_medium", "BLOCK TIME, KNEE", make.run("X", 1000, 0.0121))
+    for axis in AXES:
+        for ratio, count in _LONG_RAPIDS if make.rate_is_reached(axis) else _SHORT_RAPIDS:
+            name = f"rapid_{axis.lower()}_{ratio * 100:.0f}"
+            stopwatch(name, f"RAPID OF {axis}, {ratio * 100:.0f} PERCENT OF THE BOX", make.rapids(axis, ratio, count))
+    override_run = make.run("X", 20, min(1.0, abs(box.travel_mm("X")) / make.feed * _PER_MINUTE))
+    for percent in (50, 100, 120):
+        stopwatch(f"override_{percent}", "FEED OVERRIDE", override_run, percent, same=percent != 50)
+
+    for name, purpose, parts in _log_tests(make):
+        add("log", name, purpose, parts)
+    return tests
+
+
+def _log_tests(make: _Maker) -> Iterator[tuple[str, str, list[Part]]]:
+    """Name, purpose and parts of the tests for a servo log; a pause stands behind each part."""
+    pause = Part("pause", dwell_s=_LOG_PAUSE_S)
+
+    def paused(parts: Iterable[Part]) -> list[Part]:
+        return [each for part in parts for each in (part, pause)]
+
+    stops = [make.stops("dwell", "X", 10, side, log=True) for side in (-1, +1)]
+    yield "log_cutting", "TIME CONSTANT, PERIOD", paused(stops)
+    yield "log_exact", "IN-POSITION TIMES", paused(make.stops("exact", axis, 10, -1, log=True) for axis in AXES)
+    yield "log_run", "CEIL OR CARRY", paused([make.run("X", 160, _STOP_S, +1)])
+    yield "log_blocks", "BLOCK TIME", paused([make.run("X", 1200, 0.0002)])
+    for axis in AXES:
+        ratios, count = (_LOG_RATIOS, 6) if make.rate_is_reached(axis) else ((*_LOG_RATIOS, *_MORE_RATIOS), 4)
+        rapids = paused(make.rapids(axis, ratio, count) for ratio in ratios)
+        yield f"log_rapid_{axis.lower()}", f"RAPID OF {axis}", rapids
+    lengths = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
+    parts = [part for length in lengths for part in make.feed_steps("X", length * make.feed / 3000.0)]
+    if parts:
+        yield "log_feed_steps", "FEED-CONTROL INTERVAL", parts
+
+
+# --- how long they last -----------------------------------------------------------------------------------------------
+#
+# On a controller that smooths after interpolation. Source: C.-Y. Lee, S.-K. Ro, C. K. Song, J. S. Oh: Cycle Time
+# Estimation of Block Overlap Based CNC, J. Korean Soc. Precis. Eng. 39(7), 2022 (paper 004), equations 2 to 16; the
+# in-position wait follows a rapid and an exact stop.
+
+NO_PERIOD_S = 1e-6  # so short that nothing is rounded
+_ROUND_OFF = 1e-6  # periods
+
+
+@dataclass(frozen=True)
+class ControllerTiming:
+    """The facts of a controller that decide how long a test lasts; times in s."""
+
+    period_s: float
+    block_end: BlockEnd
+    block_time_s: float  # shortest time in which a block is taken in
+    cutting_s: float  # from the end of a cutting command to rest: time constant and bell time
+    rapid_s: Mapping[str, float] = field(default_factory=dict)  # time constant of a rapid, by axis
+    rapid_bell_s: Mapping[str, float] = field(default_factory=dict)  # bell time of a rapid, by axis
+    in_position_s: Mapping[str, float] = field(default_factory=dict)  # wait after a rapid or an exact stop, by axis
+    overhead_s: float = 0.0  # what the stopwatch sees besides the program
+
+    @classmethod
+    def of(cls, machine: Machine) -> ControllerTiming:
+        """What a machine file says."""
+        control = machine.controller
+
+        def by_axis(value: object) -> dict[str, float]:
+            get = getattr(value, "as_tuple", None)
+            values = get() if get is not None else (value,) * 3
+            return dict(zip(AXES, values, strict=True))
+
+        return cls(
+            control.interpolation_period_s,
+            control.block_end,
+            control.block_time_s,
+            control.time_constant_s + control.bell_time_s,
+            by_axis(control.rapid_time_constant_s),
+            by_axis(control.rapid_bell_time_s),
+            by_axis(control.in_position_s),
+        )
+
+
+def whole_periods(duration_s: float, period_s: float) -> float:
+    """A duration rounded up to whole interpolation periods, in s."""
+    return math.ceil(duration_s / period_s - _ROUND_OFF) * period_s
+
+
+def _rapid_s(part: Part, timing: ControllerTiming) -> float:
+    ramp = timing.rapid_s[part.axis]
+    nominal = part.duration_s
+    if nominal >= ramp:
+        moving = whole_periods(nominal, timing.period_s) + ramp
+    else:
+        # acceleration = rate / time constant; half the way up, half the way down
+        moving = 2.0 * whole_periods(math.sqrt(nominal * ramp), timing.period_s)
+    return moving + timing.rapid_bell_s[part.axis] + timing.in_position_s[part.axis]
+
+
+def part_time_s(part: Part, timing: ControllerTiming, override: float = 1.0) -> float:
+    """Duration of one part in s."""
+    if part.pattern == "pause":
+        return part.dwell_s
+    if part.pattern == "rapid":
+        return part.count * _rapid_s(part, timing)
+    feeds = (1.0, 0.5) if part.pattern == "feed_steps" else (1.0,)
+    mean = 0.0
+    for feed in feeds:
+        nominal = part.duration_s / (feed * override)
+        if part.pattern in ("dwell", "exact"):
+            block = whole_periods(nominal, timing.period_s)
+        else:
+            block = whole_periods(nominal, timing.period_s) if timing.block_end == "ceil" else nominal
+            block = max(block, timing.block_time_s)
+        mean += block / len(feeds)
+    if part.pattern == "dwell":
+        return part.count * (mean + timing.cutting_s + part.dwell_s)
+    if part.pattern == "exact":
+        return part.count * (mean + timing.cutting_s + timing.in_position_s[part.axis])
+    return part.count * mean + timing.cutting_s
+
+
+def program_time_s(test: AirTest, timing: ControllerTiming) -> float:
+    """Duration of a test in s, with the operator's overhead."""
+    override = test.override_percent / 100.0
+    return timing.overhead_s + sum(part_time_s(part, timing, override) for part in test.parts)

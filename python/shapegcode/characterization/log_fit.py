@@ -1,0 +1,509 @@
+"""What servo logs of the test programs say about a controller: period, time constants, waits, blocks, position loop."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.characterization.air_tests import AXES, AirTest, whole_periods
+from shapegcode.characterization.moves import (
+    PartLog,
+    ShapeFit,
+    bend_samples,
+    fit_shape,
+    held_samples,
+    lagged_share,
+    line_slope,
+    parts_of,
+    smoothed_share,
+)
+from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, ControllerFact, Facts, mean
+from shapegcode.identification.servo.models import GAINS, lag_way
+from shapegcode.io.servo_log import ServoLog
+
+Array = npt.NDArray[np.float64]
+_Interval = tuple[float, float]  # a value and its half-width
+_FOLLOWED = 0.9
+_RUN_SETTLE_S = 0.45
+_STEPS_SETTLE_S = 0.3
+
+
+def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:
+    """Fit everything that the logs hold."""
+    bend = bend_samples(list(logs.values()))
+    parts = {name: parts_of(log, tests[name], bend) for name, log in logs.items()}
+    facts = LogFacts()
+    stops = [part for part in parts.get("log_cutting", []) if part.part.pattern == "dwell"]
+    run = parts.get("log_run", [])
+    _period(facts, logs, stops, run, bend)
+    stop_pitch: float | None = None
+    if stops:
+        fit_cutting(facts, stops)
+        stop_pitch = _dwells(facts, stops[0])
+    else:
+        facts.unknown("cutting time constant", "needs log_cutting")
+    _runs(facts, run, parts.get("log_blocks", []))
+    rapids = {
+        axis: fit_rapids(facts, axis, parts[f"log_rapid_{axis.lower()}"])
+        for axis in AXES
+        if f"log_rapid_{axis.lower()}" in parts
+    }
+    _waits(facts, _in_position(facts, parts.get("log_exact", []), stop_pitch), rapids)
+    _feed_steps(facts, parts.get("log_feed_steps", []))
+    fit_servo(facts, logs)
+    return facts.found
+
+
+def _period(facts: LogFacts, logs: Mapping[str, ServoLog], stops: list[PartLog], run: list[PartLog], bend: int) -> None:
+    """Interpolation period: from a held command, else from moves just below and just above whole periods."""
+    name, key = "interpolation period", "controller.interpolation_period_s"
+    count, sampling = min((held_samples(log)[0], log.sampling_s) for log in logs.values())
+    facts.sampling = sampling
+    note = f"the command changes every {count} samples"
+    if count == 1 and bend > 1:
+        facts.bent = True
+        count, note = bend, f"the speed of the command changes every {bend} samples"
+    if count > 1:
+        facts.period, facts.held = round(count * sampling, 6), True
+        facts.known(name, facts.period, 1e-3 * facts.period, key, note)
+        return
+    for found in (_period_of_stops(stops), _period_of_run(run, sampling)):
+        if found is not None:
+            facts.period, half, note = found
+            facts.known(name, facts.period, half, key, note)
+            return
+    why = f"not longer than the {sampling * 1e3:g} ms between samples, or interpolated between periods"
+    if len(stops) < 2 or not run:
+        why += "; log_cutting and log_run together may tell"
+    facts.unknown(name, why)
+
+
+def _period_of_stops(stops: list[PartLog]) -> tuple[float, float, str] | None:
+    """Of the usual periods the one that rounds two durations so far apart; its half-width and a note."""
+    if len(stops) < 2:
+        return None
+    (below, half_b), (above, half_a) = stops[0].pitch_s(), stops[1].pitch_s()
+    short, long = stops[0].part.duration_s, stops[1].part.duration_s
+    step, half = above - below, math.hypot(half_a, half_b) + 1e-4
+    expected = {t: whole_periods(long, t) - whole_periods(short, t) for t in PERIODS_S}
+    fits = [t for t, e in expected.items() if abs(e - step) <= half and t > long - short]
+    if step <= (long - short) + half or len(fits) != 1:
+        return None
+    return fits[0], half, f"moves of {short * 1e3:.2f} and {long * 1e3:.2f} ms differ by {step * 1e3:.2f} ms"
+
+
+def _period_of_run(run: list[PartLog], sampling: float) -> tuple[float, float, str] | None:
+    """Of the usual periods the one to which the blocks of a run are rounded; its half-width and a note."""
+    steady = line_slope(run[0], _RUN_SETTLE_S) if run else None
+    if steady is None:
+        return None
+    part = run[0].part
+    lasts = abs(part.length_mm) / steady[0]
+    slack = lasts * steady[1] / steady[0] + 2e-5
+    fits = [t for t in PERIODS_S if abs(whole_periods(part.duration_s, t) - lasts) <= slack and t <= 1.01 * sampling]
+    if lasts - part.duration_s <= 2.0 * slack or len(fits) != 1:
+        return None
+    note = f"blocks of {part.duration_s * 1e3:.2f} ms last {lasts * 1e3:.2f} ms, and no longer period shows"
+    return fits[0], slack, note
+
+
+def _dwells(facts: LogFacts, part: PartLog) -> float:
+    """Whether the control waits for in-position before a dwell; returns the pitch of the moves without the dwell."""
+    pitch, half = part.pitch_s()
+    moving = pitch - whole_periods(part.part.dwell_s, facts.tick)
+    if facts.stop_s is not None:
+        extra = moving - whole_periods(part.part.duration_s, facts.tick) - facts.stop_s
+        waits = extra > 2.0 * (half + facts.cutting_half) + 1.5 * (facts.period or 0.004)
+        facts.said("in-position wait before a dwell", f"yes, {extra * 1e3:.1f} ms" if waits else "no")
+    return moving
+
+
+def _in_position(facts: LogFacts, parts: list[PartLog], stop_pitch: float | None) -> dict[str, _Interval]:
+    """In-position time of each axis from exact stops."""
+    out = {}
+    for part in parts:
+        pitch, half = part.pitch_s()
+        if facts.stop_s is not None:
+            moving = whole_periods(part.part.duration_s, facts.tick) + facts.stop_s
+            half = half + facts.cutting_half + (0.0 if facts.period else 0.002)
+        elif stop_pitch is not None:
+            moving = stop_pitch
+            half *= 2.0
+        else:
+            continue
+        out[part.part.axis] = (pitch - moving, half)
+    return out
+
+
+def _waits(facts: LogFacts, stops: dict[str, _Interval], rapids: dict[str, list[_Interval]]) -> None:
+    """In-position times: after rapids, compared with those after exact stops."""
+    for axis in AXES:
+        name, key = f"in-position time {axis}", f"controller.in_position_s.{axis.lower()}"
+        after, stop = rapids.get(axis, []), stops.get(axis)
+        if not after and stop is None:
+            facts.unknown(name, f"needs log_exact or log_rapid_{axis.lower()}")
+            continue
+        value, half = mean(*zip(*after, strict=True)) if after else (0.0, math.inf)
+        note = "after rapids"
+        if stop is not None and not after:
+            value, half, note = *stop, "after exact stops"
+        elif stop is not None:
+            if abs(stop[0] - value) > stop[1] + half + (facts.period or 0.001):
+                note += f"; after exact stops {stop[0] * 1e3:.1f} ms"
+            else:
+                value, half = mean([value, stop[0]], [half, stop[1]])
+                note = "after rapids and exact stops"
+        if value < -half:
+            facts.unknown(name, f"{value * 1e3:.1f} ms: the next move begins too early")
+        else:
+            facts.known(name, max(value, 0.0), half, key, note)
+
+
+def _runs(facts: LogFacts, run: list[PartLog], blocks: list[PartLog]) -> None:
+    """Ceil or carry from the mean time of long blocks; the block time from short ones."""
+    settle = (facts.cutting or 0.1) * (4.5 if facts.exponential else 1.1)
+    end = None
+    if run:
+        end = _block_end(facts, run[0], settle)
+    else:
+        facts.unknown("block end", "needs log_run", "")
+    if blocks:
+        _block_time(facts, blocks[0], settle, end)
+    else:
+        facts.unknown("block time", "needs log_blocks")
+
+
+def _block_end(facts: LogFacts, run: PartLog, settle: float) -> str | None:
+    part = run.part
+    nominal = part.duration_s
+    speed, half = line_slope(run, settle) or (abs(part.length_mm) / nominal, math.inf)
+    lasts = abs(part.length_mm) / speed
+    note = f"blocks of {nominal * 1e3:.2f} ms last {lasts * 1e3:.2f} ms"
+    full = whole_periods(nominal, facts.period) - nominal if facts.period else None
+    slack = lasts * half / speed + 1e-5
+    end = None
+    if lasts - nominal > 3.0 * slack and (full is None or abs(lasts - nominal - full) < 0.3 * full + slack):
+        end = "ceil"
+    elif full is not None and abs(lasts - nominal) < 0.3 * full and slack < 0.3 * full:
+        end = "carry"
+    if end:
+        facts.said("block end", end, "controller.block_end", note)
+    else:
+        facts.unknown("block end", note + ": neither fits, or the period is not known", "")
+    return end
+
+
+def _block_time(facts: LogFacts, blocks: PartLog, settle: float, end: str | None) -> None:
+    name, part = "block time", blocks.part
+    lasting = f"blocks of {part.duration_s * 1e3:.2f} ms"
+    steady = line_slope(blocks, settle)
+    if steady is None:
+        facts.unknown(name, f"{lasting} are over before the speed is steady: it is short")
+        return
+    speed, half = steady
+    lasts = abs(part.length_mm) / speed
+    slack = lasts * half / speed
+    floor = part.duration_s
+    if facts.period and end != "carry":
+        floor = whole_periods(part.duration_s, facts.period)
+    if lasts <= 1.02 * floor + slack:
+        why = f"{lasting} last {lasts * 1e3:.2f} ms: it hides behind the period"
+        facts.unknown(name, why, high=lasts + slack)
+        return
+    if facts.exponential:
+        slack += 0.005 * lasts  # the tail of the start
+    facts.known(name, lasts, slack, "controller.block_time_s", f"{lasting} last so long")
+
+
+def _feed_steps(facts: LogFacts, parts: list[PartLog]) -> None:
+    """The shortest distance over which the speed follows a step of the feed between F and F/2 by 90 %."""
+    name = f"feed-control interval at F{parts[0].part.feed_mm_per_min:g}" if parts else "feed-control interval"
+    if not parts:
+        facts.unknown(name, "needs log_feed_steps", "mm")
+        return
+    depths = {abs(log.part.length_mm): depth for log in parts if (depth := _followed_share(log)) is not None}
+    followed = [d for d in depths if all(depths[e] >= _FOLLOWED for e in depths if e >= d)]
+    shown = ", ".join(f"{d:g} mm {max(0.0, min(1.0, depths[d])) * 100:.0f} %" for d in sorted(depths))
+    if not followed:
+        facts.unknown(name, f"no distance that fits into the box is followed: {shown}", "mm")
+        return
+    best = min(followed)
+    below = max((d for d in depths if d < best), default=0.0)
+    facts.between(name, best, below, best, "", f"followed: {shown}", "mm")
+
+
+def _followed_share(log: PartLog) -> float | None:
+    """How much of the step the speed follows; None where nothing of the way is steady."""
+    part = log.part
+    top = int(np.argmax(log.way_mm))  # the turn, which smoothing cuts short
+    begin = log.times_s[int(np.argmax(log.way_mm > max(0.02, 5 * log.noise_mm)))]
+    settle = min(_STEPS_SETTLE_S, 0.25 * (log.times_s[top] - begin))
+    inside = (log.times_s > begin + settle) & (log.times_s < log.times_s[top] - settle)
+    pitch = float(np.median(np.diff(log.times_s)))
+    width = max(1, round(min(0.02, 0.25 * part.duration_s) / pitch))
+    speed = (log.way_mm[width:] - log.way_mm[:-width]) / (log.times_s[width:] - log.times_s[:-width])
+    seen = speed[inside[width:] & inside[:-width]]
+    if not len(seen):
+        return None
+    noise = 2.0 * log.noise_mm * math.sqrt(2.0) / (width * pitch)
+    swing = float(np.percentile(seen, 99.0) - np.percentile(seen, 1.0)) - noise
+    return swing / (part.feed_mm_per_min / 120.0)
+
+
+# --- time constants from the shape of single moves --------------------------------------------------------------------
+
+_ODD_SHAPE = 0.002  # of the way: a fit that leaves more is no fit
+_BELL_GAIN = 0.8  # a second moving average must lower the variance below this share
+_FINE = 1.7  # periods
+_FINE_BENT = 1.0
+_NO_BELL = "no second moving average shows"
+_SHAPE_NOTES = {"linear": "linear", "bell": "the longer of two moving averages", "exponential": "exponential"}
+
+
+@dataclass
+class LogFacts(Facts):
+    """What the logs have told so far; times in s."""
+
+    source: str = "log"
+    period: float | None = None  # interpolation period; None: not known
+    held: bool = False  # whether the command is held over a period
+    bent: bool = False  # whether it is interpolated between periods
+    sampling: float = 0.001  # of the logs
+    cutting: float | None = None  # time constant and bell time of cutting moves together; None: not known
+    cutting_half: float = 0.0  # half-width of its interval
+    exponential: bool = False  # whether cutting moves have the shape of an exponential
+
+    @property
+    def tick(self) -> float:
+        """The period, or one so short that nothing is rounded."""
+        return self.period or 1e-6
+
+    @property
+    def stop_s(self) -> float | None:
+        """What a stop adds to a cutting move; None: not known, or an exponential, which has no end."""
+        return None if self.exponential else self.cutting
+
+    @property
+    def fine_s(self) -> float:
+        """A second moving average up to this length may be interpolation between unseen periods."""
+        if self.bent and self.period:
+            return _FINE_BENT * self.period
+        return 0.0 if self.held else _FINE * max(self.period or 0.0, 2.0 * self.sampling)
+
+
+# --- cutting moves ----------------------------------------------------------------------------------------------------
+
+
+def fit_cutting(facts: LogFacts, stops: list[PartLog]) -> None:
+    """Time constant and bell time from the shape of moves between stops."""
+    names = ("cutting time constant", "cutting bell time")
+    fits = _cutting_fits(facts, stops[:2])
+    rms = {shape: math.sqrt(sum(fit.rms_mm**2 for fit in each) / len(each)) for shape, each in fits.items()}
+    best = "exponential" if rms["exponential"] < min(rms["linear"], rms["bell"]) else "linear"
+    bell = [min(fit.values[1:]) for fit in fits["bell"]]
+    if best == "linear" and rms["bell"] ** 2 < _BELL_GAIN * rms["linear"] ** 2 and min(bell) > facts.fine_s:
+        best = "bell"
+    if rms[best] > _ODD_SHAPE * abs(stops[0].part.length_mm) + 3.0 * stops[0].noise_mm:
+        why = (
+            f"no moving average and no exponential: the best fit ({best}) leaves {rms[best] * 1e3:.1f} µm; "
+            "was a look-ahead mode on?"
+        )
+        for name in names:
+            facts.unknown(name, why)
+        return
+    # Of each fit the longest time first.
+    times = [
+        sorted(zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True), reverse=True) for fit in fits[best]
+    ]
+    value, half = mean(*zip(*(pairs[0] for pairs in times), strict=True))
+    facts.known(names[0], value, half, "controller.time_constant_s", _SHAPE_NOTES[best])
+    facts.said("cutting acceleration shape", best, "controller.after_interpolation_shape")
+    facts.exponential = best == "exponential"
+    facts.cutting, facts.cutting_half = value, half
+    bell_key = "controller.bell_time_s"
+    if best == "bell":
+        second, second_half = mean(*zip(*(pairs[1] for pairs in times), strict=True))
+        facts.known(names[1], second, second_half, bell_key)
+        facts.cutting, facts.cutting_half = value + second, math.hypot(half, second_half)
+    elif best == "linear":
+        facts.between(names[1], 0.0, 0.0, max(facts.fine_s, 0.002), bell_key, _NO_BELL)
+    if not facts.exponential:
+        # What a stopwatch sees.
+        facts.known(CUTTING_SUM, facts.cutting, facts.cutting_half)
+
+
+def _cutting_fits(facts: LogFacts, stops: list[PartLog]) -> dict[str, list[ShapeFit]]:
+    """Each part with each shape: its nominal duration and one or two times are fitted."""
+    fits: dict[str, list[ShapeFit]] = {"linear": [], "bell": [], "exponential": []}
+    for part in stops:
+        nominal = part.part.duration_s
+        low, high = nominal * 0.95, nominal + (facts.period or 0.004) * 1.1
+        one = [low, 1e-4], [high, 1.0]
+        fits["linear"].append(fit_shape(part, smoothed_share, [nominal, 0.05], *one))
+        two = [low, 1e-4, 1e-5], [high, 1.0, 0.5]
+        fits["bell"].append(fit_shape(part, smoothed_share, [nominal, 0.06, 0.02], *two))
+        fits["exponential"].append(fit_shape(part, lagged_share, [nominal, 0.03], *one))
+    return fits
+
+
+# --- rapids -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Rapid:
+    """Fit of one part of rapids; values with their half-widths, s."""
+
+    long: bool  # whether the rate is reached
+    ramp: tuple[float, float]
+    bell: tuple[float, float] | None
+    wait: tuple[float, float]
+    nominal: float
+    rms_mm: float
+
+
+def _rapid(part: PartLog, facts: LogFacts) -> _Rapid:
+    """The shape of rapids over one length, as a long move (the rate is reached) or a short one."""
+    nominal = part.part.duration_s
+    rectangle = whole_periods(nominal, facts.tick)
+    found: list[tuple[ShapeFit, bool, bool]] = []
+    for bell, ramp_guess in itertools.product((None, 0.005, 0.03, 0.08), (0.06, 0.15)):
+        begin = math.sqrt(nominal * ramp_guess)
+        tail, low, high = ([], [], []) if bell is None else ([bell], [1e-5], [0.5])
+        ends = [0.1 * begin, *low], [20.0 * begin, *high]
+        fit = fit_shape(part, lambda t, p: smoothed_share(t, [p[0], p[0], *p[1:]]), [begin, *tail], *ends)
+        found.append((fit, False, bell is not None))
+        ends = [1e-4, *low], [1.05 * rectangle, *high]
+        fit = fit_shape(part, lambda t, p: smoothed_share(t, [rectangle, *p]), [0.7 * rectangle, *tail], *ends)
+        found.append((fit, True, bell is not None))
+    plain = min((each for each in found if not each[2]), key=lambda each: each[0].rms_mm)
+    curved = min((each for each in found if each[2]), key=lambda each: each[0].rms_mm)
+    better = curved[0].rms_mm ** 2 < _BELL_GAIN * plain[0].rms_mm ** 2
+    fit, long, bell_found = curved if better and curved[0].values[1] > facts.fine_s else plain
+    values = list(zip(fit.values.tolist(), fit.half.tolist(), strict=True))
+    if long:
+        values.sort(reverse=True)
+    ramp, bell_value = values[0], values[1] if bell_found else None
+    moving = (rectangle if long else ramp[0]) + ramp[0] + (bell_value[0] if bell_value else 0.0)
+    slack = (1.0 if long else 2.0) * ramp[1] + (bell_value[1] if bell_value else 0.0)
+    pitch, half = part.pitch_s()
+    return _Rapid(long, ramp, bell_value, (pitch - moving, half + slack), nominal, fit.rms_mm)
+
+
+def fit_rapids(facts: LogFacts, axis: str, parts: list[PartLog]) -> list[tuple[float, float]]:
+    """Time constants of an axis' rapids; returns the in-position times that they show, with their half-widths."""
+    name, bell_name = f"rapid time constant {axis}", f"rapid bell time {axis}"
+    every = [_rapid(part, facts) for part in parts]
+    fits = [fit for fit, part in zip(every, parts, strict=True) if fit.rms_mm < _ODD_SHAPE * abs(part.part.length_mm)]
+    if not fits:
+        why = f"the rapids are no constant acceleration: the best fit leaves {every[0].rms_mm * 1e3:.1f} µm"
+        facts.unknown(name, why)
+        facts.unknown(bell_name, why)
+        return []
+    key = f"controller.rapid_time_constant_s.{axis.lower()}"
+    long = [fit.ramp for fit in fits if fit.long]
+    if long:
+        value, half = mean(*zip(*long, strict=True))
+        facts.known(name, value, half, key, "ramp of rapids that reach the rate")
+    else:
+        low, high = _short_ramp(facts, fits)
+        if low <= high:
+            note = "no rapid reaches the rate: from their acceleration, in whole periods"
+            facts.between(name, (low + high) / 2.0, low, high, key, note)
+        else:
+            facts.unknown(
+                name, "rapids of different length have different accelerations; is the rate in the machine file right?"
+            )
+    bells = [fit.bell for fit in fits if fit.bell is not None]
+    bell_key = f"controller.rapid_bell_time_s.{axis.lower()}"
+    if len(bells) * 2 > len(fits):
+        value, half = mean(*zip(*bells, strict=True))
+        facts.known(bell_name, value, half, bell_key)
+    else:
+        facts.between(bell_name, 0.0, 0.0, max(facts.fine_s, 0.002), bell_key, _NO_BELL)
+    return [fit.wait for fit in fits]
+
+
+def _short_ramp(facts: LogFacts, fits: list[_Rapid]) -> tuple[float, float]:
+    """Between which time constants rapids lie that do not reach the rate.
+
+    Half of such a rapid lasts ceil(sqrt(nominal * A) / T) T (eq. 16 of paper 004, docs/evidence/references.md).
+    """
+    period = facts.tick
+    halves = [(whole_periods(fit.ramp[0] - 0.3 * period, period), fit) for fit in fits]
+    sure = [(half, fit) for half, fit in halves if abs(half - fit.ramp[0]) + fit.ramp[1] < 0.3 * period]
+    slack = 0.0 if sure and facts.period else 1e-4
+    pairs = sure if slack == 0.0 else [(fit.ramp[0], fit) for fit in fits]
+    low = max((half - slack - period) ** 2 / fit.nominal for half, fit in pairs)
+    high = min((half + slack) ** 2 / fit.nominal for half, fit in pairs)
+    return low, high
+
+
+_SERVO_SLACK = 0.02
+
+
+def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
+    """Position gain K and feed-forward f: e = −K ∫e dt + (1 − f) x + c, fitted to following error e and command x."""
+    done = False
+    for index, axis in enumerate(AXES):
+        records = [each for log in logs.values() if (each := _servo_rows(log, index)) is not None]
+        if not records:
+            continue
+        done = True
+        name = f"position gain {axis}"
+        gain, rest = _lag_of(records)
+        if rest < 0.02 or not 2.0 * GAINS[0] < gain < 0.5 * GAINS[1]:
+            facts.unknown(name, "the actual position follows the command without a lag that tells it", "1/s")
+            continue
+        spread = np.std(np.array([_lag_of([record]) for record in records]), axis=0) / math.sqrt(len(records))
+        # Command and actual position may be sampled up to half a sample apart, which looks like lag.
+        apart = 0.5 * min(log.sampling_s for log in logs.values()) * gain
+        half = float(spread[0]) + (_SERVO_SLACK + apart / rest) * gain
+        facts.known(name, gain, half, f"controller.position_gain_per_s.{axis.lower()}", unit="1/s")
+        half = float(spread[1]) + _SERVO_SLACK + apart
+        key = f"controller.feed_forward_ratio.{axis.lower()}"
+        facts.known(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, key, unit="1")
+    if not done:
+        facts.unknown("position gain", "no actual positions in the logs", "1/s")
+
+
+def _servo_rows(log: ServoLog, index: int) -> tuple[Array, Array, float] | None:
+    """Command, following error and time step, one row for each held command so that its stairs are no error."""
+    if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
+        return None
+    count, first = held_samples(log)
+    n = (len(log.times_s) - first) // count
+
+    def rows(values: Array) -> Array:
+        return np.asarray(values[first : first + n * count].reshape(n, count).mean(axis=1))
+
+    way = rows(log.command_mm[:, index] - log.command_mm[0, index])
+    if np.ptp(way) < 1.0:
+        return None
+    error = way - rows(log.actual_mm[:, index] - log.actual_mm[0, index])
+    step = count * log.sampling_s
+    return way, error - np.median(error[: max(3, round(0.1 / step))]), step
+
+
+def _lag_of(records: list[tuple[Array, Array, float]]) -> tuple[float, float]:
+    """Position gain in 1/s and what feed-forward leaves (1 − f), from all records: least squares of the error."""
+    from scipy.optimize import minimize_scalar
+
+    def solve(gain: float) -> tuple[float, float]:
+        cross = square = power = 0.0
+        for way, error, step in records:
+            model = lag_way(way, gain, step)
+            cross += float(model @ error)
+            square += float(model @ model)
+            power += float(error @ error)
+        rest = cross / square
+        return power - rest * cross, rest
+
+    bounds = tuple(np.log(GAINS))
+    found = minimize_scalar(lambda logarithm: solve(math.exp(logarithm))[0], bounds=bounds, method="bounded")
+    gain = math.exp(float(found.x))
+    return gain, solve(gain)[1]

@@ -1,0 +1,297 @@
+"""Fits models of the position loop to one half of a log and judges them on the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from shapegcode.errors import ArgumentError
+from shapegcode.identification.servo.models import (
+    SETTLE_S,
+    DriveFit,
+    FloatArray,
+    LoopFit,
+    Masks,
+    counted,
+    fit_drive,
+    fit_lag,
+    lag_estimates,
+    range_of_three,
+    rms,
+    torque_friction,
+)
+from shapegcode.identification.servo.record import ServoRecord, ServoTrace, read_servo_record
+from shapegcode.identification.servo.result import ServoAxis, ServoCurves, ServoEstimate, ServoFit, ServoModel
+from shapegcode.machine import Machine
+
+_STILL_TRAVEL = 1e-3  # mm or degrees
+_STEADY_CHANGE = 0.02  # of the top speed: less is no change of speed
+_LAG_SPREAD = 0.03
+_SLOPE = (0.5, 2.0)
+_MAX_SAMPLES = 40_000
+_MIN_SPEED = 0.02  # of the top speed, where a lag at constant speed is looked for
+_KEYS = {"controller.position_gain_per_s": "position gain", "controller.feed_forward_ratio": "feed-forward"}
+
+
+def fit_servo(
+    log: str | Path | ServoRecord,
+    machine: Machine | None = None,
+    *,
+    axes: str | Mapping[str, str] | None = None,
+    units: str | None = None,
+    drive: bool = False,
+    on_progress: Callable[[float], None] | None = None,
+) -> ServoFit:
+    """What a log of commands and actual positions says about the position loop of each axis.
+
+    Three models are fitted to one half of the changes of speed and judged on the other half, and the reverse: the servo
+    lag of the machine file (gain, feed-forward), the same behind a dead time, and a drive with friction behind a dead
+    time. They see the command alone, never the actual positions of the half on which they are judged.
+
+    Args:
+        log: capture of a Sinumerik control, CSV with command and actual columns, or what `read_servo_record` gave.
+        machine: whose file gets gain and feed-forward of X, Y and Z; None: none.
+        axes: which axis of the log is X, Y, Z of the machine, such as "X=1,Y=6,Z=2"; None: by their names.
+        units: of time and length in a CSV, for example "ms,um"; None: from its header.
+        drive: whether the drive is fitted too, which takes some ten seconds for each axis and half.
+        on_progress: told the share of the work done, 0 to 1.
+
+    Returns:
+        What each model leaves, and the parameters that follow, with intervals.
+
+    Raises:
+        ArgumentError, RecordError: the file cannot be used; an axis that it does not have.
+        MachineError: the values do not go with others of the machine file.
+        OSError: the file cannot be read.
+    """
+    record = log if isinstance(log, ServoRecord) else read_servo_record(log, units)
+    places = _machine_axes(record, axes)
+    found: list[ServoAxis] = []
+    for rank, trace in enumerate(record.axes):
+
+        def tell(share: float, rank: int = rank) -> None:
+            if on_progress is not None:
+                on_progress((rank + share) / len(record.axes))
+
+        found.append(_axis(trace.liveliest(_MAX_SAMPLES), record.period_s, drive, tell))
+    written: dict[str, float] = {}
+    warnings = list(record.notes)
+    samples = record.axes[0].samples
+    if samples > _MAX_SAMPLES:
+        warnings.append(f"of {samples} samples those {_MAX_SAMPLES} were taken where an axis changes its speed most")
+    fitted = machine
+    if machine is not None:
+        fitted, written, unknown = _machine_with(machine, found, places)
+        warnings += unknown
+    duration = sum(each[-1] - each[0] for each in record.axes[0].time_s)
+    return ServoFit(
+        source=record.source,
+        duration_s=float(duration),
+        axes=tuple(found),
+        machine="" if machine is None else machine.name,
+        written=written,
+        warnings=tuple(warnings),
+        fitted=fitted,
+    )
+
+
+# --- one axis ---------------------------------------------------------------------------------------------------------
+
+
+def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[float], None]) -> ServoAxis:
+    lag = np.concatenate(trace.lag)
+    travel = max(float(np.ptp(each)) for each in trace.command)
+    speeds = tuple(np.gradient(each, period_s) for each in trace.command)
+    top = max(float(np.abs(each).max()) for each in speeds)
+    own = None if trace.deviation is None else rms(np.concatenate(trace.deviation))
+    base = ServoAxis(trace.name, trace.unit, travel, top, rms(lag), own, (), (), "")
+    if travel < _STILL_TRAVEL:
+        return replace(base, note="did not move")
+    if alike := _unlike(trace):
+        return replace(base, note=alike)
+    change = sum(float(np.abs(np.diff(each)).sum()) for each in speeds)
+    if change < _STEADY_CHANGE * top:
+        mean = float(np.mean(lag)) / float(np.mean(np.concatenate(speeds)))
+        steady = ServoEstimate("lag at constant speed", mean, None, None, "s", "one speed: nothing else follows")
+        return replace(base, parameters=(steady,), note="never changes its speed")
+    if two := _two_lags(trace, speeds, top):
+        return replace(base, note=two)
+    early, use = _halves(speeds, period_s)
+    uses = (use, *(tuple(c & (e == which) for e, c in zip(early, use, strict=True)) for which in (True, False)))
+    judged = _judged(trace, early, uses, period_s, with_drive, tell)
+    rests = [rms(counted(each.rest, use)) for each in judged]
+    own = rms(counted(trace.deviation, use)) if trace.deviation is not None else None
+    models = tuple(
+        ServoModel(
+            each.name, rest, rms(counted(each.rest_fitted, use)), 100.0 * (1.0 - (rest / own) ** 2) if own else None
+        )
+        for each, rest in zip(judged, rests, strict=True)
+    )
+    whole, *halves = judged[1].fits
+    parameters = lag_estimates(whole, halves, trace, use, period_s)
+    parameters += torque_friction(trace, whole.lag_s, uses, period_s)
+    for each in judged[2:]:
+        parameters += _drive_estimates([fit for fit in each.fits if isinstance(fit, DriveFit)], trace.unit)
+    best = judged[int(np.argmin(rests))]
+    curves = ServoCurves(trace.time_s, speeds, trace.lag, trace.deviation, best.rest)
+    return replace(base, models=models, parameters=parameters, curves=curves)
+
+
+def _unlike(trace: ServoTrace) -> str:
+    """Says where the actual position goes another way than the command: other units, another axis, another sign."""
+    way = [r - r.mean() for r in trace.command]
+    power = sum(float(r @ r) for r in way)
+    slope = sum(float(r @ (x - x.mean())) for r, x in zip(way, trace.actual, strict=True)) / power
+    low, high = _SLOPE
+    if low <= slope <= high:
+        return ""
+    return f"the actual position goes {slope:.3g} times the way of the command: not the same unit, sign or axis"
+
+
+def _two_lags(trace: ServoTrace, speeds: Sequence[FloatArray], top: float) -> str:
+    """Says where the lag at constant speed is not one number."""
+    found: list[tuple[float, float, float]] = []  # lag over speed, speed, time
+    count = 25
+    for lag, speed, time in zip(trace.lag, speeds, trace.time_s, strict=True):
+        for start in range(0, len(lag) - 2 * count, count):
+            part = speed[start : start + 2 * count]
+            mean = float(np.mean(part))
+            if abs(mean) > _MIN_SPEED * top and float(np.ptp(part)) < 1e-3 * abs(mean):
+                late = lag[start + count : start + 2 * count]
+                found.append((float(np.mean(late)) / mean, mean, float(time[start])))
+    if not found:
+        return ""
+    least, most = min(found), max(found)
+    if most[0] - least[0] <= _LAG_SPREAD * abs(most[0]):
+        return ""
+    return (
+        f"the lag at constant speed is {1e3 * least[0]:.3f} ms at {least[1]:.5g} {trace.unit}/s ({least[2]:.2f} s) and "
+        f"{1e3 * most[0]:.3f} ms at {most[1]:.5g} {trace.unit}/s ({most[2]:.2f} s): the control changed its loop "
+        "there, and no one model follows"
+    )
+
+
+def _halves(speeds: Sequence[FloatArray], period_s: float) -> tuple[Masks, Masks]:
+    """Which samples lie in the half of all changes of speed that comes first; and which count: not the first of a
+    stretch, since what the axis did before it is not known.
+    """
+    changes = [np.abs(np.diff(each, prepend=each[:1])) for each in speeds]
+    done = np.cumsum(np.concatenate(changes))
+    early = np.split(done < done[-1] / 2.0, np.cumsum([len(each) for each in speeds])[:-1])
+    settle = round(SETTLE_S / period_s)
+    return tuple(early), tuple(np.arange(len(each)) >= settle for each in speeds)
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """A model with what it leaves in every sample."""
+
+    name: str
+    fits: tuple[LoopFit, ...]  # to all samples, to the first half, to the second
+    rest: tuple[FloatArray, ...]  # each sample by the fit to the other half
+    rest_fitted: tuple[FloatArray, ...]
+
+
+def _judged(
+    trace: ServoTrace,
+    early: Masks,
+    uses: Sequence[Masks],
+    period_s: float,
+    with_drive: bool,
+    tell: Callable[[float], None],
+) -> list[_Judged]:
+    """The models, fitted to all, the first half and the second."""
+
+    def judge(name: str, fits: Sequence[LoopFit]) -> _Judged:
+        whole, first, second = fits
+        rest = tuple(
+            lag - np.where(in_first, second.error[rank], first.error[rank])
+            for rank, (lag, in_first) in enumerate(zip(trace.lag, early, strict=True))
+        )
+        fitted = tuple(lag - model for lag, model in zip(trace.lag, whole.error, strict=True))
+        return _Judged(name, tuple(fits), rest, fitted)
+
+    found = [judge("servo lag", [fit_lag(trace, use, period_s, dead_time=False) for use in uses])]
+    tell(0.1)
+    lags = [fit_lag(trace, use, period_s, dead_time=True) for use in uses]
+    found.append(judge("dead time and servo lag", lags))
+    tell(0.2)
+    if with_drive:
+        steps = iter(np.linspace(0.2, 1.0, 7)[1:].tolist())
+        drives = [
+            fit_drive(trace, use, period_s, lag, lambda: tell(next(steps))) for use, lag in zip(uses, lags, strict=True)
+        ]
+        found.append(judge("drive", drives))
+    return found
+
+
+def _drive_estimates(fits: Sequence[DriveFit], unit: str) -> tuple[ServoEstimate, ...]:
+    rows = (
+        ("dead time", [fit.dead_s for fit in fits], "s"),
+        ("position gain", [fit.gain_per_s for fit in fits], "1/s"),
+        ("feed-forward", [1.0 - fit.rest for fit in fits], "1"),
+        ("speed loop", [fit.bandwidth_hz for fit in fits], "Hz"),
+        ("integral time", [fit.integral_time_s for fit in fits], "s"),
+        ("friction over mass", [fit.coulomb for fit in fits], f"{unit}/s²"),
+    )
+    return tuple(range_of_three(f"drive: {name}", values, of) for name, values, of in rows)
+
+
+# --- the machine file -------------------------------------------------------------------------------------------------
+
+
+def _machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> dict[str, int]:
+    """Which axes of a log are X, Y and Z of the machine."""
+    if axes is None:
+        named = {each.name.partition("(")[2].rstrip(")") or each.name: rank for rank, each in enumerate(record.axes)}
+        found = {
+            letter: named[name] for letter in "xyz" for name in (f"{letter.upper()}1", letter.upper()) if name in named
+        }
+        turning = [letter for letter, rank in found.items() if record.axes[rank].unit == "deg"]
+        return {} if turning else found
+    if isinstance(axes, str):
+        pairs = [each.partition("=") for each in axes.split(",")]
+        axes = {letter.strip().lower(): name.strip() for letter, _, name in pairs}
+        if any(not equals for _, equals, _ in pairs):
+            raise ArgumentError(f"--axes {','.join(axes)}: must be for example X=1,Y=6,Z=2")
+    found = {}
+    for letter, name in axes.items():
+        ranks = [
+            rank
+            for rank, each in enumerate(record.axes)
+            if str(name).lower() in (each.name.lower(), *each.name.lower().replace("(", "").replace(")", "").split())
+        ]
+        if letter.lower() not in ("x", "y", "z") or len(ranks) != 1:
+            held = ", ".join(each.name for each in record.axes)
+            raise ArgumentError(f"--axes {letter}={name}: must be X, Y or Z and an axis of the log, which has {held}")
+        found[letter.lower()] = ranks[0]
+    return found
+
+
+def _machine_with(
+    machine: Machine, axes: Sequence[ServoAxis], places: Mapping[str, int]
+) -> tuple[Machine, dict[str, float], list[str]]:
+    """The machine with gain and feed-forward of the axes that tell them."""
+    written: dict[str, float] = {}
+    remarks: dict[str, list[str]] = {}
+    warnings: list[str] = []
+    for letter, place in places.items():
+        axis = axes[place]
+        if axis.unit != "mm":
+            warnings.append(f"axis {axis.name} turns: it is no {letter.upper()} of a machine file")
+            continue
+        estimates = {key: axis.parameter(name) for key, name in _KEYS.items()}
+        if any(each is None or each.value is None for each in estimates.values()):
+            warnings.append(f"axis {axis.name}: gain and feed-forward do not follow: {letter.upper()} keeps its values")
+            continue
+        for key, each in estimates.items():
+            assert each is not None
+            written[f"{key}.{letter}"] = round(float(each.value or 0.0), 6)
+            remarks.setdefault(key, []).append(f"{letter} {each.low:.6g} ... {each.high:.6g}")
+    if not written:
+        return machine, written, warnings
+    said = {key: f"measured (log, behind a dead time): {', '.join(each)}" for key, each in remarks.items()}
+    return machine.with_values(written).with_remarks(said), written, warnings

@@ -1,0 +1,562 @@
+"""Calibrates the cycle-time model of a machine from programs and the logs of their runs."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.errors import ArgumentError
+from shapegcode.machine import Machine
+from shapegcode.program import Program
+from shapegcode.timing.calibration.functions import FunctionFit, fit_functions, m_codes, spindle_rows, whole_model
+from shapegcode.timing.calibration.motion import (
+    FAMILIES,
+    LookAhead,
+    MotionFit,
+    fit_motion,
+    misfit,
+    parameter_intervals,
+    section_residuals,
+    sections_of,
+    starts_of,
+)
+from shapegcode.timing.calibration.observed import (
+    ObservedRun,
+    TimedProgram,
+    longest,
+    observe,
+    rapid_rate,
+    timed_program,
+    with_override,
+)
+from shapegcode.timing.calibration.result import (
+    TOLERANCE_PERCENT,
+    FamilyScore,
+    LearnedClock,
+    LearnedNumber,
+    LearnedRun,
+    LearnedShare,
+)
+from shapegcode.timing.calibration.runs_file import RunsFile, load_runs
+
+FloatArray = npt.NDArray[np.float64]
+_Hold = tuple[float, float, str]  # begin and length in s, and why
+
+_MAX_FOLDS = 4
+_BETTER = 0.97  # a family further down the list must be better by so much to be taken
+_MIN_SPREAD = 0.005  # of what a machine takes for its cuts: no model is truer
+_MAX_HOLDS = 6  # of one run that may be true
+_CALLS = 2500  # of the misfit that one fit takes, about; for the bar
+
+
+@dataclass(frozen=True, eq=False)
+class _Learned:
+    """Motion and functions, from some of the runs."""
+
+    motion: MotionFit
+    functions: FunctionFit
+    machine: Machine
+
+    def starts(self, run: ObservedRun) -> FloatArray:
+        values = self.functions.values
+        model = whole_model(self.machine, self.motion, values, self.functions.last_tool_in_spindle)
+        return _predicted_starts(run, model)
+
+
+def learn_clock(
+    runs: RunsFile | str | Path,
+    machine: Machine,
+    *,
+    families: Sequence[str] | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> LearnedClock:
+    """Calibrate the cycle-time model of a machine from what it did.
+
+    Logs are laid beside their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
+    to what stretches between functions took, and the one is taken that says best what programs (or runs, where there
+    is one program) took that it was not fitted to. Tool changes, M codes, spindle and unknown ways follow by least
+    squares.
+
+    Args:
+        runs: pairs of program and log, or the file that lists them (RUNS.toml).
+        machine: whose file gets the numbers, and that says how programs are read.
+        families: names of the kinds of look-ahead that are tried; None: all.
+        on_progress: told the share of the work done, 0 to 1.
+
+    Returns:
+        The numbers with 95 % intervals, the machine with them, and each run beside what was predicted.
+
+    Raises:
+        ArgumentError: no run is to be fitted, or a family that does not exist.
+        RecordError: a log and its program do not belong together, or a log cannot be used; with the line.
+        ProgramError, RunsFileError: bad input.
+        OSError: a file cannot be read.
+    """
+    file = runs if isinstance(runs, RunsFile) else load_runs(runs)
+    tried = _families(families)
+    observed = _observed(file, machine)
+    # The rate of the machine is what the runs show that are learned from; of the others it tells the override.
+    fitted, others_seen = ([run for run in observed if run.entry.use == use] for use in ("fit", "test"))
+    rate, fitted = rapid_rate(fitted)
+    observed = [*fitted, *(with_override(run, rate) for run in others_seen)]
+    if not fitted:
+        raise ArgumentError(f'{file.path}: no run has use = "fit": there is nothing to learn from')
+    folds = _folds(fitted)
+    meter = _Meter(on_progress, len(tried) * (1 + (len(folds) if len(folds) > 1 else 0)))
+    fits, scores = _tried(tried, fitted, folds, machine, rate, meter)
+    order = [score.left_out_s if score.left_out_s is not None else score.fitted_s for score in scores]
+    best = 0
+    for index in range(1, len(order)):
+        if order[index] < _BETTER * order[best]:
+            best = index
+    motion = fits[best]
+    learned = _Learned(motion, fit_functions(fitted, motion, machine), machine)
+    others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
+    rows, warnings = _rows(observed, learned, others)
+    with_it, remarks, numbers, not_told = learned_machine(machine, motion, learned.functions, fitted)
+    return LearnedClock(
+        machine=machine.name,
+        family=motion.family.name,
+        families=tuple(scores),
+        numbers=tuple(numbers),
+        runs=tuple(rows),
+        fitted=with_it,
+        remarks=remarks,
+        not_told=tuple(not_told),
+        warnings=tuple(dict.fromkeys(warnings)),
+    )
+
+
+class _Meter:
+    """How far the work is: by fits begun, and by steps within one."""
+
+    def __init__(self, on_progress: Callable[[float], None] | None, fits: int) -> None:
+        self._on_progress, self._fits, self._done, self._steps = on_progress, fits, 0, 0
+
+    def step(self) -> None:
+        self._steps += 20
+        if self._on_progress is not None:
+            within = min(0.99, self._steps / _CALLS)
+            self._on_progress(0.97 * (self._done + within) / self._fits)
+
+    def next(self) -> None:
+        self._done, self._steps = min(self._done + 1, self._fits - 1), 0
+
+
+def _families(names: Sequence[str] | None) -> list[LookAhead]:
+    if names is None:
+        return list(FAMILIES)
+    known = {family.name: family for family in FAMILIES}
+    unknown = [name for name in names if name not in known]
+    if unknown or not names:
+        raise ArgumentError(f"kind of look-ahead {unknown[0] if unknown else ''!r}: must be one of {', '.join(known)}")
+    return [known[name] for name in names]
+
+
+def _observed(file: RunsFile, machine: Machine) -> list[ObservedRun]:
+    timed: dict[Path, TimedProgram] = {}
+    found = []
+    for entry in file.used:
+        path = entry.program.resolve()
+        if path not in timed:
+            timed[path] = timed_program(Program.read(entry.program, machine))
+        found += [observe(entry, log, timed[path], machine) for log in entry.read()]
+    return found
+
+
+def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
+    """Runs that are left out together: those of a program; with one program, which tells less, every other run."""
+    by_program: dict[int, list[ObservedRun]] = defaultdict(list)
+    for run in runs:
+        by_program[id(run.timed)].append(run)
+    groups = list(by_program.values()) if len(by_program) > 1 else [[run] for run in runs]
+    count = min(_MAX_FOLDS if len(by_program) > 1 else 2, len(groups))
+    folds: list[list[ObservedRun]] = [[] for _ in range(count)]
+    for index, group in enumerate(groups):
+        folds[index % len(folds)] += group
+    return folds
+
+
+def _tried(
+    tried: Sequence[LookAhead],
+    runs: Sequence[ObservedRun],
+    folds: Sequence[Sequence[ObservedRun]],
+    machine: Machine,
+    rate: float,
+    meter: _Meter,
+) -> tuple[list[MotionFit], list[FamilyScore]]:
+    sections = sections_of(runs)
+    if not sections:
+        raise ArgumentError(
+            "no log reports lines of a stretch of cuts often enough (10 readings): there is nothing to learn from"
+        )
+    fits, scores = [], []
+    for family in tried:
+        fit = fit_motion(runs, family, machine, rate, on_step=meter.step)
+        meter.next()
+        left_out = []
+        for fold in folds if len(folds) > 1 else ():
+            rest = [run for run in runs if run not in fold]
+            part = fit_motion(rest, family, machine, rate, on_step=meter.step, thorough=False)
+            left_out.append(misfit(sections_of(fold), part.model(machine)))
+            meter.next()
+        fits.append(fit)
+        score = misfit(sections, fit.model(machine))
+        scores.append(FamilyScore(family.name, family.meaning, score, float(np.mean(left_out)) if left_out else None))
+    return fits, scores
+
+
+def _left_out(
+    runs: Sequence[ObservedRun],
+    folds: Sequence[Sequence[ObservedRun]],
+    motion: MotionFit,
+    machine: Machine,
+    rate: float,
+) -> dict[int, _Learned]:
+    """For each run what the others teach."""
+    found = {}
+    for fold in folds:
+        rest = [run for run in runs if run not in fold]
+        part = fit_motion(rest, motion.family, machine, rate)
+        other = _Learned(part, fit_functions(rest, part, machine), machine)
+        found.update({id(run): other for run in fold})
+    return found
+
+
+def _rows(
+    observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]
+) -> tuple[list[LearnedRun], list[str]]:
+    spread = _spread(observed, learned, others)
+    rows = [_row(run, learned, others.get(id(run)), spread) for run in observed]
+    # What whole runs left out were off by is in the interval, too: a start that an operator delays, a tool at hand.
+    off = [row.left_out_percent / 100.0 for row in rows if row.left_out_percent is not None]
+    whole = 2.0 * math.sqrt(sum(each**2 for each in off) / len(off)) if off else 0.0
+    rows = [
+        replace(
+            row,
+            low_s=min(row.low_s, row.predicted_s * (1.0 - whole)),
+            high_s=max(row.high_s, row.predicted_s * (1.0 + whole)),
+        )
+        for row in rows
+    ]
+    warnings = []
+    for row in rows:
+        judged = row.judged_percent
+        if judged is not None and abs(judged) > TOLERANCE_PERCENT:
+            warnings.append(f"{row.name}: {judged:+.1f} % from what it took, more than {TOLERANCE_PERCENT:g} %")
+        if len(row.holds) > _MAX_HOLDS:
+            warnings.append(
+                f"{row.name}: stood {len(row.holds)} times where the program does not ask for it, first at "
+                f"{row.holds[0]}: the program may have been changed after the run"
+            )
+        else:
+            warnings += [f"{row.name}: held at {hold}" for hold in row.holds]
+    return rows, warnings
+
+
+def _row(run: ObservedRun, learned: _Learned, other: _Learned | None, spread: float) -> LearnedRun:
+    starts = learned.starts(run)
+    holds = _holds_of(run, starts)
+    tools, kinds = _shares(run, starts, holds)
+    # Half of the 95 % interval of its time: cuts err together, what lies between them by itself.
+    cut = sum(float(starts[stretch.lines[1] + 1] - starts[stretch.lines[0]]) for stretch in run.stretches)
+    between = len(run.stretches) * learned.functions.scatter_s**2
+    reach = 2.0 * math.sqrt((spread * cut) ** 2 + between)
+    return LearnedRun(
+        program=str(run.entry.program),
+        log=run.log.source,
+        use=run.entry.use,
+        measured_s=run.duration_s,
+        held_s=sum(length for _, length, _ in holds),
+        predicted_s=float(starts[-1]),
+        low_s=float(starts[-1]) - reach,
+        high_s=float(starts[-1]) + reach,
+        left_out_s=float(other.starts(run)[-1]) if other is not None else None,
+        feed_override=_feed_override(run),
+        rapid_override=run.rapid_override,
+        tools=tools,
+        kinds=kinds,
+        holds=tuple(f"{begin:.1f} s: {length:.1f} s, {why}" for begin, length, why in holds),
+        notes=run.notes,
+    )
+
+
+def _spread(observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]) -> float:
+    """Root mean square of the relative error of whole sections, of runs left out where there are any."""
+    square = weight = 0.0
+    for run in observed:
+        if run.entry.use != "fit":
+            continue
+        who = others.get(id(run), learned)
+        sections = sections_of([run])
+        holds = _holds_of(run, who.starts(run))
+        for section, residual in zip(sections, section_residuals(sections, who.motion.model(who.machine)), strict=True):
+            begin, end = float(section.time_s[0]), float(section.time_s[-1])
+            if any(since < end and since + length > begin for since, length, _ in holds):
+                continue
+            took = end - begin
+            error = float(np.median(residual[-4:]) - np.median(residual[:4]))
+            square += min(error / took, 0.2) ** 2 * took if took > 0.0 else 0.0
+            weight += took
+    return max(math.sqrt(square / weight) if weight > 0.0 else 0.0, _MIN_SPREAD)
+
+
+# --- what a model says of a run: when each line begins, where it was held ---------------------------------------------
+
+_MIN_HOLD_S = 2.0
+_READING_S = 0.35  # what two readings may hide
+
+
+def _predicted_starts(run: ObservedRun, model: _core.ControllerModel) -> FloatArray:
+    """(line_count + 2,) When each line begins at the overrides of the run, s; the last entry is the end."""
+    starts_at = starts_of(model)
+    starts = starts_at(run, 1.0).copy()
+    for stretch in sorted(run.stretches, key=lambda each: each.feed_override):
+        if stretch.feed_override != 1.0:
+            other = starts_at(run, stretch.feed_override)
+            first, last = stretch.lines
+            gone = (other[first : last + 2] - other[first]) - (starts[first : last + 2] - starts[first])
+            starts[first : last + 2] += gone
+            starts[last + 2 :] += gone[-1]
+    return starts
+
+
+def _holds_of(run: ObservedRun, starts: FloatArray) -> list[_Hold]:
+    """Where a run stood still though no program asks for it."""
+    found = [(begin, length, "hold") for begin, length in run.log.holds]
+    found = [_not_covered(run, starts, hold) for hold in (*found, *_held_rapids(run))]
+    found = [hold for hold in found if hold[1] > _READING_S]
+    line, time_s = run.line, run.time_s
+    expected = np.diff(starts[line])
+    late = np.diff(time_s) - expected - _READING_S
+    for index in np.flatnonzero(late > np.maximum(_MIN_HOLD_S, 0.5 * expected)):
+        if run.timed.function[line[index] : line[index + 1]].any():
+            continue  # what lies between cuts scatters
+        begin, end = float(time_s[index]), float(time_s[index + 1])
+        if not any(begin < other + length and other < end for other, length, _ in found):
+            found.append((begin, float(late[index]), f"stood at line {line[index]}"))
+    return sorted(found)
+
+
+def _held_rapids(run: ObservedRun) -> list[_Hold]:
+    signal = run.log.rapid_override
+    if signal is None or run.duration_s is None:
+        return []
+    ends = np.append(signal.time_s[1:], run.duration_s)
+    low = signal.value < 0.1 * max(run.rapid_override, 0.1)
+    cutting = np.isfinite(run.timed.feed_mm_per_s)
+    found: list[_Hold] = []
+    for begin, end, is_low in zip(signal.time_s, ends, low, strict=True):
+        if not is_low:
+            continue
+        at = int(np.searchsorted(run.time_s, end, side="right")) - 1
+        if (
+            at >= 0
+            and cutting[run.line[at]]
+            and not run.timed.rapid[run.line[at] : run.line[min(at + 1, len(run.line) - 1)] + 1].any()
+        ):
+            continue
+        if found and begin - (found[-1][0] + found[-1][1]) < 0.5:
+            found[-1] = (found[-1][0], float(end) - found[-1][0], found[-1][2])
+        else:
+            found.append((float(begin), float(end - begin), "rapids held by their override"))
+    return [hold for hold in found if hold[1] > 1.0]
+
+
+def _not_covered(run: ObservedRun, starts: FloatArray, hold: _Hold) -> _Hold:
+    """What a hold added to the run: a spindle that starts, or coolant, may pass within it."""
+    begin, length, why = hold
+    plain = np.flatnonzero(~run.timed.function[run.line] & np.isfinite(run.timed.feed_mm_per_s[run.line]))
+    before = plain[run.time_s[plain] <= begin]
+    behind = plain[run.time_s[plain] >= begin + length]
+    since, at = (float(run.time_s[before[-1]]), float(starts[run.line[before[-1]]])) if len(before) else (0.0, 0.0)
+    if not len(behind):
+        return hold
+    late = float(run.time_s[behind[0]]) - since - (float(starts[run.line[behind[0]]]) - at)
+    return begin, min(length, max(0.0, late)), why
+
+
+def _shares(
+    run: ObservedRun, starts: FloatArray, holds: list[_Hold]
+) -> tuple[tuple[LearnedShare, ...], tuple[LearnedShare, ...]]:
+    """A run by tool, and by kind of motion."""
+    end_s = run.duration_s
+    if end_s is None:
+        return (), ()
+    tools = run.timed.tools[1:-1]
+    changes = [1, *(int(each) + 2 for each in np.flatnonzero(np.diff(tools) != 0) if tools[each] >= 0)]
+    seen = [0.0, *(_began(run, line) for line in changes[1:]), end_s]
+    expected = [0.0, *(float(starts[line]) for line in changes[1:]), float(starts[-1])]
+    shares: dict[str, tuple[float, float]] = {}
+    for index, until in enumerate([*(line - 1 for line in changes[1:]), len(tools)]):
+        tool = int(tools[until - 1])
+        name = f"T{tool}" if tool >= 0 else "no tool"
+        measured, predicted = shares.get(name, (0.0, 0.0))
+        measured += seen[index + 1] - seen[index] - _held(holds, seen[index], seen[index + 1])
+        shares[name] = measured, predicted + expected[index + 1] - expected[index]
+    cut_measured = cut_predicted = 0.0
+    for stretch in run.stretches:
+        inside = np.flatnonzero((run.line >= stretch.lines[0]) & (run.line <= stretch.lines[1]))
+        if len(inside) >= 2:
+            ends = inside[[0, -1]]
+            begin_s, until_s = run.time_s[ends].tolist()
+            cut_measured += until_s - begin_s - _held(holds, begin_s, until_s)
+            cut_predicted += float(np.diff(starts[run.line[ends]])[0])
+    kinds = (
+        LearnedShare("cuts", cut_measured, cut_predicted),
+        LearnedShare(
+            "between cuts", end_s - _held(holds, 0.0, end_s) - cut_measured, float(starts[-1]) - cut_predicted
+        ),
+    )
+    return tuple(LearnedShare(name, *both) for name, both in shares.items()), kinds
+
+
+def _began(run: ObservedRun, line: int) -> float:
+    """When a line was first seen."""
+    return float(run.time_s[min(int(np.searchsorted(run.line, line)), len(run.line) - 1)])
+
+
+def _held(holds: list[_Hold], begin_s: float, end_s: float) -> float:
+    return sum(max(0.0, min(begin + length, end_s) - max(begin, begin_s)) for begin, length, _ in holds)
+
+
+# --- the numbers of the machine file ----------------------------------------------------------------------------------
+
+_USUAL = 0.75  # of the time
+_KNOWN = 4.0  # an interval that reaches so far from its value to both sides tells nothing
+
+
+def _feed_override(run: ObservedRun) -> float:
+    """At which most of a run was cut."""
+    return longest((each.feed_override, each.lines[1] - each.lines[0]) for each in run.stretches)[0]
+
+
+def learned_machine(
+    machine: Machine, motion: MotionFit, functions: FunctionFit, runs: Sequence[ObservedRun]
+) -> tuple[Machine, dict[str, str], list[LearnedNumber], list[str]]:
+    """The machine with what was learned."""
+    source = f"logs of {len(runs)} runs"
+    values = motion.file_values()
+    values.update(_function_values(functions, runs))
+    numbers, remarks = _motion_numbers(machine, motion, runs, source)
+    if math.isfinite(motion.rapid_mm_per_s):
+        rate = motion.rapid_mm_per_s * 60.0
+        bounds = _digits(rate), _digits(0.99 * rate), _digits(1.01 * rate)
+        had = machine.axes.x.rapid_mm_per_min
+        numbers.append(
+            LearnedNumber(
+                "axes.x|y|z.rapid_mm_per_min", "rate of rapids, of the fastest axis", *bounds, "mm/min", True, had
+            )
+        )
+    numbers += _function_numbers(functions)
+    not_told = [
+        f"{number.meaning} ({number.key}): the runs bear {number.low:.3g} to {number.high:.3g} {number.unit}"
+        for number in numbers
+        if not number.told
+    ]
+    if not math.isfinite(motion.rapid_mm_per_s):
+        not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
+    for key in values:
+        remarks.setdefault(key, f"measured ({source})")
+    fitted = machine.with_values(values, source=f"{machine.name} with what was learned")
+    return fitted.with_remarks(machine.all_remarks() | remarks), remarks, numbers, not_told
+
+
+def _motion_numbers(
+    machine: Machine, motion: MotionFit, runs: Sequence[ObservedRun], source: str
+) -> tuple[list[LearnedNumber], dict[str, str]]:
+    intervals = parameter_intervals(motion, runs, machine)
+    numbers, remarks = [], {}
+    for parameter in motion.family.parameters:
+        value = motion.values[parameter.name] * parameter.scale
+        low, high = (bound * parameter.scale for bound in intervals[parameter.name])
+        told = low > value / _KNOWN and high < value * _KNOWN
+        key = parameter.key.format(axis="|".join(parameter.axes))
+        had = _had(machine, parameter.key.format(axis=parameter.axes[:1]))
+        numbers.append(
+            LearnedNumber(
+                key, parameter.meaning, _digits(value), _digits(low), _digits(high), parameter.unit, told, had
+            )
+        )
+        for axis in parameter.axes or " ":
+            place = parameter.key.format(axis=axis)
+            place = place.rpartition(".")[0] if place.startswith("controller.corner_speed") else place
+            remarks[place] = f"measured ({source}): {low:.4g} ... {high:.4g} {parameter.unit}"
+    return numbers, remarks
+
+
+def _function_numbers(functions: FunctionFit) -> list[LearnedNumber]:
+    numbers = []
+    for name, key, meaning, unit in _function_rows(functions):
+        value, low, high = functions.values[name], functions.low[name], functions.high[name]
+        told = high - low < max(2.0, 2.0 * value)
+        numbers.append(LearnedNumber(key, meaning, _digits(value), _digits(low), _digits(high), unit, told))
+    return numbers
+
+
+def _usual(overrides: Iterable[tuple[float, float]]) -> float:
+    """The override at which most of the time was run; 1 where the operator had it now so, now otherwise."""
+    value, ratio = longest(overrides)
+    return value if ratio >= _USUAL else 1.0
+
+
+def _digits(value: float) -> float:
+    """A number to what a person reads."""
+    return float(f"{value:.4g}")
+
+
+def _had(machine: Machine, key: str) -> float | None:
+    place: object = machine
+    for name in key.split("."):
+        place = getattr(place, name, None)
+    if isinstance(place, int | float):
+        return float(place)
+    return float(place.x) if place is not None and hasattr(place, "x") else None
+
+
+def _function_rows(functions: FunctionFit) -> list[tuple[str, str, str, str]]:
+    """Name in the fit, key, meaning and unit of what takes time beside the motion."""
+    known = {
+        "start": ("times.program_start_s", "from the start key to the first block", "s"),
+        "tool change": ("times.tool_change_s", "tool change", "s"),
+        "way xy": ("times.unknown_move_s.x|y", "rapid of X and Y on a way that is not known", "s"),
+        "way z": ("times.unknown_move_s.z", "rapid of Z on a way that is not known", "s"),
+        "spindle start": ("times.spindle_start", "start of the spindle, per 1000/min", "s"),
+        "spindle start from": ("times.spindle_start", "start of the spindle takes time from", "1000/min"),
+        "spindle stop": ("times.spindle_stop", "stop of the spindle, per 1000/min", "s"),
+        "spindle stop from": ("times.spindle_stop", "stop of the spindle takes time from", "1000/min"),
+    }
+    return [
+        (name, *known[name]) if name in known else (name, "times.m_codes", f"M{int(name[1:]):02d}", "s")
+        for name in functions.values
+    ]
+
+
+def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dict[str, object]:
+    values = functions.values
+    codes = {code: round(value, 3) for code, value in m_codes(values).items() if round(value, 3) >= 0.005}
+    way_xy, way_z = (round(values.get(name, 0.0), 3) for name in ("way xy", "way z"))
+    feed = _usual((_feed_override(run), run.duration_s or 0.0) for run in runs)
+    rapid = _usual((run.rapid_override, run.duration_s or 0.0) for run in runs)
+    found: dict[str, object] = {
+        "times.program_start_s": round(values.get("start", 0.0), 3),
+        "times.tool_change_s": round(values.get("tool change", 0.0), 3),
+        "times.last_tool_in_spindle": functions.last_tool_in_spindle,
+        "times.m_function_s": 0.0,
+        "times.unknown_move_s": {"x": way_xy, "y": way_xy, "z": way_z},
+        "times.feed_override_percent": round(100.0 * feed, 2),
+        "times.rapid_override_percent": round(100.0 * rapid, 2),
+        "times.m_codes": {"code": list(codes), "s": list(codes.values())} if codes else None,
+    }
+    for name in ("spindle start", "spindle stop"):
+        rows = spindle_rows(values, name)
+        table = {"rpm": [round(row[0], 1) for row in rows], "s": [round(row[1], 3) for row in rows]} if rows else None
+        found[f"times.{name.replace(' ', '_')}"] = table
+    return found

@@ -1,0 +1,409 @@
+"""Fits what cuts and rapids take: kinds of look-ahead with their numbers, the misfit to logs, the search, intervals."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model
+from shapegcode.timing.calibration.observed import ObservedRun, TimedProgram, seen_arc_acceleration
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a family."""
+
+    name: str  # short, within the family
+    key: str  # of the machine file; "{axis}" stands for the axes of `axes`
+    unit: str  # of the value in the machine file
+    start: float  # where a fit begins, in mm, s and rad
+    low: float
+    high: float
+    meaning: str
+    scale: float = 1.0  # value in the machine file over that of the fit
+    axes: str = ""  # that it holds for
+
+
+@dataclass(frozen=True)
+class LookAhead:
+    """A rule for corners with its limits."""
+
+    name: str  # as it is shown
+    motion: str  # `controller.motion`
+    law: str  # `controller.law`
+    rule: str  # `controller.corner_rule`
+    parameters: tuple[Parameter, ...]  # what is fitted
+    meaning: str
+
+
+_ACCELERATION = "axes.{axis}.max_acceleration_mm_s2"
+_SPEED_STEP = "controller.corner_speed_difference_mm_per_min.{axis}"
+_ARC = "controller.centripetal_acceleration_mm_s2"
+_PER_MINUTE, _DEGREES = 60.0, 180.0 / math.pi
+# fmt: off
+_ACROSS = Parameter("acceleration_xy", _ACCELERATION, "mm/s²", 1000.0, 20.0, 3e4, "acceleration of X and Y", axes="xy")
+_ALONG_Z = Parameter("acceleration_z", _ACCELERATION, "mm/s²", 1000.0, 20.0, 3e4, "acceleration of Z", axes="z")
+_ARCS = Parameter("arc_acceleration", _ARC, "mm/s²", 1000.0, 5.0, 3e4, "acceleration across the path in arcs")
+_CORNER = Parameter(
+    "corner_xy", _SPEED_STEP, "mm/min", 8.0, 0.05, 300.0, "speed step of X and Y at a corner", _PER_MINUTE, "xy")
+_CORNER_Z = Parameter(
+    "corner_z", _SPEED_STEP, "mm/min", 8.0, 0.05, 300.0, "speed step of Z at a corner", _PER_MINUTE, "z")
+_JERK_TIME = Parameter(
+    "jerk_time", "controller.bell_time_s", "s", 0.05, 0.001, 0.5, "time in which the acceleration is built up")
+_RAPID_TIME = Parameter(
+    "rapid_time", "controller.rapid_time_constant_s", "s", 0.15, 0.01, 1.0, "time in which a rapid reaches its rate")
+_ARRIVAL = Parameter("arrival", "controller.in_position_s", "s", 0.04, 1e-4, 1.0, "wait behind a rapid")
+_DEVIATION = Parameter(
+    "deviation", "controller.junction_deviation_mm", "mm", 0.005, 1e-5, 0.5, "deviation allowed at a corner")
+_STOP_ANGLE = Parameter(
+    "stop_angle", "controller.corner_stop_angle_deg", "degrees", 0.5, 0.03, 3.0, "corners that are stops", _DEGREES)
+_TIME_CONSTANT = Parameter(
+    "time_constant", "controller.time_constant_s", "s", 0.08, 0.005, 0.6, "time in which a feed is reached")
+_BLOCK_TIME = Parameter(
+    "block_time", "controller.look_ahead_block_time_s", "s", 0.002, 1e-4, 0.05, "time in which a block is read")
+# fmt: on
+_BOTH = (_RAPID_TIME, _ARRIVAL)
+
+FAMILIES = (
+    LookAhead(
+        "speed difference", "look_ahead", "jerk_limited", "speed_difference",
+        (_ACROSS, _ALONG_Z, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, *_BOTH),
+        "look-ahead with a largest speed step of each axis at corners (FANUC 1783)",
+    ),
+    LookAhead(
+        "speed difference, block time", "look_ahead", "jerk_limited", "speed_difference",
+        (_ACROSS, _ALONG_Z, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, _BLOCK_TIME, *_BOTH),
+        "the same, and blocks are read no faster than so",
+    ),
+    LookAhead(
+        "speed difference, constant time", "look_ahead", "constant_time", "speed_difference",
+        (_ACROSS, _ALONG_Z, _TIME_CONSTANT, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, *_BOTH),
+        "the same, with ramps of a constant time",
+    ),
+    LookAhead(
+        "junction deviation", "look_ahead", "jerk_limited", "junction_deviation",
+        (_ACROSS, _ALONG_Z, _JERK_TIME, _DEVIATION, _ARCS, *_BOTH),
+        "look-ahead that passes a corner as an arc within a deviation",
+    ),
+    LookAhead(
+        "stops at corners", "look_ahead", "jerk_limited", "stops",
+        (_ACROSS, _ALONG_Z, _JERK_TIME, _STOP_ANGLE, _ARCS, *_BOTH),
+        "look-ahead that stops at sharp corners",
+    ),
+    LookAhead(
+        "after interpolation", "after_interpolation", "constant_time", "speed_difference", (_TIME_CONSTANT, *_BOTH),
+        "no look-ahead: blocks overlap within the time constant (FANUC 1622)",
+    ),
+)  # fmt: skip
+"""What is tried."""
+
+_OFF = 1e9
+_NO_LIMIT = 1e6  # mm/s²
+
+
+@dataclass(frozen=True)
+class MotionFit:
+    """A family with its numbers."""
+
+    family: LookAhead
+    values: dict[str, float]  # of its parameters by name, in mm, s and rad
+    rapid_mm_per_s: float  # rapid rate of every axis; NaN: the machine's
+
+    def model(self, machine: Machine) -> _core.ControllerModel:
+        """The controller that the family and its numbers describe."""
+        family, values, rapid_mm_per_s = self.family, self.values, self.rapid_mm_per_s
+        model = controller_model(machine)
+        limits = _core.MotionLimits()
+        limits.law = getattr(_core.AccelerationLaw, family.law)
+        xy, z = values.get("acceleration_xy", _OFF), values.get("acceleration_z", _OFF)
+        limits.max_acceleration_mm_per_s2 = [xy, xy, z]
+        limits.max_feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in machine.axes.as_tuple()]
+        limits.jerk_time_s = values.get("jerk_time", 0.0)
+        limits.time_constant_s = max(values.get("time_constant", 0.0), model.period_s)
+        corner, corner_z = values.get("corner_xy", _OFF), values.get("corner_z", _OFF)
+        limits.corner_speed_difference_mm_per_s = [corner, corner, corner_z]
+        limits.centripetal_acceleration_mm_per_s2 = values.get("arc_acceleration", _OFF)
+        limits.junction_deviation_mm = values.get("deviation", _OFF)
+        limits.corner_stop_angle_rad = values.get("stop_angle", _OFF)
+        limits.block_time_s = values.get("block_time", 0.0)
+        model.limits = limits
+        model.motion = getattr(_core.MotionKind, family.motion)
+        model.filter_shape = _core.FilterShape.linear
+        model.time_constant_s = values.get("time_constant", 0.0)
+        model.bell_time_s = 0.0
+        model.look_ahead_filter_time_constant_s = 0.0
+        if math.isfinite(rapid_mm_per_s):
+            model.rapid_rate_mm_per_s = [rapid_mm_per_s] * 3
+        model.rapid_time_constant_s = [values["rapid_time"]] * 3
+        model.rapid_bell_time_s = 0.0
+        model.in_position = _core.InPosition.measured
+        model.in_position_s = [values["arrival"]] * 3
+        return model
+
+    def file_values(self) -> dict[str, object]:
+        """The same as values of the machine file, by dotted key."""
+        family, values, rapid_mm_per_s = self.family, self.values, self.rapid_mm_per_s
+        corner = dict.fromkeys("xyz", 0.0)
+        found: dict[str, object] = {
+            "controller.motion": family.motion,
+            "controller.law": family.law,
+            "controller.corner_rule": family.rule,
+            "controller.look_ahead_filter_time_constant_s": 0.0,
+            "controller.rapid_bell_time_s": 0.0,
+            "controller.in_position": "measured",
+            "controller.contour_acceleration_mm_s2": None,
+            "controller.junction_deviation_mm": None,
+            "controller.corner_stop_angle_deg": None,
+            "controller.look_ahead_block_time_s": 0.0,
+            "controller.bell_time_s": 0.0,
+            "controller.polyline_acceleration_mm_s2": _NO_LIMIT,
+        }
+        for axis in "xyz":
+            found[f"axes.{axis}.max_jerk_mm_s3"] = None
+            if math.isfinite(rapid_mm_per_s):
+                found[f"axes.{axis}.rapid_mm_per_min"] = float(f"{rapid_mm_per_s * 60.0:.5g}")
+        for parameter in family.parameters:
+            value = float(f"{values[parameter.name] * parameter.scale:.5g}")
+            if parameter.key.startswith("controller.corner_speed"):
+                corner.update(dict.fromkeys(parameter.axes, value))
+            elif "{axis}" in parameter.key:
+                found.update({parameter.key.format(axis=axis): value for axis in parameter.axes})
+            else:
+                found[parameter.key] = value
+        if any(parameter.name == "corner_xy" for parameter in family.parameters):
+            found["controller.corner_speed_difference_mm_per_min"] = corner
+        if family.motion == "after_interpolation":
+            found["controller.after_interpolation_shape"] = "linear"
+        return found
+
+
+# --- how far a model is off -------------------------------------------------------------------------------------------
+#
+# A control reports its line a few times a second: the time at which one is first seen is late by up to one reading.
+# What a stretch of the log takes is therefore known to a reading or two, whatever its length; the error of the model
+# grows with it.
+
+#: (length of the stretches in s, error beyond which it counts no more in s, weight).
+_SCALES = ((1.0, 0.25, 1.0), (6.0, 0.5, 0.7), (30.0, 1.0, 0.5))
+_SECTION = (2.0, 0.5)  # of whole sections: error per half minute in s beyond which it counts no more, weight
+_MIN_READINGS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class SeenSection:
+    """One section of a run: what was seen of it."""
+
+    run: ObservedRun
+    feed_override: float
+    time_s: FloatArray  # (n,) when its lines were seen
+    line: npt.NDArray[np.int64]  # (n,) which
+
+    @cached_property
+    def stretches(self) -> tuple[tuple[IntArray, IntArray], ...]:
+        """For each length of a stretch: readings at which one begins, and those at which it ends."""
+        found = []
+        for length_s, _, _ in _SCALES:
+            upto = np.searchsorted(self.time_s, self.time_s + length_s)
+            begins = np.flatnonzero(upto < len(self.time_s))
+            found.append((begins, upto[begins]))
+        return tuple(found)
+
+
+def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
+    """The sections of runs of which enough was seen."""
+    found = []
+    for run in runs:
+        for stretch in run.stretches:
+            inside = (run.line >= stretch.lines[0]) & (run.line <= stretch.lines[1])
+            if int(inside.sum()) >= _MIN_READINGS:
+                found.append(SeenSection(run, stretch.feed_override, run.time_s[inside], run.line[inside]))
+    return found
+
+
+def line_starts(timed: TimedProgram, model: _core.ControllerModel) -> FloatArray:
+    """(line_count + 2,) When each line begins on a model; the last entry is the end of the program."""
+    starts = timed.starts(model)
+    # A line without any move begins with the next one.
+    missing = np.isnan(starts)
+    following = np.minimum.accumulate(np.where(missing, len(starts), np.arange(len(starts)))[::-1])[::-1]
+    return np.asarray(starts[following], dtype=np.float64)
+
+
+def starts_of(model: _core.ControllerModel) -> Callable[[ObservedRun, float], FloatArray]:
+    """Line starts on a model by run and feed override, simulated once for each program and its overrides."""
+    found: dict[tuple[int, float, float], FloatArray] = {}
+
+    def starts(run: ObservedRun, feed_override: float) -> FloatArray:
+        key = (id(run.timed), feed_override, run.rapid_override)
+        if key not in found:
+            model.feed_override, model.rapid_override = feed_override, run.rapid_override
+            found[key] = line_starts(run.timed, model)
+        return found[key]
+
+    return starts
+
+
+def section_residuals(sections: Sequence[SeenSection], model: _core.ControllerModel) -> list[FloatArray]:
+    """What was seen minus what the model says, in s, for each reading of each section."""
+    starts = starts_of(model)
+    return [section.time_s - starts(section.run, section.feed_override)[section.line] for section in sections]
+
+
+def misfit(sections: Sequence[SeenSection], model: _core.ControllerModel) -> float:
+    """How badly a model keeps the time of sections: every program counts alike, outliers (holds) count to a limit."""
+    square: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))
+    count: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))
+    for section, residual in zip(sections, section_residuals(sections, model), strict=True):
+        sums, counts = square[id(section.run.timed)], count[id(section.run.timed)]
+        for scale, (_, limit_s, _) in enumerate(_SCALES):
+            begins, ends = section.stretches[scale]
+            apart = residual[ends] - residual[begins]
+            sums[scale] += np.minimum(apart**2, limit_s**2).sum()
+            counts[scale] += len(apart)
+        whole = np.median(residual[-4:]) - np.median(residual[:4])
+        whole /= max(1.0, np.sqrt((section.time_s[-1] - section.time_s[0]) / 30.0))
+        sums[-1] += min(whole**2, _SECTION[0] ** 2)
+        counts[-1] += 1
+    weight = np.array([*(scale[2] for scale in _SCALES), _SECTION[1]])
+    means = [(np.sqrt(square[key] / np.maximum(count[key], 1.0)) * weight).sum() for key in square]
+    return float(np.mean(means)) if means else 0.0
+
+
+# --- the search, and the intervals ------------------------------------------------------------------------------------
+
+_STEP = 0.3  # of the first simplex, in the logarithm
+_WINDOW_S = 6.0
+_PLACES, _SEARCHED, _VALLEYS, _STEPS = 400, 1.0, 5, 500
+# Where the runs do not tell a number, it is that of a usual machine: so far from it costs as much as so much misfit.
+_TYPICAL_SPREAD = 1.0  # in the logarithm
+_SEEN_SPREAD = 0.15  # of a number that the logs show
+_PRIOR = 0.01
+_MIN_STEP = 0.02  # of the numeric derivatives, in the logarithm
+
+
+def fit_motion(
+    runs: Sequence[ObservedRun],
+    family: LookAhead,
+    machine: Machine,
+    rapid_mm_per_s: float,
+    *,
+    thorough: bool = True,
+    on_step: Callable[[], None] | None = None,
+) -> MotionFit:
+    """Least misfit over the numbers of a family: Nelder-Mead, restarted from where it ended."""
+    from scipy.optimize import minimize
+
+    sections = sections_of(runs)
+    across = seen_arc_acceleration(runs)
+    seen = {"arc_acceleration": across} if math.isfinite(across) else {}
+    parameters = family.parameters
+    low = np.log([parameter.low for parameter in parameters])
+    high = np.log([parameter.high for parameter in parameters])
+    usual = {parameter.name: parameter.start for parameter in parameters} | seen
+    typical = np.log([usual[parameter.name] for parameter in parameters])
+    reach = np.array([_SEEN_SPREAD if parameter.name in seen else _TYPICAL_SPREAD for parameter in parameters])
+    calls = 0
+
+    def fit(place: FloatArray) -> MotionFit:
+        kept = np.clip(place, low, high)
+        values = {parameter.name: math.exp(value) for parameter, value in zip(parameters, kept, strict=True)}
+        return MotionFit(family, values, rapid_mm_per_s)
+
+    def cost(place: FloatArray) -> float:
+        nonlocal calls
+        calls += 1
+        if on_step is not None and calls % 20 == 0:
+            on_step()
+        beyond = float(np.abs(place - np.clip(place, low, high)).sum())
+        usual = _PRIOR * float((((place - typical) / reach) ** 2).sum())
+        return misfit(sections, fit(place).model(machine)) + usual + 10.0 * beyond
+
+    def search(place: FloatArray, most: int) -> tuple[float, FloatArray]:
+        simplex = np.vstack([place, place + _STEP * np.eye(len(parameters))])
+        found = minimize(
+            cost, place, method="Nelder-Mead",
+            options={"maxfev": most, "xatol": 2e-3, "fatol": 1e-4, "initial_simplex": simplex, "adaptive": True},
+        )  # fmt: skip
+        return float(found.fun), found.x
+
+    # The misfit has several valleys: the search begins in the lowest of many places, and again from where it ended.
+    generator = np.random.default_rng(1)
+    places, valleys, restarts = (_PLACES, _VALLEYS, 2) if thorough else (_PLACES // 2, _VALLEYS // 2, 1)
+    spread = generator.normal(0.0, _SEARCHED, (places, len(parameters))) * (reach / _TYPICAL_SPREAD)
+    tried = [typical, *(np.clip(typical + each, low, high) for each in spread)]
+    ranked = sorted(((cost(place), index) for index, place in enumerate(tried)), key=lambda each: each[0])
+    ends = [search(tried[index], _STEPS // 2) for _, index in ranked[:valleys]]
+    best = min(ends, key=lambda end: end[0])
+    for _ in range(restarts):
+        end = search(best[1] + generator.normal(0.0, 0.1, len(parameters)), _STEPS)
+        best = min(best, end, key=lambda each: each[0])
+    return fit(best[1])
+
+
+def parameter_intervals(
+    fit: MotionFit, runs: Sequence[ObservedRun], machine: Machine
+) -> dict[str, tuple[float, float]]:
+    """95 % intervals of the numbers of a fit.
+
+    From the derivatives of what stretches of some seconds take; the scatter is that of the sections, each of which
+    counts as one (a sandwich of clusters), so that an error of the model is in it.
+    """
+    names = [parameter.name for parameter in fit.family.parameters]
+    sections = sections_of(runs)
+    stretches = [_stretches(section) for section in sections]
+
+    def taken(values: dict[str, float]) -> list[FloatArray]:
+        residual = section_residuals(sections, replace(fit, values=values).model(machine))
+        return [np.diff(each[places]) for each, places in zip(residual, stretches, strict=True)]
+
+    centre = taken(fit.values)
+    slopes = []
+    for name in names:
+        above = taken(fit.values | {name: fit.values[name] * math.exp(_MIN_STEP)})
+        below = taken(fit.values | {name: fit.values[name] * math.exp(-_MIN_STEP)})
+        slopes.append([(one - other) / (2.0 * _MIN_STEP) for one, other in zip(above, below, strict=True)])
+    normal = np.zeros((len(names), len(names)))
+    scatter = np.zeros_like(normal)
+    for rank, error in enumerate(centre):
+        slope = np.column_stack([each[rank] for each in slopes])
+        normal += slope.T @ slope
+        pull = slope.T @ np.clip(error, -1.0, 1.0)
+        scatter += np.outer(pull, pull)
+    inverse = np.linalg.pinv(normal + 1e-12 * np.trace(normal) * np.eye(len(names)))
+    # Few clusters understate the scatter: the usual correction, and Student's t of their number.
+    spread = inverse @ scatter @ inverse * len(centre) / max(1, len(centre) - 1)
+    from scipy.stats import t as student
+
+    reach = float(student.ppf(0.975, max(1, len(centre) - 1)))
+    white = np.concatenate(centre) if centre else np.zeros(1)
+    noise = inverse * float(np.mean(np.minimum(white**2, 1.0)))
+    found = {}
+    for index, parameter in enumerate(fit.family.parameters):
+        deviation = math.sqrt(max(spread[index, index], noise[index, index], 0.0))
+        seen = normal[index, index] > 1e-6
+        ratio = math.exp(min(reach * deviation, 5.0)) if seen else math.inf
+        value = fit.values[parameter.name]
+        found[parameter.name] = max(parameter.low, value / ratio), min(parameter.high, value * ratio)
+    return found
+
+
+def _stretches(section: SeenSection) -> npt.NDArray[np.int64]:
+    """Readings that are some seconds apart."""
+    places = [0]
+    for index, time_s in enumerate(section.time_s):
+        if time_s - section.time_s[places[-1]] >= _WINDOW_S:
+            places.append(index)
+    if len(places) == 1 and len(section.time_s) > 1:
+        places.append(len(section.time_s) - 1)
+    return np.array(places)

@@ -1,0 +1,519 @@
+"""A program as its cycle time needs it, and a log laid beside it: when each line began, at which overrides."""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.errors import RecordError
+from shapegcode.io.run_log import RunLog, Signal
+from shapegcode.io.units import find_unit
+from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model
+from shapegcode.program import Program
+from shapegcode.timing.calibration.runs_file import RunEntry
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+_SEQUENCE = re.compile(r"[ /]*[Nn](\d{1,7})")
+_MIN_ARC_MM = 0.5
+_GENTLE_MM_PER_S2 = 100.0  # across the path: no machining centre slows down for it
+
+
+@dataclass(frozen=True, eq=False)
+class TimedProgram:
+    """A program as its cycle time needs it."""
+
+    program: Program
+    line_count: int  # of the text that the control runs
+    # (line_count + 2,) programmed feed of a line's last cut, by its number; NaN where it does not cut
+    feed_mm_per_s: FloatArray
+    # (line_count + 2,) radius of a line's arc, where it turns by more than a sixth of a circle and is long enough to
+    # be run steadily; infinity elsewhere
+    arc_radius_mm: FloatArray
+    free: npt.NDArray[np.bool_]  # (line_count + 2,) whether no machine has to go slower there for the sake of an arc
+    rapid: npt.NDArray[np.bool_]  # (line_count + 2,) whether it moves in rapid
+    function: npt.NDArray[np.bool_]  # (line_count + 2,) whether it holds M, S or T words, or a way that is not known
+    sections: tuple[tuple[int, int], ...]  # (first line, last line) of the stretches without functions
+
+    def starts(self, model: _core.ControllerModel) -> FloatArray:
+        """When the lines begin on a model."""
+        timed = _core.time_program(self.program.core, model, True)
+        found = np.full(self.line_count + 2, np.nan)
+        # A line may hold several moves: its first one counts.
+        found[timed.blocks["line"][::-1]] = timed.blocks["start_s"][::-1]
+        found[-1] = timed.total_s
+        return found
+
+    @cached_property
+    def text_lines(self) -> list[str]:
+        """The lines of the text that the control runs."""
+        return self.program.core.text.decode("latin-1").splitlines()
+
+    @cached_property
+    def sequence_lines(self) -> dict[int, list[int]]:
+        """Lines by their N number, ascending."""
+        places: dict[int, list[int]] = defaultdict(list)
+        for line, text in enumerate(self.text_lines, start=1):
+            if number := _SEQUENCE.match(text):
+                places[int(number[1])].append(line)
+        return places
+
+    @cached_property
+    def tools(self) -> IntArray:
+        """(line_count + 2,) Tool in use at a line, -1: not known."""
+        tool = np.full(self.line_count + 2, -1, dtype=np.int64)
+        selected, functions = -1, self.program.core.functions
+        for kind, index, line in self.program.core.steps:
+            if kind == _core.StepKind.function:
+                codes, asked, _ = functions[index]
+                selected = asked if asked >= 0 else selected
+                if 6 in codes:
+                    tool[line:] = selected
+        return tool
+
+
+def timed_program(program: Program) -> TimedProgram:
+    """Which lines of a program cut, move in rapid, or hold machine functions."""
+    core = program.core
+    count = core.line_count
+    feed = np.full(count + 2, np.nan)
+    radius = np.full(count + 2, np.inf)
+    free = np.zeros(count + 2, dtype=bool)
+    rapid = np.zeros(count + 2, dtype=bool)
+    function = np.zeros(count + 2, dtype=bool)
+    for region in program.regions:
+        for index in range(len(region.path)):
+            segment = region.path[index]
+            feed[segment.line_number] = segment.feed_mm_per_s
+            if segment.length_mm > max(_MIN_ARC_MM, _radius_mm(segment)):
+                radius[segment.line_number] = _radius_mm(segment)
+            free[segment.line_number] = segment.feed_mm_per_s**2 < _GENTLE_MM_PER_S2 * _radius_mm(segment)
+    for segment, dwell_s in core.other_moves:
+        if segment.kind == _core.SegmentKind.rapid:
+            rapid[segment.line_number] = True
+        elif dwell_s <= 0.0:
+            feed[segment.line_number] = segment.feed_mm_per_s
+            free[segment.line_number] = True
+    for kind, _, line in core.steps:
+        if kind == _core.StepKind.function:
+            function[line] = True
+    return TimedProgram(program, count, feed, radius, free, rapid, function, tuple(_sections(function, count)))
+
+
+def _radius_mm(segment: _core.Segment) -> float:
+    if segment.kind != _core.SegmentKind.arc:
+        return math.inf
+    return float(np.linalg.norm(np.asarray(segment.start_mm) - np.asarray(segment.centre_mm)))
+
+
+def _sections(function: npt.NDArray[np.bool_], count: int) -> list[tuple[int, int]]:
+    found: list[tuple[int, int]] = []
+    first = 1
+    for line in range(1, count + 2):
+        if line > count or function[line]:
+            if line - first > 1:
+                found.append((first, line - 1))
+            first = line + 1
+    return found
+
+
+# --- what the feeds of a log tell: their unit, the overrides ----------------------------------------------------------
+
+# mm/s of the units that a feed is tried in where none is stated
+_FEED_UNITS = {"mm/s": 1.0, "mm/min": 1.0 / 60.0, "in/min": 25.4 / 60.0}
+_MIN_READINGS = 4  # so many readings of one value are no chance
+_FEED_BIN = 0.0025  # of the programmed feed: readings of a steady feed agree better
+_MIN_SHARE = 0.06
+_MIN_OVERRIDE, _MAX_OVERRIDE = 0.2, 2.0
+_STEPS = (1.0, 0.5, 0.1, 1.0 / 60.0, 0.01, 0.001)  # in which controls show feeds
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A section of a run without functions."""
+
+    lines: tuple[int, int]  # first and last
+    feed_override: float  # ratio at which it was cut
+    measured: bool  # whether that was seen in the log, else it is taken from the run or as 1
+
+
+def line_numbers(log: RunLog, timed: TimedProgram) -> IntArray:
+    """Lines of the text from what the log counts."""
+    value = np.asarray(log.block.value, dtype=np.int64)
+    if log.block_counts == "line":
+        return value
+    found, at = np.zeros(len(value), dtype=np.int64), 0
+    for index, sequence_number in enumerate(value.tolist()):
+        ahead = [place for place in timed.sequence_lines.get(sequence_number, []) if place >= at]
+        if ahead:
+            at = found[index] = ahead[0]
+    return found
+
+
+def lines_at(signal: Signal, log: RunLog, timed: TimedProgram) -> IntArray:
+    """Line that was reported when a value came."""
+    line = line_numbers(log, timed)
+    at = np.searchsorted(log.block.time_s, signal.time_s, side="right") - 1
+    return np.clip(np.where(at >= 0, line[np.maximum(at, 0)], 0), 0, timed.line_count + 1)
+
+
+def longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
+    """Of pairs of value and duration the value that held for the longest time, and its ratio of the whole time."""
+    held: dict[float, float] = defaultdict(float)
+    for value, duration in pairs:
+        held[value] += duration
+    value = max(held, key=lambda each: held[each], default=1.0)
+    return value, held[value] / sum(held.values()) if any(held.values()) else 1.0
+
+
+def held_longest(signal: Signal, end_s: float | None) -> float:
+    """The value that a signal had for the longest time."""
+    until = np.append(signal.time_s[1:], end_s if end_s is not None else signal.time_s[-1])
+    values = (round(value, 3) for value in signal.value.tolist())
+    return longest(zip(values, np.maximum(until - signal.time_s, 0.0).tolist(), strict=True))[0]
+
+
+def feed_unit(entry: RunEntry, log: RunLog, timed: TimedProgram) -> float:
+    """The unit of the logged feed: as stated, else the one in which steady cuts run as programmed."""
+    if log.feed is None or len(log.feed) < _MIN_READINGS:
+        return math.nan
+    line = lines_at(log.feed, log, timed)
+    ratio = log.feed.value / timed.feed_mm_per_s[line]
+    ratio = ratio[np.isfinite(ratio) & (ratio > 0.0)]
+    steady = steady_value(np.log(ratio)) if len(ratio) else None
+    name = entry.feed_unit or log.feed_unit
+    stated = find_unit(name) if name is not None else None
+    if steady is None:
+        return float(stated.factor) * 1000.0 if stated is not None else math.nan
+    # An override is between a half and twice the programmed feed: units lie further apart.
+    units = [float(stated.factor) * 1000.0] if stated is not None else list(_FEED_UNITS.values())
+    best = min(units, key=lambda unit: abs(steady + math.log(unit)))
+    if abs(steady + math.log(best)) > math.log(2.0):
+        tried = name if stated is not None else f"no unit of {', '.join(_FEED_UNITS)}"
+        raise RecordError(
+            f"{log.source}: steady feeds of {entry.program.name} are {math.exp(steady):.4g} times the programmed ones "
+            f"in mm/s: {tried} does not make that an override of 50 to 200 %; the log is of another program, the "
+            "program in another unit (G20, G21), or feed_unit must be stated"
+            + (" otherwise" if stated is not None else "")
+        )
+    return best
+
+
+def steady_value(values: FloatArray) -> float | None:
+    """Where values heap up."""
+    ordered = np.sort(values)
+    upto = np.searchsorted(ordered, ordered + _FEED_BIN, side="right")
+    count = upto - np.arange(len(ordered))
+    most = int(count.max())
+    if most < _MIN_READINGS or most < _MIN_SHARE * len(values):
+        return None
+    at = int(np.argmax(count))
+    return float(np.median(ordered[at : at + most]))
+
+
+def stretches_of(entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float, notes: list[str]) -> list[Stretch]:
+    """Feed override of each section: what steady cuts show, else what is stated, else that of the run, else 1."""
+    ratio = np.empty(0)
+    line = np.empty(0, dtype=np.int64)
+    if log.feed is not None and math.isfinite(unit):
+        line = lines_at(log.feed, log, timed)
+        ratio = log.feed.value * unit / timed.feed_mm_per_s[line]
+        # A control shows feeds in steps: where one is much of the feed, it tells nothing.
+        fine = timed.feed_mm_per_s[line] * _FEED_BIN > _step_of(log.feed.value) * unit
+        keep = np.isfinite(ratio) & (ratio > 0.0) & timed.free[line] & fine
+        ratio, line = ratio[keep], line[keep]
+    whole = steady_value(ratio) if len(ratio) else None
+    stated = entry.override_percent / 100.0 if entry.override_percent is not None else None
+    if stated is None and log.feed_override is not None and len(log.feed_override):
+        stated = held_longest(log.feed_override, log.duration_s)
+    found = []
+    for first, last in timed.sections:
+        inside = ratio[(line >= first) & (line <= last) & (ratio >= _MIN_OVERRIDE) & (ratio <= _MAX_OVERRIDE)]
+        seen = steady_value(inside) if len(inside) else None
+        fallback = stated if stated is not None else whole
+        value = seen if seen is not None else fallback if fallback is not None else 1.0
+        found.append(Stretch((first, last), as_dialled(value), seen is not None))
+    used = sorted({stretch.feed_override for stretch in found if stretch.measured})
+    if any(abs(value - 1.0) > 0.005 for value in used):
+        notes.append("feed override " + ", ".join(f"{value:.1%}" for value in used) + " as steady cuts show")
+    if ratio.size == 0 and stated is None:
+        notes.append("no feed in the log: overrides cannot be told and are taken as 100 %")
+    return found
+
+
+def _step_of(values: FloatArray) -> float:
+    """The step in which values are shown: the largest usual one that all of them are multiples of; 0: none is."""
+    for step in _STEPS:
+        if np.all(np.abs(values / step - np.round(values / step)) < 1e-3):
+            return step
+    return 0.0
+
+
+def as_dialled(ratio: float) -> float:
+    """As a dial has it: whole percents where they are within what a reading means."""
+    whole = round(ratio, 2)
+    return whole if abs(ratio - whole) < 0.002 else round(ratio, 4)
+
+
+# --- a log laid beside its program ------------------------------------------------------------------------------------
+
+_MIN_BLOCKS = 8
+_MISSING_S, _MISSING = 15.0, 0.15  # of a program: more than a machine's own times explain
+_MIN_RISING = 0.9  # of the reported lines
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedRun:
+    """One run of a program, as far as its log tells."""
+
+    timed: TimedProgram
+    log: RunLog
+    entry: RunEntry  # what the file of runs says of it
+    time_s: FloatArray  # (n,) when the control first reported a line, since the start
+    line: IntArray  # (n,) the line, never falling
+    stretches: tuple[Stretch, ...]  # sections with their feed overrides
+    rapid_override: float  # ratio of the rapid rates
+    feed_unit_mm_per_s: float  # what one unit of the logged feed is; NaN without a feed
+    notes: tuple[str, ...]  # what was found and bridged
+    whole: bool = True  # whether the log begins where the program does
+
+    @property
+    def duration_s(self) -> float | None:
+        """From start to completion; None: the log does not hold both."""
+        return self.log.duration_s if self.log.complete and self.whole else None
+
+
+def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine) -> ObservedRun:
+    """Lay a log beside its program."""
+    notes = list(log.notes)
+    time_s, line = _lines(entry, log, timed, notes)
+    _compare_tools(entry, log, timed, notes)
+    unit = feed_unit(entry, log, timed)
+    stretches = tuple(stretches_of(entry, log, timed, unit, notes))
+    rapid_override = math.nan
+    if entry.rapid_override_percent is not None:
+        rapid_override = entry.rapid_override_percent / 100.0
+    elif log.rapid_override is not None and len(log.rapid_override):
+        # The dial may be turned for a moment, at the start mostly: what held longest counts.
+        rapid_override = held_longest(log.rapid_override, log.duration_s) or math.nan
+    run = ObservedRun(timed, log, entry, time_s, line, stretches, rapid_override, unit, tuple(notes))
+    starts = timed.starts(controller_model(machine))  # by the machine's own limits, before anything is learned
+    whole = _is_whole(run, starts, notes)
+    _require_same(run, starts)
+    return replace(run, whole=whole, notes=tuple(notes))
+
+
+def _lines(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> tuple[FloatArray, IntArray]:
+    """Times and lines of what was reported, never falling."""
+    line = line_numbers(log, timed)
+    time_s = log.block.time_s
+    within = (line >= 1) & (line <= timed.line_count)
+    above = line[line > timed.line_count]
+    where = f"{log.source}: {entry.program.name}"
+    if len(above) > 0.02 * len(line):
+        raise RecordError(
+            f"{where} has {timed.line_count} lines, and the log reports line {int(above.max())}: log and program do "
+            "not belong together"
+        )
+    time_s, line = time_s[within], line[within]
+    if len(line) < _MIN_BLOCKS:
+        raise RecordError(f"{where}: the log reports {len(line)} lines of it; {_MIN_BLOCKS} are needed")
+    # What is reported before the first block is of the run before; single readings may be wrong.
+    rises = _rising(line)
+    if np.mean(rises) < _MIN_RISING:
+        back = int(np.flatnonzero(~rises)[0])
+        raise RecordError(
+            f"{where}: {np.mean(~rises):.0%} of the reported lines go back (line {line[back]} after "
+            f"{time_s[back]:.1f} s is out of order): log and program do not belong together, or it repeats parts of "
+            "itself, which cannot be laid beside a log by line numbers"
+        )
+    if not rises.all():
+        notes.append(f"{int(np.sum(~rises))} reported lines are out of order and left out")
+    time_s, line = time_s[rises], line[rises]
+    first = np.concatenate([[True], np.diff(line) > 0])
+    return np.asarray(time_s[first], dtype=np.float64), np.asarray(line[first], dtype=np.int64)
+
+
+def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> None:
+    """The tools that the log names must be those that the program calls there; numbers of another kind are noted."""
+    if log.tool is None:
+        return
+    called = {int(tool) for tool in timed.tools if tool >= 0}
+    line = lines_at(log.tool, log, timed)
+    wrong = []
+    for value, at in zip(log.tool.value.tolist(), line.tolist(), strict=True):
+        # The number changes within the block that changes the tool.
+        here = {int(tool) for tool in timed.tools[max(at - 2, 0) : at + 3] if tool >= 0}
+        if value > 0.0 and at > 0 and here and int(value) not in here:
+            wrong.append((int(value), at, here))
+    if not wrong:
+        return
+    value, at, here = wrong[0]
+    said = f"tool {value} in the spindle at line {at}, where the program has T{min(here)}"
+    if len(wrong) > 1 and all(each[0] in called for each in wrong):
+        raise RecordError(f"{log.source}: {said}: it is not the log of {entry.program.name} as it stands")
+    notes.append(f"{said}: numbers of another kind, or of a tool that was there before the start")
+
+
+def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
+    """Which values belong to the longest row that never falls."""
+    ends: list[int] = []  # value at which the best row of each length ends
+    places: list[int] = []  # and where
+    before = np.full(len(line), -1, dtype=np.int64)
+    for index, value in enumerate(line.tolist()):
+        length = bisect_right(ends, value)
+        if length == len(ends):
+            ends.append(value)
+            places.append(index)
+        else:
+            ends[length] = value
+            places[length] = index
+        before[index] = places[length - 1] if length > 0 else -1
+    kept = np.zeros(len(line), dtype=bool)
+    at = places[-1] if places else -1
+    while at >= 0:
+        kept[at] = True
+        at = int(before[at])
+    return kept
+
+
+def _is_whole(run: ObservedRun, starts: FloatArray, notes: list[str]) -> bool:
+    """Whether the log begins where the program does."""
+    begin, total_s = starts[run.line], float(starts[-1])
+    known = np.flatnonzero(np.isfinite(begin))
+    if not len(known) or run.log.duration_s is None:
+        return True
+    missing_s = total_s - float(begin[known[-1]])
+    if missing_s > max(_MISSING_S, _MISSING * total_s):
+        raise RecordError(
+            f"{run.log.source}: completed at line {run.line[-1]} of the {run.timed.line_count} lines of "
+            f"{run.entry.program.name}, {missing_s:.0f} s before its end: log and program do not belong together"
+        )
+    if float(begin[known[0]]) - float(run.time_s[known[0]]) > max(_MISSING_S, _MISSING * total_s):
+        notes.append(f"begins at line {run.line[known[0]]}, in the middle of the program: the run is not whole")
+        return False
+    return True
+
+
+def _require_same(run: ObservedRun, starts: FloatArray) -> None:
+    """The way that the program goes between the reported lines must take time where the log says that it did."""
+    begin = starts[run.line]
+    known = np.isfinite(begin) & ~run.timed.function[run.line]
+    if known.sum() < _MIN_BLOCKS:
+        return
+    expected, seen = np.diff(begin[known]), np.diff(run.time_s[known])
+    groups = max(4, len(expected) // 6)
+    edges = np.linspace(0, len(expected), groups + 1).astype(int)[:-1]
+    one, other = np.log(np.add.reduceat(expected, edges) + 0.05), np.log(np.add.reduceat(seen, edges) + 0.05)
+    if np.std(one) < 0.15:
+        return
+    agreement = float(np.corrcoef(one, other)[0, 1])
+    if agreement < 0.3:
+        raise RecordError(
+            f"{run.log.source}: its lines do not take the time that those of {run.entry.program.name} need "
+            f"(correlation {agreement:.2f} over {groups} stretches, at least 0.3 is expected): log and program do not "
+            "belong together"
+        )
+
+
+# --- what the feeds of all runs show directly: rate of rapids, acceleration in arcs -----------------------------------
+
+_LIMITED = 0.9  # of the programmed feed: below it something else than the program sets the speed
+_MIN_ARC_READINGS = 12
+_DIALS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.05)  # where a dial of rapids usually stands
+
+
+def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
+    """What the feeds shown in arcs say of the largest acceleration across the path: v²/r where v is below the feed."""
+    found: list[FloatArray] = []
+    for run in runs:
+        log, timed = run.log, run.timed
+        if log.feed is None or not math.isfinite(run.feed_unit_mm_per_s):
+            continue
+        line = lines_at(log.feed, log, timed)
+        speed = log.feed.value * run.feed_unit_mm_per_s
+        radius = timed.arc_radius_mm[line]
+        feed = timed.feed_mm_per_s[line]
+        inside = np.isfinite(radius) & np.isfinite(feed) & (speed > 0.0)
+        for each, programmed in {
+            (round(float(r), 1), float(f)) for r, f in zip(radius[inside], feed[inside], strict=True)
+        }:
+            group = inside & (np.round(radius, 1) == each) & (feed == programmed)
+            # A reading may fall upon a corner or a ramp: the steady speed is the one that is hardly passed.
+            top = float(np.percentile(speed[group], 90))
+            if group.sum() >= _MIN_READINGS and top < _LIMITED * programmed:
+                found.append(np.full(int(group.sum()), top**2 / float(np.median(radius[group]))))
+    every = np.concatenate(found) if found else np.empty(0)
+    return float(np.median(every)) if len(every) >= _MIN_ARC_READINGS else math.nan
+
+
+def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
+    """Rapid rate of the machine and the override of each run, from the feeds that its logs show in rapids.
+
+    A rate shows as the highest feed that returns again and again. Where runs show several, the highest one, or one that
+    a usual place of the dial makes of it, is the machine's.
+    """
+    shown = {id(run): _shown_rate(run) for run in runs}
+    plateaus = [plateau for plateau, _ in shown.values() if math.isfinite(plateau)]
+    if not plateaus:
+        return math.nan, [with_override(run, math.nan) for run in runs]
+    top = max(plateaus)
+    fastest = max(single for _, single in shown.values())
+    stated = [run for run in runs if math.isfinite(run.rapid_override) and math.isfinite(shown[id(run)][0])]
+    rate = top
+    if stated:
+        rate = float(np.median([shown[id(run)][0] / run.rapid_override for run in stated if run.rapid_override > 0]))
+    elif fastest > 1.05 * top:
+        rate = next((top / dial for dial in _DIALS if top / dial >= 0.98 * fastest), fastest)
+    return rate, [with_override(run, rate) for run in runs]
+
+
+def with_override(run: ObservedRun, rate_mm_per_s: float) -> ObservedRun:
+    """A run with the override of its rapids: as stated, else as its rapids show it, else 1."""
+    if math.isfinite(run.rapid_override):
+        return run
+    ratio = _shown_rate(run)[0] / rate_mm_per_s
+    override = as_dialled(min(1.0, ratio)) if math.isfinite(ratio) else 1.0
+    notes = (*run.notes, f"rapid override {override:.0%} as its rapids show") if override < 0.99 else run.notes
+    return replace(run, rapid_override=override, notes=notes)
+
+
+def _shown_rate(run: ObservedRun) -> tuple[float, float]:
+    """Feed at which rapids run steadily, and the highest one of a way along Z alone; NaN and 0 where none is seen."""
+    log, timed = run.log, run.timed
+    if log.feed is None or not math.isfinite(run.feed_unit_mm_per_s):
+        return math.nan, 0.0
+    line = lines_at(log.feed, log, timed)
+    moving = np.isnan(timed.feed_mm_per_s[line]) & (line > 0)
+    value = log.feed.value[moving] * run.feed_unit_mm_per_s
+    if not len(value):
+        return math.nan, 0.0
+    single = _along_z(timed)[line[moving]]
+    alone = value[single]
+    high = value[value > 0.3 * value.max()]
+    ordered = np.sort(high)
+    upto = np.searchsorted(ordered, ordered * 1.003, side="right")
+    count = upto - np.arange(len(ordered))
+    steady = np.flatnonzero(count >= _MIN_READINGS)
+    plateau = float(np.median(ordered[steady[np.argmax(count[steady])] :][: count.max()])) if len(steady) else math.nan
+    return plateau, float(alone.max()) if len(alone) else 0.0
+
+
+def _along_z(timed: TimedProgram) -> npt.NDArray[np.bool_]:
+    """Lines whose only axis word is Z."""
+    alone = np.zeros(timed.line_count + 2, dtype=bool)
+    for number, words in enumerate(timed.text_lines[: timed.line_count], start=1):
+        plain = words.split("(")[0].upper()
+        alone[number] = "Z" in plain and "X" not in plain and "Y" not in plain
+    return alone
