@@ -148,13 +148,13 @@ Kind = tuple[str, Callable[[Path], bytes], Callable[[bytes], bytes], Callable[[P
 
 def _kinds() -> dict[str, Kind]:
     """Name of the file, a valid one, what is done with it once it is changed, and its reader."""
-    from shapegcode.identification.servo.record import read_servo_record
     from shapegcode.characterization.sheet import read_sheet
 
     import shapegcode as sg
     from command import run
     from shapegcode.cutting.stock import Stock
     from shapegcode.cutting.tool import Tool
+    from shapegcode.identification.servo.record import read_servo_record
     from shapegcode.io.edge_json import read_edge_json
     from shapegcode.io.read import read_measurement
     from shapegcode.machine.fanuc_import import import_parameters

@@ -15,15 +15,7 @@ _SAME_DAMPING = 0.05
 
 
 def stabilisation_chart(poles: Sequence[npt.NDArray[np.complex128]], period_s: float) -> tuple[ChartPole, ...]:
-    """Poles of models with 1, 2, ... modes, each held against the model one order lower.
-
-    Args:
-        poles: discrete poles by number of modes, as `stabilisation_poles` gives them.
-        period_s: time between two samples.
-
-    Returns:
-        The poles, by order of their model.
-    """
+    """Poles of models with 1, 2, ... modes, each held against the model one order lower."""
     chart: list[ChartPole] = []
     before: list[tuple[float, float]] = []
     for order, of_model in enumerate(poles, start=1):

@@ -82,11 +82,7 @@ class _Usable:
 
 
 def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> _Usable:
-    """Check a record with force.
-
-    Raises:
-        RecordError: why it cannot be used.
-    """
+    """Check a record with force."""
     force = record.force_n
     assert force is not None
     if not np.ptp(force) > 0.0:
@@ -184,11 +180,7 @@ def _windowed(
 
 
 def _decay(record: Record, band_hz: float | None, start_s: float | None, warnings: list[str]) -> _Usable:
-    """Check a record without force.
-
-    Raises:
-        RecordError: why it cannot be used.
-    """
+    """Check a record without force."""
     free = find_decay(record, start_s)
     if is_clipped(free.response):
         raise RecordError(
@@ -209,17 +201,6 @@ def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s:
 
     The force is set to 0 outside its pulse after its offset is taken away, and the offset of the response where it
     shows before the hit.
-
-    Args:
-        records: of one point and one axis, with force throughout or without force throughout.
-        band_hz: highest frequency of interest; None: the strongest vibration of each record.
-        start_s: time at which free decays begin; None: it is looked for.
-
-    Returns:
-        The hits that can be used, and what was said of the others.
-
-    Raises:
-        RecordError: no record can be used, or they do not belong together; with the reason for each.
     """
     if not records:
         raise RecordError("no record: needed is at least one tap or decay")
@@ -251,11 +232,7 @@ def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s:
 
 
 def _refuse_mixture(records: Sequence[Record]) -> None:
-    """Refuse records that do not belong together.
-
-    Raises:
-        RecordError: different quantities, axes or sampling, or force in some only.
-    """
+    """Refuse records that do not belong together."""
     first = records[0]
     for other in records[1:]:
         pairs = [

@@ -154,19 +154,7 @@ def _rest_after_motion(quiet: FloatArray, period_samples: float, level: float, s
 
 
 def find_decay(record: Record, start_s: float | None = None) -> Record:
-    """The free decay in a record without force.
-
-    Args:
-        record: of a rapid stop, for example.
-        start_s: time of the record at which the decay begins; None: the longest of the strong ones is taken, from
-            where its envelope falls and the axis itself no longer moves. Either way it ends before the next event.
-
-    Returns:
-        The decay alone, from its beginning on.
-
-    Raises:
-        RecordError: nothing vibrates, or *start_s* lies outside the record.
-    """
+    """The free decay in a record without force."""
     response = record.response
     last_s = record.start_s + record.period_s * (len(response) - 1)
     if start_s is not None and not record.start_s <= start_s < last_s:

@@ -42,22 +42,7 @@ def find_modes(
     modes: int | None,
     accepted_percent: float,
 ) -> Identification:
-    """Find the modes that checked records of the same point support; see `identify.identify`.
-
-    Args:
-        ready: taps (all with force) or free decays (all without), of the same quantity and sampling period.
-        files: where they come from.
-        band_hz: look for modes in this band only; None: from two swings per record to .45 of the sampling rate.
-        most_modes: largest number of modes of a model.
-        modes: number of modes; None: chosen by evidence.
-        accepted_percent: a mode is refused whose damping ratio or stiffness is less certain than this (95 %).
-
-    Returns:
-        The modes, those refused and why, and how well they fit.
-
-    Raises:
-        RecordError: a band beyond half the sampling rate, or more modes than the records hold.
-    """
+    """Find the modes that checked records of the same point support; see `identify.identify`."""
     problem = problem_of(ready, band_hz, within=modes is not None)
     models = _search(problem, most_modes, modes)
     others: list[Fit] = []

@@ -40,22 +40,7 @@ def find_frf_modes(
     modes: int | None,
     accepted_percent: float,
 ) -> Identification:
-    """Find the modes that frequency responses of the same point support; see `identify.identify`.
-
-    Args:
-        responses: of one quantity and axis.
-        files: where they come from.
-        band_hz: look for modes in this band only; None: all lines.
-        most_modes: largest number of modes of a model.
-        modes: number of modes; None: chosen by evidence.
-        accepted_percent: a mode is refused whose damping ratio or stiffness is less certain than this (95 %).
-
-    Returns:
-        The modes, those refused and why, and how well they fit.
-
-    Raises:
-        RecordError: a band without lines, or more modes than the lines hold.
-    """
+    """Find the modes that frequency responses of the same point support; see `identify.identify`."""
     problem, used = frf_problem_of(responses, band_hz)
     problem, models = _searched(problem, modes or most_modes)
     turned: list[str] = []

@@ -77,16 +77,7 @@ class FrfFit:
 def mode_columns(
     lines: FrfLines, omega: FloatArray, zeta: FloatArray
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Frequency responses of modes of 1 kg, and their derivatives to ln omega and ln zeta.
-
-    Args:
-        lines: where.
-        omega: (m,) rad/s.
-        zeta: (m,).
-
-    Returns:
-        Three arrays (n, m).
-    """
+    """Frequency responses of modes of 1 kg, and their derivatives to ln omega and ln zeta."""
     s = 1j * lines.omega[:, None]
     below = s**2 + 2.0 * zeta * omega * s + omega**2
     column = s ** POWERS[lines.quantity] / below
@@ -113,17 +104,6 @@ def fit_frf(lines: FrfLines, starts: Sequence[tuple[float, float]], most_iterati
     """Fit modes to lines: the sum over modes of (1/m) s^q / (s² + 2 zeta omega s + omega²).
 
     Levenberg-Marquardt in ln omega and ln zeta with exact derivatives; everything linear is eliminated.
-
-    Args:
-        lines: with their weights.
-        starts: (omega in rad/s, damping ratio) of each mode.
-        most_iterations: steps after which the search ends.
-
-    Returns:
-        The fit; its covariance is that of white noise of the weights' course, its level taken from the residual.
-
-    Raises:
-        ArgumentError: too few lines for the parameters.
 
     Source: D. J. Ewins, Modal Testing, 2nd ed., ch. 4; variable projection: G. Golub and V. Pereyra, 2003.
     """

@@ -202,18 +202,7 @@ def _measured_noise(each: FrequencyResponse) -> FloatArray:
 def frf_problem_of(
     responses: Sequence[FrequencyResponse], band_hz: tuple[float, float] | None
 ) -> tuple[FrfProblem, list[FrequencyResponse]]:
-    """The lines of a fit, and the band to look in.
-
-    Args:
-        responses: of one point and quantity.
-        band_hz: as asked for; None: all.
-
-    Returns:
-        The problem, and the responses as far as they are fitted.
-
-    Raises:
-        RecordError: a band that does not ascend or holds too few lines; responses that do not belong together.
-    """
+    """The lines of a fit, and the band to look in."""
     first = responses[0]
     for other in responses[1:]:
         for name in ("quantity", "axis"):
@@ -256,13 +245,5 @@ def _within(each: FrequencyResponse, low_hz: float, high_hz: float) -> Frequency
 
 
 def refit(problem: FrfProblem, fits: Sequence[Fit]) -> list[FrfFit]:
-    """The same models under other weights.
-
-    Args:
-        problem: with the new weights.
-        fits: of the old ones.
-
-    Returns:
-        The fits anew.
-    """
+    """The same models under other weights."""
     return [problem.fit(starts_of(fit)) for fit in fits]

@@ -55,14 +55,7 @@ class Hit:
 
 
 def robust_sigma(values: FloatArray) -> float:
-    """Standard deviation of the noise of a signal that is quiet most of the time.
-
-    Args:
-        values: (n,) samples.
-
-    Returns:
-        Standard deviation by the median, in the unit of the values.
-    """
+    """Standard deviation of the noise of a signal that is quiet most of the time."""
     return _MAD * float(np.median(np.abs(values - np.median(values))))
 
 
@@ -101,12 +94,6 @@ def find_hits(record: Record) -> list[Hit]:
 
     A pulse is a new hit if it comes 0.1 s or more after the one before, the response has died away to a tenth
     meanwhile, and it has at least a tenth of the largest force.
-
-    Args:
-        record: with force; without there is no hit.
-
-    Returns:
-        The hits, with the largest later pulse of each.
     """
     if record.force_n is None or not np.ptp(record.force_n) > 0.0:
         return []
@@ -135,12 +122,6 @@ def split_hits(record: Record) -> list[Record]:
     """One record for each hit of a recording, each with some time before the hit.
 
     A record with one hit, or without force, comes back as it is.
-
-    Args:
-        record: of one or several hits.
-
-    Returns:
-        Records with one hit each.
     """
     hits = find_hits(record)
     if len(hits) < 2:

@@ -122,11 +122,7 @@ def identify(
 
 
 def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:
-    """Arrays as a record.
-
-    Raises:
-        RecordError: instants that do not ascend evenly, or arrays of other lengths.
-    """
+    """Arrays as a record."""
     times = np.asarray(time_s, dtype=np.float64)
     samples = np.asarray(response, dtype=np.float64)
     if times.shape != samples.shape or times.ndim != 1 or len(times) < _LEAST_SAMPLES:
@@ -146,11 +142,7 @@ def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quanti
 
 
 def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
-    """The record of a resonance sweep, if that is what the file holds; None: it is anything else.
-
-    Raises:
-        RecordError: several of them, or a fault in the file.
-    """
+    """The record of a resonance sweep, if that is what the file holds; None: it is anything else."""
     paths = [Path(each) for each in sources if isinstance(each, str | Path)]
     found = [path for path in paths if path.is_file() and is_klipper(_beginning(path))]
     if not found or options.ignore_force:

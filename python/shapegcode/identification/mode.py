@@ -71,14 +71,7 @@ _SKEWED = 1.2
 
 
 def mode_line(mode: IdentifiedMode) -> str:
-    """A mode in one line: each value with half of its 95 % interval, or why the data do not support it.
-
-    Args:
-        mode: supported or refused.
-
-    Returns:
-        One line of text.
-    """
+    """A mode in one line: each value with half of its 95 % interval, or why the data do not support it."""
     if mode.refusal:
         return f"{mode.frequency_hz.value:.4g} Hz not supported: {mode.refusal}"
     named = (
@@ -97,15 +90,7 @@ def mode_line(mode: IdentifiedMode) -> str:
 
 
 def with_interval(estimate: Estimate, factor: float = 1.0) -> str:
-    """``46.02 ± 0.05``, with as many digits as the interval is worth; both ends where it is skewed.
-
-    Args:
-        estimate: value and ends.
-        factor: to the unit that is shown.
-
-    Returns:
-        Value and interval.
-    """
+    """``46.02 ± 0.05``, with as many digits as the interval is worth; both ends where it is skewed."""
     value, low, high = (factor * each for each in (estimate.value, estimate.low, estimate.high))
     above, below = high - value, value - low
     if not (math.isfinite(above) and math.isfinite(below) and above > 0.0 and below > 0.0):
@@ -117,15 +102,7 @@ def with_interval(estimate: Estimate, factor: float = 1.0) -> str:
 
 
 def plus_minus(value: float, half: float) -> str:
-    """A value and half its interval, to two digits of the latter.
-
-    Args:
-        value: of any unit.
-        half: half of its interval, above 0.
-
-    Returns:
-        Both as text.
-    """
+    """A value and half its interval, to two digits of the latter."""
     decimals = _decimals(half)
     return f"{value:z.{decimals}f} ± {half:.{decimals}f}"
 
@@ -135,13 +112,5 @@ def _decimals(half: float) -> int:
 
 
 def estimate_cell(estimate: Estimate | None, factor: float) -> str:
-    """An estimate times a factor with its interval, for a table; empty where there is none.
-
-    Args:
-        estimate: None: there is none.
-        factor: to the unit of the column.
-
-    Returns:
-        Text of the cell.
-    """
+    """An estimate times a factor with its interval, for a table; empty where there is none."""
     return "" if estimate is None else with_interval(estimate, factor)

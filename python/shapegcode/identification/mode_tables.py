@@ -51,17 +51,7 @@ class ModeTables:
     """
 
     def __init__(self, text: str, axis: str, source: str, file: str) -> None:
-        """Find them.
-
-        Args:
-            text: of a machine file that loads, without byte order mark.
-            axis: "x", "y" or "z".
-            source: where the new modes come from.
-            file: name for messages.
-
-        Raises:
-            ArgumentError: modes or axis are written in a way in which they cannot be edited.
-        """
+        """Find them."""
         text = with_origin_table(text)
         self.newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
         self._last_end = "" if text.endswith("\n") else self.newline
@@ -103,18 +93,7 @@ class ModeTables:
         )
 
     def put(self, modes: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
-        """The text with modes in it; see `update.update_modes`.
-
-        Args:
-            modes: that the data support.
-            refused: that the data show without supporting them.
-
-        Returns:
-            The new text of the file.
-
-        Raises:
-            ArgumentError: the result would not say what is meant, because of a layout that is not known here.
-        """
+        """The text with modes in it; see `update.update_modes`."""
         old_hz = [each["frequency_hz"] for each in self.old]
         taken = matches(modes, old_hz)
         kept = {old: modes[mode] for mode, old in taken.items()}
@@ -136,14 +115,7 @@ class ModeTables:
         return self._with_origins(text, [*stay, *added])
 
     def make_rigid(self) -> str:
-        """The text without modes of the axis, which is said to be rigid.
-
-        Returns:
-            The new text of the file.
-
-        Raises:
-            ArgumentError: the result would not say what is meant, because of a layout that is not known here.
-        """
+        """The text without modes of the axis, which is said to be rigid."""
         _, left = self._old_tables({}, {}, "it is taken as rigid")
         entries = self.home.value.body
         place = next((n for n, (key, item) in enumerate(entries) if _is_modes(key, item)), len(entries))
@@ -174,11 +146,7 @@ class ModeTables:
     def _old_tables(
         self, kept: Mapping[int, IdentifiedMode], seen: Mapping[int, IdentifiedMode], why: str = "which was not found"
     ) -> tuple[list[Table], list[Entry]]:
-        """Change the tables of the file.
-
-        Returns:
-            The tables that stay, and what stood behind the last ones that went.
-        """
+        """Change the tables of the file."""
         stay: list[Table] = []
         left: list[Entry] = []
         for number, (table, old) in enumerate(zip(self.tables, self.old, strict=True)):

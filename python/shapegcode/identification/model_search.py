@@ -92,18 +92,7 @@ class Search:
 
 
 def search(problem: FitProblem, most_modes: int) -> Search:
-    """Fit models of 0, 1, 2, ... modes until the data ask for no more.
-
-    Args:
-        problem: what is fitted.
-        most_modes: largest number of modes.
-
-    Returns:
-        Every model that was tried, and the one that the data ask for.
-
-    Raises:
-        ArgumentError: the records have too few samples for a mode.
-    """
+    """Fit models of 0, 1, 2, ... modes until the data ask for no more."""
     squares, share = problem.squares, problem.white_share
     evidence = [evidence_of_none(problem)]
     fits: list[Fit] = []
@@ -123,27 +112,12 @@ def search(problem: FitProblem, most_modes: int) -> Search:
 
 
 def evidence_of_none(problem: FitProblem) -> float:
-    """Evidence of a model without modes.
-
-    Args:
-        problem: what is fitted.
-
-    Returns:
-        The criterion; lower is better.
-    """
+    """Evidence of a model without modes."""
     return _evidence(problem.squares, problem.white_share * problem.samples, problem.constants, 0)
 
 
 def evidence_of(fit: Fit, white_share: float) -> float:
-    """Evidence of a fit, as in `Search.evidence`.
-
-    Args:
-        fit: a model.
-        white_share: of the samples, how many are independent.
-
-    Returns:
-        The criterion; lower is better.
-    """
+    """Evidence of a fit, as in `Search.evidence`."""
     return _evidence(fit.sum_of_squares, white_share * fit.samples, fit.parameters, len(fit.omega_rad_s))
 
 
@@ -153,14 +127,7 @@ def _evidence(squares: float, samples: float, parameters: int, modes: int) -> fl
 
 
 def chart_poles(problem: FitProblem) -> Sequence[npt.NDArray[np.complex128]]:
-    """Poles of the models of a stabilisation chart, by number of modes from 1.
-
-    Args:
-        problem: records.
-
-    Returns:
-        Discrete poles by number of modes.
-    """
+    """Poles of the models of a stabilisation chart, by number of modes from 1."""
     return problem.poles(max(1, min(_CHART_ORDERS, problem.chart_orders)))
 
 
@@ -219,14 +186,7 @@ def _has_twins(fit: Fit, record_s: float) -> bool:
 
 
 def starts_of(fit: Fit) -> Starts:
-    """The modes of a fit, for another one to begin with.
-
-    Args:
-        fit: a model.
-
-    Returns:
-        (omega in rad/s, damping ratio) of each mode.
-    """
+    """The modes of a fit, for another one to begin with."""
     return [(float(omega), float(zeta)) for omega, zeta in zip(fit.omega_rad_s, fit.damping_ratio, strict=True)]
 
 

@@ -17,15 +17,7 @@ _ORIGIN = re.compile(r"^(from [^:]*|assumed|not known|not measured)")
 
 
 def open_modes(machine: Machine, measured: str | None) -> dict[str, str]:
-    """Modes of the other axes that nobody measured on this machine, and over which nobody decided.
-
-    Args:
-        machine: with the remarks of its file.
-        measured: the axis that was tapped; None: none.
-
-    Returns:
-        Per axis their frequencies and where they come from.
-    """
+    """Modes of the other axes that nobody measured on this machine, and over which nobody decided."""
     found: dict[str, list[str]] = {}
     for value in machine.values():
         parts = value.key.split(".")
@@ -36,17 +28,7 @@ def open_modes(machine: Machine, measured: str | None) -> dict[str, str]:
 
 
 def require_decisions(open_axes: Mapping[str, str], keep: str, rigid: str, file: str) -> None:
-    """Refuse modes over which nobody decided.
-
-    Args:
-        open_axes: see `open_modes`.
-        keep: letters of axes whose modes stay.
-        rigid: letters of axes that have none.
-        file: name for messages.
-
-    Raises:
-        ArgumentError: says what to do.
-    """
+    """Refuse modes over which nobody decided."""
     check_axes(keep, rigid)
     undecided = {axis: modes for axis, modes in open_axes.items() if axis not in keep + rigid}
     if undecided:
@@ -59,20 +41,7 @@ def require_decisions(open_axes: Mapping[str, str], keep: str, rigid: str, file:
 
 
 def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[str]]:
-    """Take the modes of rigid axes out of a file, and say of kept ones that they are.
-
-    Args:
-        text: of a machine file that loads, without byte order mark.
-        keep: letters of axes whose modes stay.
-        rigid: letters of axes that have none.
-        file: name for messages.
-
-    Returns:
-        The text, and a note for each axis that changed.
-
-    Raises:
-        ArgumentError: an axis is written in a way in which it cannot be edited.
-    """
+    """Take the modes of rigid axes out of a file, and say of kept ones that they are."""
     notes: list[str] = []
     for axis in rigid:
         tables = ModeTables(text, axis, "", file)

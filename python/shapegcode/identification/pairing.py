@@ -21,12 +21,6 @@ _SHARE_DIGITS = 4
 def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
     """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes.
 
-    Args:
-        modes: of one point, that the data support.
-
-    Returns:
-        The participation of each, and what it is in words.
-
     Those of one point under a motion of its base do so, sum of phi_i Gamma_i = 1, for mode shapes that span the motion.
     """
     masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
@@ -41,15 +35,7 @@ def _share(value: float) -> float:
 
 
 def matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
-    """Number of the old mode by that of the new: as many pairs within 10 % as there can be, the nearest ones.
-
-    Args:
-        modes: new ones.
-        old_hz: frequencies of the old ones.
-
-    Returns:
-        The pairs.
-    """
+    """Number of the old mode by that of the new: as many pairs within 10 % as there can be, the nearest ones."""
     if not old_hz or not modes:
         return {}
     new_hz = np.array([mode.frequency_hz.value for mode in modes])

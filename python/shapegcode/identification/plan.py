@@ -55,15 +55,7 @@ def _round_up(value: float) -> float:
 
 
 def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisRecording:
-    """How to record.
-
-    Args:
-        axis: its name.
-        modes: (frequency in Hz, damping ratio) of those known; empty: the usual range of machining centres.
-
-    Returns:
-        Sampling rate, length of a tap, tip of the hammer.
-    """
+    """How to record."""
     known = modes or tuple((frequency, _USUAL_DAMPING) for frequency in _USUAL_HZ)
     highest = max(_LOOK_LEAST_HZ, _LOOK_ABOVE * max(frequency for frequency, _ in known))
     pulse = EXCITED_HALF_SINE / highest
@@ -88,16 +80,7 @@ def _modes(axis: Axis) -> tuple[tuple[float, float], ...]:
 
 
 def rapid_stop_program(axis: str, distance_mm: float, dwell_s: float) -> str:
-    """A FANUC program that stops an axis from rapid several times, there and back, in the air.
-
-    Args:
-        axis: X, Y or Z.
-        distance_mm: length of each rapid, positive or negative.
-        dwell_s: rest after each, in which the decay is recorded.
-
-    Returns:
-        The program.
-    """
+    """A FANUC program that stops an axis from rapid several times, there and back, in the air."""
     number = 7201 + _AXES.index(axis)
     there, back = (f"{sign * distance_mm:.3f}".rstrip("0") for sign in (1.0, -1.0))
     lines = ["%", f"O{number}(RAPID STOP {axis})", "(INCREMENTAL, AIR ONLY, ENDS WHERE IT BEGAN)", "G21 G91 G94"]

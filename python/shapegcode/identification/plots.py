@@ -44,14 +44,7 @@ _MEASURED, _FITTED = plot.GREY, plot.COLOURS[0]
 
 
 def plots_of(found: Identification) -> dict[str, Plot]:
-    """Its pictures by name.
-
-    Args:
-        found: what was identified.
-
-    Returns:
-        What draws each picture, by the name of its file without ending.
-    """
+    """Its pictures by name."""
     if found.sweep is not None:
         return {"identify-sweep": partial(plot_sweep, found)}
     if found.responses:

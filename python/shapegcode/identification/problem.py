@@ -246,18 +246,6 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
     """The records of a fit, and the band to look in.
 
     A strong mode outside the band asked for is part of what is measured within it: it is looked for too.
-
-    Args:
-        ready: records that were looked through.
-        band_hz: as asked for; None: from two swings per record to .45 of the sampling rate, or to where nothing is
-            excited any more.
-        within: look for modes in the band asked for only.
-
-    Returns:
-        Taps or decays.
-
-    Raises:
-        RecordError: a band that does not ascend, or ends above half the sampling rate.
     """
     first = ready.records[0]
     responses = [record.response for record in ready.records]

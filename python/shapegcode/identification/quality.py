@@ -44,12 +44,6 @@ def is_clipped(values: FloatArray) -> bool:
 
     A run of three or more samples at the extreme, next to which the signal falls more steeply than a smooth peak of the
     same width at this resolution would.
-
-    Args:
-        values: (n,) samples.
-
-    Returns:
-        True for an overload.
     """
     centred = values - np.median(values)
     largest = float(np.max(np.abs(centred)))
@@ -97,15 +91,7 @@ def _run_around(inside: npt.NDArray[np.bool_], at: int) -> int:
 
 
 def excited_hz(force_n: FloatArray, period_s: float) -> float:
-    """Frequency up to which a pulse excites: where its spectrum has fallen by 20 dB, at most half the sampling rate.
-
-    Args:
-        force_n: (n,) the pulse, 0 outside of it.
-        period_s: time between two samples.
-
-    Returns:
-        The frequency in Hz; 0 without a pulse.
-    """
+    """Frequency up to which a pulse excites: where its spectrum has fallen by 20 dB, at most half the sampling rate."""
     pulse = np.trim_zeros(force_n)
     if pulse.size == 0:
         return 0.0
@@ -122,21 +108,7 @@ def excited_hz(force_n: FloatArray, period_s: float) -> float:
 def refuse_short(
     record: Record, response: FloatArray, noise: float, band_hz: float | None, warnings: list[str]
 ) -> float:
-    """Refuse what is too short or sampled too slowly for the strongest mode.
-
-    Args:
-        record: for the sampling period, and its name in warnings.
-        response: after the hit, or of the free decay.
-        noise: RMS noise of the response, 0 where it is not known.
-        band_hz: highest frequency of interest; None: the strongest vibration.
-        warnings: grows by what is only doubtful.
-
-    Returns:
-        Frequency of the strongest vibration in Hz.
-
-    Raises:
-        RecordError: the response after the hit does not support a model.
-    """
+    """Refuse what is too short or sampled too slowly for the strongest mode."""
     half_rate = 0.5 / record.period_s
     if len(response) < _LEAST_SAMPLES:
         raise RecordError(

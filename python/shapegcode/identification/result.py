@@ -311,15 +311,7 @@ def _estimate(name: str, factor: float = 1.0) -> Any:
 
 
 def reason_for(supported: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
-    """Why there is no mode; empty: there is.
-
-    Args:
-        supported: modes that the data support.
-        refused: those that stand out and are not supported.
-
-    Returns:
-        The reason, with that of each mode.
-    """
+    """Why there is no mode; empty: there is."""
     if supported:
         return ""
     if not refused:

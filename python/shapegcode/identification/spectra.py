@@ -56,15 +56,6 @@ def frf(records: Sequence[Record]) -> Frf:
 
     No window beside the one of the force that `checks.prepare` applied; a response that has not decayed at the end of
     its record leaks. Records of different length are filled up with zeros.
-
-    Args:
-        records: taps with force, of one quantity and sampling period.
-
-    Returns:
-        The response over the force by frequency; with several taps the coherence too.
-
-    Raises:
-        RecordError: a record has no force, or the sampling differs.
     """
     if not records:
         raise RecordError("no record: an FRF needs at least one tap")
@@ -136,12 +127,6 @@ def decay_spectrum(record: Record) -> Spectrum:
 
     The window falls from 1 at the first sample to 0 after the last (half of a Hann window): the beginning of a decay
     counts fully and the end of the record leaves no side lobes. Filled up with zeros to four times the length.
-
-    Args:
-        record: without force.
-
-    Returns:
-        Amplitude by frequency, and its peaks, largest first.
     """
     response = record.response - np.mean(record.response)
     samples = len(response)
@@ -196,18 +181,7 @@ class Envelope:
 
 
 def envelope(record: Record, band_hz: tuple[float, float] | None = None) -> Envelope:
-    """Envelope of a response by the Hilbert transform, of a band by a Butterworth filter run both ways (order 4).
-
-    Args:
-        record: a response.
-        band_hz: lower and upper limit; None: the whole response.
-
-    Returns:
-        The response in the band, and its envelope.
-
-    Raises:
-        RecordError: the band does not lie between 0 and half the sampling rate.
-    """
+    """Envelope of a response by the Hilbert transform, of a band by a Butterworth filter run both ways (order 4)."""
     response = np.asarray(record.response - np.mean(record.response), dtype=np.float64)
     if band_hz is not None:
         low, high = band_hz
@@ -222,18 +196,7 @@ def envelope(record: Record, band_hz: tuple[float, float] | None = None) -> Enve
 
 
 def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[Envelope]:
-    """The envelope of each mode in a band of its own: a quarter to either side, at most half way to the next mode.
-
-    Args:
-        record: a response.
-        frequencies_hz: of the modes.
-
-    Returns:
-        One envelope per mode, in their order.
-
-    Raises:
-        RecordError: a frequency is not between 0 and half the sampling rate.
-    """
+    """The envelope of each mode in a band of its own: a quarter to either side, at most half way to the next mode."""
     half = 0.5 / record.period_s
     found = []
     for frequency in frequencies_hz:

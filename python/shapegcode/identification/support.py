@@ -98,17 +98,6 @@ def estimates_of(
     The intervals are those of the fit's covariance, in logarithms. Where taps differ by more than that explains, their
     scatter takes its place. What the force does between its samples is not known to the covariance: the intervals
     reach as far as those of the other courses that the data allow, and by what may have been folded into its spectrum.
-
-    Args:
-        fit: of all records together.
-        alone: of each record by itself, its modes in the same order; fewer than two: no scatter.
-        others: the same modes under other courses of the force between its samples.
-        aliased: share of the force's spectrum at a frequency in Hz that may come from above half the sampling rate.
-        white_share: of the samples, how many are independent.
-        least: shares to which frequency and damping ratio are known at best.
-
-    Returns:
-        Estimates per mode, in the order of the fit.
     """
     freedom = max(white_share * fit.samples - fit.parameters, 1.0)
     quantile = float(stats.t.ppf(0.975, freedom)) / np.sqrt(white_share)
@@ -186,14 +175,6 @@ def rivals_of(order: int, fits: Sequence[Fit], white_share: float) -> list[Rival
     """Models beside the chosen one that the data do not clearly refuse.
 
     That is the one with a mode more, if chance alone would seldom make it fit so much better.
-
-    Args:
-        order: number of modes of the chosen model.
-        fits: models with 1, 2, ... modes.
-        white_share: of the samples, how many are independent.
-
-    Returns:
-        None, or the one with a mode more.
     """
     chosen = fits[order - 1]
     if len(fits) <= order:
@@ -208,29 +189,13 @@ def rivals_of(order: int, fits: Sequence[Fit], white_share: float) -> list[Rival
 
 
 def is_background(mode: Estimates, doubts: Doubts) -> bool:
-    """Whether a part of the model is drift or lies outside the band: it helps the fit, and is no mode to speak of.
-
-    Args:
-        mode: of the model.
-        doubts: what was searched.
-
-    Returns:
-        True where it is no mode to speak of.
-    """
+    """Whether a part of the model is drift or lies outside the band: it helps the fit, and is no mode to speak of."""
     low, high = doubts.band_hz
     return mode.damping_ratio.value > _NO_VIBRATION or not low <= mode.frequency_hz.value <= high
 
 
 def refusal_of(mode: Estimates, doubts: Doubts) -> str:
-    """Why the data do not support a mode; empty if they do.
-
-    Args:
-        mode: of the model.
-        doubts: limits and rivals.
-
-    Returns:
-        The reason, or an empty text.
-    """
+    """Why the data do not support a mode; empty if they do."""
     frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
     if frequency.value * doubts.record_s < LEAST_SWINGS:
         return (

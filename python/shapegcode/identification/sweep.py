@@ -58,19 +58,6 @@ def find_swept_modes(
 ) -> Identification:
     """Find the modes that a sweep shows; see `identify.identify`.
 
-    Args:
-        record: acceleration along the axis that was shaken.
-        files: where it comes from.
-        band_hz: part of the sweep that is looked at; None: 10 to 130 Hz.
-        most_modes: largest number of modes of a model.
-        modes: number of modes; None: chosen by evidence.
-
-    Returns:
-        Frequencies and damping ratios, with wide intervals; masses cannot be had without force.
-
-    Raises:
-        RecordError: too short, too slow, or a band that does not ascend.
-
     Source: this project; the sweep is that of Klipper's resonance tester.
     """
     band = band_hz or SWEPT_HZ

@@ -60,13 +60,6 @@ def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
     """Up to where a tap must be sampled for its modes to be found.
 
     Modes above the band are part of what is measured within it: what stands out of the response is fitted along.
-
-    Args:
-        ready: taps with force.
-        asked_hz: end of the band that is asked for; None: all that the hits excite.
-
-    Returns:
-        The frequency in Hz.
     """
     excited = max((value for value in ready.excited_hz if value is not None), default=0.0)
     margin = _MARGIN
@@ -90,13 +83,6 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
     Force and response pass the same filter of linear phase, whose delay is taken away: their ratio stays what it was.
     The record is taken as at rest before its first sample; where the pulse comes soon after it, it begins earlier by as
     much as the filter spreads the pulse.
-
-    Args:
-        ready: taps with force.
-        highest_hz: end of the band.
-
-    Returns:
-        The thinned taps; None: they are thin enough, or velocities after single blows, which jump.
     """
     period = ready.records[0].period_s
     factor = int(_BAND / (highest_hz * period)) if highest_hz > 0.0 else 1
@@ -139,14 +125,7 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
 
 
 def are_blows(ready: Prepared) -> bool:
-    """Whether the pulses are single blows of one or two samples.
-
-    Args:
-        ready: taps with force.
-
-    Returns:
-        True for blows.
-    """
+    """Whether the pulses are single blows of one or two samples."""
     forces = (record.force_n for record in ready.records)
     return any(np.count_nonzero(force) < LEAST_PULSE for force in forces if force is not None)
 

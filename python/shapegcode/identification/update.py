@@ -85,25 +85,7 @@ def update_machine_file(
     keep_modes: str = "",
     rigid: str = "",
 ) -> MachineUpdate:
-    """Read a machine file and put identified modes into it; see `update_modes`. The file itself is not touched.
-
-    Args:
-        path: of the machine file.
-        axis: "x", "y" or "z".
-        modes: what the data support.
-        source: where they come from.
-        refused: modes that the data show without supporting their values.
-        keep_modes: other axes whose modes stay though nobody measured them on this machine: "yz".
-        rigid: other axes that have no mode that counts; theirs are taken out.
-
-    Returns:
-        The text to write, what it says, and notes of what changed.
-
-    Raises:
-        ArgumentError: a built-in machine; see `update_modes` too.
-        MachineError: the file is bad, or would be.
-        OSError: it cannot be read.
-    """
+    """Read a machine file and put identified modes into it; see `update_modes`. The file itself is not touched."""
     check_updatable(path)
     text = read_text(Path(path), MachineError)
     return update_modes(
@@ -112,19 +94,7 @@ def update_machine_file(
 
 
 def check_updatable(path: str | Path) -> Machine:
-    """Tell before the work what would make `update_machine_file` fail whatever the modes.
-
-    Args:
-        path: of the machine file, or name of a built-in machine.
-
-    Returns:
-        What the file says now.
-
-    Raises:
-        ArgumentError: a built-in machine.
-        MachineError: the file is bad.
-        OSError: it cannot be read.
-    """
+    """Tell before the work what would make `update_machine_file` fail whatever the modes."""
     if isinstance(path, str) and path in Machine.builtin_names():
         raise ArgumentError(
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "
@@ -151,24 +121,6 @@ def update_modes(
     frequency that somebody stated wider than it was measured. A mode of the file that the test shows, but does not
     support, stays as it is. Other tables of the axis' modes go, other modes get a table of their own, whose
     participation is its share of the residues. Putting the same modes in twice gives the same text.
-
-    Args:
-        text: of the machine file.
-        axis: "x", "y" or "z".
-        modes: what the data support.
-        source: where they come from.
-        refused: modes that the data show without supporting their values.
-        keep_modes: other axes whose modes stay though nobody measured them on this machine: "yz".
-        rigid: other axes that have no mode that counts; theirs are taken out.
-        file: name for messages.
-
-    Returns:
-        The new text, and what changed in it.
-
-    Raises:
-        ArgumentError: no mode, one without support, no such axis, modes that are not written as [[axes.x.modes]], or
-            modes of another axis that nobody measured on this machine and over which nobody decided.
-        MachineError: the result would not load.
     """
     if axis not in ("x", "y", "z"):
         raise ArgumentError(f"axis {axis!r}: must be x, y or z")

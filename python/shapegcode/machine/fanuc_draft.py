@@ -79,15 +79,7 @@ class Draft:
             table.pop(name, None)
 
     def set(self, key: str, value: Any, *numbers: int, note: str = "", axis: int | None = None) -> None:
-        """Put a value of the dump into the machine.
-
-        Args:
-            key: dotted.
-            value: of the key; a list is one per axis.
-            numbers: of the parameters that it comes from.
-            note: what had to be assumed to understand them; the remark begins with it then.
-            axis: the one whose values were read; None: all three.
-        """
+        """Put a value of the dump into the machine."""
         shown = self.put(key, value)
         origin = "FANUC " + ", ".join(str(number) for number in numbers)
         self.remarks[key] = f"{origin}: {note}" if note else origin

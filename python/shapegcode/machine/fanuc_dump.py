@@ -70,11 +70,7 @@ class Dump:
 
 
 def read_dump(data: bytes, file: str, wanted: Container[int]) -> Dump:
-    """Read the *wanted* parameters of a dump, and check the form of all; *file* names it in messages.
-
-    Raises:
-        MachineError: not a dump, a record that is cut or not numeric, a value given twice in one record.
-    """
+    """Read the *wanted* parameters of a dump, and check the form of all; *file* names it in messages."""
 
     def bad(message: str, line: int | None = None) -> MachineError:
         return MachineError(file, (Problem("", "", message, line),))

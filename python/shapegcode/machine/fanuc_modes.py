@@ -10,15 +10,7 @@ __all__ = ["check_axes", "take_modes"]
 
 
 def check_axes(keep: str, rigid: str) -> None:
-    """Whether axes are named as they can be.
-
-    Args:
-        keep: letters of axes whose modes stay.
-        rigid: letters of axes that have none.
-
-    Raises:
-        ArgumentError: a letter that is no axis, or an axis in both.
-    """
+    """Whether axes are named as they can be."""
     wrong = sorted({*keep, *rigid} - set("xyz"))
     if wrong:
         raise ArgumentError(f"{', '.join(wrong)}: axes are x, y and z")
@@ -27,17 +19,7 @@ def check_axes(keep: str, rigid: str) -> None:
 
 
 def take_modes(draft: Draft, base: Machine | None, keep: str, rigid: str) -> None:
-    """Keep the modes of the base where somebody says that they are those of this machine; leave them out elsewhere.
-
-    Args:
-        draft: tables that start as those of the base.
-        base: where modes may come from.
-        keep: letters of axes whose modes are those of the base.
-        rigid: letters of axes that have none.
-
-    Raises:
-        ArgumentError: an axis in both, or to be kept though the base has no mode of it.
-    """
+    """Keep the modes of the base where somebody says that they are those of this machine; leave them out elsewhere."""
     check_axes(keep, rigid)
     for axis in "xyz":
         modes = getattr(base.axes, axis).modes if base else ()

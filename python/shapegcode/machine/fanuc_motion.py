@@ -22,11 +22,7 @@ _OFF, _ON = ("G05.1Q0",), ("G05.1Q1",)
 
 
 def take_motion(draft: Draft) -> None:
-    """Everything about the motion.
-
-    Args:
-        draft: is filled; its increment system is known already.
-    """
+    """Everything about the motion."""
     before = _limits_and_law(draft)
     _shaped_filter(draft)
     _look_ahead_at_start(draft)

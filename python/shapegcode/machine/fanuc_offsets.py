@@ -13,12 +13,7 @@ _KEYS = {10: "tool_length_mm", 11: "tool_length_wear_mm", 12: "tool_radius_mm", 
 
 
 def take_tables(draft: Draft, tables: ControlTables) -> None:
-    """Offsets and variables as they stood when they were punched.
-
-    Args:
-        draft: is filled; it has what the parameters say.
-        tables: what was read.
-    """
+    """Offsets and variables as they stood when they were punched."""
     _tools(draft, tables)
     _systems(draft, tables)
     _variables(draft, tables)

@@ -27,11 +27,7 @@ NUMBERS = frozenset(
 
 
 def take_program(draft: Draft) -> None:
-    """Everything about programs.
-
-    Args:
-        draft: is filled.
-    """
+    """Everything about programs."""
     _axes(draft)
     _increments(draft)
     _words_and_arcs(draft)

@@ -58,14 +58,7 @@ class ControlTables:
 
 
 def is_table(data: bytes) -> bool:
-    """Whether a file is such a table: its first line with words is a G10 or an assignment, or leads to one.
-
-    Args:
-        data: of the file.
-
-    Returns:
-        False for a parameter dump.
-    """
+    """Whether a file is such a table: its first line with words is a G10 or an assignment, or leads to one."""
     for _, words in _lines(data):
         if _G10.match(words) or _ASSIGNMENT.fullmatch(words):
             return True
@@ -75,16 +68,7 @@ def is_table(data: bytes) -> bool:
 
 
 def read_table(data: bytes, file: str, tables: ControlTables) -> None:
-    """Read a table into those that were read before; a value that is there already is replaced.
-
-    Args:
-        data: of the file.
-        file: its name.
-        tables: is filled.
-
-    Raises:
-        MachineError: a line that is cut or that makes no sense.
-    """
+    """Read a table into those that were read before; a value that is there already is replaced."""
     for line, words in _lines(data):
         try:
             if found := _ASSIGNMENT.fullmatch(words):

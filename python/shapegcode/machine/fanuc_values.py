@@ -29,17 +29,7 @@ class DumpValues:
         self.differing: list[tuple[int, float]] = []
 
     def scalar(self, number: int, high: float = _LARGEST, unit: str = "", low: float = 0.0) -> float | None:
-        """A parameter without axes; where the dump gives it per axis, the largest of X, Y, Z.
-
-        Args:
-            number: of the parameter.
-            high: largest value that can be, in `unit`.
-            unit: of the value, for messages; inch values become mm.
-            low: smallest value that can be.
-
-        Returns:
-            The value; None where the dump has none.
-        """
+        """A parameter without axes; where the dump gives it per axis, the largest of X, Y, Z."""
         entry = self.dump.get(number)
         if entry is not None:
             return self._number(entry, low, high, unit)
@@ -49,17 +39,7 @@ class DumpValues:
         return max(values, default=None)
 
     def per_axis(self, number: int, high: float = _LARGEST, unit: str = "", low: float = 0.0) -> list[float] | None:
-        """The values of X, Y, Z; one without an axis stands for all three. None where the dump lacks one.
-
-        Args:
-            number: of the parameter.
-            high: largest value that can be, in `unit`.
-            unit: of the value, for messages; inch values become mm.
-            low: smallest value that can be.
-
-        Returns:
-            Three values, or None.
-        """
+        """The values of X, Y, Z; one without an axis stands for all three. None where the dump lacks one."""
         entries = self.entries(number)
         if len(entries) < 3:
             one = self.dump.get(number)

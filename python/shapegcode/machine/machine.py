@@ -444,17 +444,7 @@ _OF_A_MACHINE = ("axes.", "controller.", "times.", "power_on.", "feed_control.")
 
 
 def inherited_text(name: str) -> str:
-    """A built-in machine's file as the start of another one: what was measured there is inherited here.
-
-    Args:
-        name: of the built-in machine.
-
-    Returns:
-        The file; only remarks are other ones.
-
-    Raises:
-        MachineError: no built-in machine of that name.
-    """
+    """A built-in machine's file as the start of another one: what was measured there is inherited here."""
     text = Machine.builtin_text(name)
     whose = Machine.load(name).name
 
@@ -465,11 +455,7 @@ def inherited_text(name: str) -> str:
 
 
 def key_documentation() -> str:
-    """The reference of the machine file's keys as Markdown: what ``docs/reference/machine.md`` holds, word for word.
-
-    Returns:
-        The page; ``make docs`` writes it.
-    """
+    """The reference of the machine file's keys as Markdown: what ``docs/reference/machine.md`` holds, word for word."""
     return documentation(Machine, Machine.builtin_names())
 
 

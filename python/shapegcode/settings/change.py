@@ -18,22 +18,7 @@ _PART = re.compile(r'"([^"]*)"|([^."]+)')
 
 
 def with_values(settings: _Model, values: Mapping[str, object], source: str, error: type[FileError]) -> _Model:
-    """The settings with other values; what was a default stays one.
-
-    Args:
-        settings: what was loaded.
-        values: by dotted key; the tables of a list count from 1, as in ``axes.x.modes.1.frequency_hz``. None takes a
-            key out, so that its default holds.
-        source: names the settings in messages.
-        error: what to raise.
-
-    Returns:
-        New settings; the old ones stay as they are.
-
-    Raises:
-        FileError: the given kind of it: a key that does not exist, or a value that a file could not have; every
-            problem is listed.
-    """
+    """The settings with other values; what was a default stays one."""
     data = _plain(settings)
     for key, value in values.items():
         *tables, last = parts = _parts(key)
@@ -57,15 +42,7 @@ def with_values(settings: _Model, values: Mapping[str, object], source: str, err
 
 
 def missing_row(settings: TomlTable, key: str) -> str:
-    """Why a dotted key names no entry of a list: there it must be a number from 1 to as many as there are.
-
-    Args:
-        settings: what was loaded.
-        key: such as ``axes.x.modes.1.frequency_hz``.
-
-    Returns:
-        The reason, for a message; empty: it does, or names no list.
-    """
+    """Why a dotted key names no entry of a list: there it must be a number from 1 to as many as there are."""
     held: Any = settings
     parts = _parts(key)
     for rank, name in enumerate(parts):

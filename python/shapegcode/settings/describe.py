@@ -26,17 +26,7 @@ _LINE_WIDTH = 110
 def values_of(
     table: TomlTable, prefix: str = "", given: bool = True, remarks: Mapping[str, str] | None = None
 ) -> Iterator[KeyValue]:
-    """Every key below a table with its value and origin, in the order of the file.
-
-    Args:
-        table: a machine or a part of it.
-        prefix: what stands before the names of its keys.
-        given: True if the file has this table.
-        remarks: per dotted key, what stands behind its value in the file.
-
-    Returns:
-        The values one by one.
-    """
+    """Every key below a table with its value and origin, in the order of the file."""
     for name, field in type(table).model_fields.items():
         value, key = getattr(table, name), f"{prefix}{name}"
         from_file = given and name in table.model_fields_set
@@ -65,15 +55,7 @@ def values_of(
 
 
 def write_short_toml(machine: TomlTable, remarks: Mapping[str, str]) -> str:
-    """A machine as a file of what differs from the defaults, or of which it is known where it comes from.
-
-    Args:
-        machine: what to write.
-        remarks: text for the end of a key's line by its dotted key.
-
-    Returns:
-        The text of the file, which loads back to a machine with the same values.
-    """
+    """A machine as a file of what differs from the defaults, or of which it is known where it comes from."""
     return _ShortWriter(dict(remarks)).write(machine)
 
 
@@ -85,18 +67,7 @@ _TOLD = ("measured", "dump")
 
 
 def write_toml(machine: TomlTable, remarks: Mapping[str, str]) -> str:
-    """A machine as a commented machine file.
-
-    Args:
-        machine: what to write.
-        remarks: text for the end of a key's line by its dotted key.
-
-    Returns:
-        The text of the file.
-
-    Raises:
-        KeyError: a remark for a key that does not exist.
-    """
+    """A machine as a commented machine file."""
     return _TomlWriter(dict(remarks)).write(machine)
 
 

@@ -31,19 +31,7 @@ _COMMENTED_TABLE = re.compile(r"#\s*\[\[\s*([^\[\]]+?)\s*\]\]")
 
 
 def parse_exactly(text: str, file: str) -> tomlkit.TOMLDocument:
-    """A TOML file that can be edited so that the rest of it stays byte for byte.
-
-    Args:
-        text: of the file.
-        file: name for messages.
-
-    Returns:
-        The document; written out it is the text again.
-
-    Raises:
-        ArgumentError: a line would change though nobody edits it.
-        tomlkit.exceptions.ParseError: it is no TOML.
-    """
+    """A TOML file that can be edited so that the rest of it stays byte for byte."""
     document = tomlkit.parse(text)
     rendered = document.as_string()
     if rendered == text:
@@ -54,38 +42,17 @@ def parse_exactly(text: str, file: str) -> tomlkit.TOMLDocument:
 
 
 def entry_of(line: str) -> Entry:
-    """A line with a key as an entry, its comment and line end included.
-
-    Args:
-        line: with its line end.
-
-    Returns:
-        Key and item.
-    """
+    """A line with a key as an entry, its comment and line end included."""
     return tomlkit.parse(line).body[0]
 
 
 def commented_key(entry: Entry) -> str:
-    """The name in a comment ``# name = ...``, which stands for a key that is left out; empty for everything else.
-
-    Args:
-        entry: of a table.
-
-    Returns:
-        The name of the key.
-    """
+    """The name in a comment ``# name = ...``, which stands for a key that is left out; empty for everything else."""
     return _said(entry, _COMMENTED_KEY)
 
 
 def commented_table(entry: Entry) -> str:
-    """The name in a comment ``# [[name]]``, which stands for a list without tables; empty for everything else.
-
-    Args:
-        entry: of a table.
-
-    Returns:
-        The dotted name of the table.
-    """
+    """The name in a comment ``# [[name]]``, which stands for a list without tables; empty for everything else."""
     return _said(entry, _COMMENTED_TABLE)
 
 
@@ -95,14 +62,7 @@ def _said(entry: Entry, pattern: re.Pattern[str]) -> str:
 
 
 def own_end(entries: list[Entry]) -> int:
-    """One behind the last key, and behind the commented keys that follow it at once: what is there is of others.
-
-    Args:
-        entries: of a table.
-
-    Returns:
-        A place in them.
-    """
+    """One behind the last key, and behind the commented keys that follow it at once: what is there is of others."""
     end = max((place + 1 for place, (key, _) in enumerate(entries) if key is not None), default=0)
     for place in range(end, len(entries)):
         if not isinstance(entries[place][1], Comment) or commented_table(entries[place]):
@@ -113,14 +73,7 @@ def own_end(entries: list[Entry]) -> int:
 
 
 def take_tail(table: Table) -> list[Entry]:
-    """Take away what stands behind the last key of a table and of the tables in it: it is of what follows.
-
-    Args:
-        table: is changed.
-
-    Returns:
-        The entries that were taken away.
-    """
+    """Take away what stands behind the last key of a table and of the tables in it: it is of what follows."""
     entries = table.value.body
     last = next((item for key, item in reversed(entries) if key is not None), None)
     if isinstance(last, AoT):
@@ -138,12 +91,5 @@ def _cut(entries: list[Entry]) -> list[Entry]:
 
 
 def is_blank(entry: Entry) -> bool:
-    """Whether it is a blank line.
-
-    Args:
-        entry: of a table.
-
-    Returns:
-        True for a blank line.
-    """
+    """Whether it is a blank line."""
     return isinstance(entry[1], Whitespace)

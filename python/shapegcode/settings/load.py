@@ -16,12 +16,7 @@ _Model = TypeVar("_Model", bound=TomlTable)
 
 
 def read_text(path: Path, error: type[FileError]) -> str:
-    """The text of a file.
-
-    Raises:
-        FileError: the given kind of it: not UTF-8.
-        OSError: the file cannot be read.
-    """
+    """The text of a file."""
     try:
         return read_file(path, MAX_SETTINGS_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as bad:
@@ -31,11 +26,7 @@ def read_text(path: Path, error: type[FileError]) -> str:
 
 
 def parsed(text: str, source: str, error: type[FileError]) -> dict[str, Any]:
-    """The tables of a TOML text; *source* names it in messages.
-
-    Raises:
-        FileError: the given kind of it: not TOML, or beyond the limits of `toml_tables`.
-    """
+    """The tables of a TOML text; *source* names it in messages."""
     try:
         return toml_tables(text)
     except ValueError as bad:
@@ -43,11 +34,7 @@ def parsed(text: str, source: str, error: type[FileError]) -> dict[str, Any]:
 
 
 def validated(model: type[_Model], data: dict[str, Any], source: str, text: str, error: type[FileError]) -> _Model:
-    """The tables of a file as their model; *source* names it in messages, *text* gives them line numbers.
-
-    Raises:
-        FileError: the given kind of it: wrong keys or values; every problem is listed.
-    """
+    """The tables of a file as their model; *source* names it in messages, *text* gives them line numbers."""
     try:
         return model.model_validate(data)
     except ValidationError as bad:
@@ -55,11 +42,6 @@ def validated(model: type[_Model], data: dict[str, Any], source: str, text: str,
 
 
 def loaded(model: type[_Model], path: str | Path, error: type[FileError]) -> _Model:
-    """A file as its model.
-
-    Raises:
-        FileError: the given kind of it: not TOML, or wrong keys or values; every problem is listed.
-        OSError: the file cannot be read.
-    """
+    """A file as its model."""
     text = read_text(Path(path), error)
     return validated(model, parsed(text, str(path), error), str(path), text, error)

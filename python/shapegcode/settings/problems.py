@@ -39,17 +39,7 @@ def syntax_problem(message: str, text: str) -> Problem:
 
 
 def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, Any], text: str) -> tuple[Problem, ...]:
-    """Pydantic's errors as problems of the file: dotted keys, TOML values, limits with units.
-
-    Args:
-        error: of validating the data.
-        model: what the file is read as.
-        data: the tables of the file.
-        text: the file, for line numbers.
-
-    Returns:
-        The problems, each once, in pydantic's order.
-    """
+    """Pydantic's errors as problems of the file: dotted keys, TOML values, limits with units."""
     problems: list[Problem] = []
     details = error.errors(include_url=False)
     for detail in details[:_MAX_PROBLEMS]:

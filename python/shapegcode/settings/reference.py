@@ -46,15 +46,7 @@ axes.z.rigid = "stated: nothing of it was seen in the tap test"
 
 
 def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
-    """The reference of a machine file's keys as Markdown.
-
-    Args:
-        model: the table that the file is read as.
-        builtin_names: machines that can be named in place of a file.
-
-    Returns:
-        The page.
-    """
+    """The reference of a machine file's keys as Markdown."""
     builtin = ", ".join(f"`{name}`" for name in builtin_names)
     lines = [
         "# The machine file",
@@ -97,16 +89,7 @@ def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
 
 
 def key_tables(model: type[TomlTable], *, fanuc: bool = True, heading: str = "##") -> list[str]:
-    """The keys of a file as Markdown: a heading and a table for each of its tables, a line each.
-
-    Args:
-        model: the table that the file is read as.
-        fanuc: with the column of FANUC parameters.
-        heading: what a heading begins with.
-
-    Returns:
-        Its lines.
-    """
+    """The keys of a file as Markdown: a heading and a table for each of its tables, a line each."""
     lines: list[str] = []
     columns = ("key", "unit", "default", "FANUC", "meaning") if fanuc else ("key", "unit", "default", "meaning")
     for table, meaning, infos in _documented(model, ""):

@@ -80,27 +80,12 @@ _VALUE = re.compile(r"(?:\"(?:[^\"\\]|\\.)*\"|'[^']*'|[^#\"'])*")
 
 
 def origin_of(remark: str) -> Origin:
-    """Where a value of a file comes from, by what stands behind it.
-
-    Args:
-        remark: the comment, without its sign.
-
-    Returns:
-        The origin; "file" where the comment says nothing of it.
-    """
+    """Where a value of a file comes from, by what stands behind it."""
     return next((origin for begins, origin in _BEGINNINGS if re.match(begins, remark)), "file")
 
 
 def inherited(name: str, remark: str) -> str:
-    """The remark of a value that is taken over from another machine.
-
-    Args:
-        name: of that machine.
-        remark: behind the value there.
-
-    Returns:
-        The remark for here: what was assumed there is assumed here, a choice stays one, everything else is inherited.
-    """
+    """The remark of a value that is taken over from another machine."""
     origin = origin_of(remark)
     if origin in ("assumed", "choice", "inherited", "default"):
         return remark
@@ -117,14 +102,7 @@ class _Line:
 
 
 def take_origins(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """The tables of a file without what they say of where values come from, and that.
-
-    Args:
-        data: as TOML gives it.
-
-    Returns:
-        The plain tables, and by dotted key what is stated (checked by nobody); None where neither form is used.
-    """
+    """The tables of a file without what they say of where values come from, and that."""
     found: dict[str, Any] = {}
     inline: dict[str, Any] = {}
     plain = {name: _plain(value, name, inline) for name, value in data.items() if name != ORIGIN}
@@ -153,14 +131,7 @@ def _flatten(value: Any, key: str, found: dict[str, Any]) -> None:
 
 
 def remark_of(stated: str) -> str:
-    """The remark that an origin in a file states: without the word where the note says the same.
-
-    Args:
-        stated: the word and a note.
-
-    Returns:
-        The remark; `origin_of` gives the origin of it.
-    """
+    """The remark that an origin in a file states: without the word where the note says the same."""
     word, _, note = stated.partition(": ")
     return note if note and origin_of(note) == origin_of(word) else stated
 
@@ -172,53 +143,24 @@ def _stated(remark: str) -> str:
 
 
 def remarks_of(text: str) -> dict[str, str]:
-    """Where the values of a file come from.
-
-    Args:
-        text: TOML of a file that loads.
-
-    Returns:
-        Per dotted key (tables of a list count from 1) its remark; keys without one are left out.
-    """
+    """Where the values of a file come from."""
     stated = take_origins(tomllib.loads(text))[1]
     return remarks_in_comments(text) if stated is None else {key: remark_of(said) for key, said in stated.items()}
 
 
 def remarks_in_comments(text: str) -> dict[str, str]:
-    """What stands behind the values of a file that has neither form of origins.
-
-    Args:
-        text: TOML of the plain layout ``[table]`` / ``key = value``.
-
-    Returns:
-        As `remarks_of`.
-    """
+    """What stands behind the values of a file that has neither form of origins."""
     return {line.key: line.remark for _, line in _lines(text) if line is not None and line.remark}
 
 
 def origin_lines(remarks: Mapping[str, str]) -> list[str]:
-    """The table of the origins.
-
-    Args:
-        remarks: by dotted key.
-
-    Returns:
-        Its lines; none without remarks.
-    """
+    """The table of the origins."""
     lines = [f"{key} = {tomlkit.string(_stated(remark)).as_string()}" for key, remark in remarks.items() if remark]
     return [f"[{ORIGIN}]  # where values come from: {', '.join(_WORDS.values())}", *lines] if lines else []
 
 
 def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> str:
-    """A file with its origins in a table at its end; the rest stays byte for byte, but for values with an origin.
-
-    Args:
-        text: TOML of a file that loads.
-        remarks: by dotted key; None: those that it has.
-
-    Returns:
-        The text.
-    """
+    """A file with its origins in a table at its end; the rest stays byte for byte, but for values with an origin."""
     remarks = remarks_of(text) if remarks is None else remarks
     document = tomlkit.parse(text)
     if take_origins(document)[1] is not None:
@@ -242,15 +184,7 @@ def _unwrap(table: Any) -> None:
 
 
 def with_remarks(text: str, change: Callable[[str, str], str]) -> str:
-    """A file whose values come from elsewhere; comments that said the same as an origin follow it.
-
-    Args:
-        text: TOML of a file that loads.
-        change: called once with each dotted key and remark; gives the new remark, empty for none.
-
-    Returns:
-        The text, with a table of its origins; everything else stays byte for byte.
-    """
+    """A file whose values come from elsewhere; comments that said the same as an origin follow it."""
     old = remarks_of(text)
     new = {key: change(key, remark) for key, remark in old.items()}
     lines = []

@@ -12,17 +12,7 @@ __all__ = ["keys_schema", "toml_schema"]
 
 
 def toml_schema(model: type[TomlTable], title: str, *, origins: bool = False) -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of a file.
-
-    Args:
-        model: the table that the file is read as.
-        title: of the schema.
-        origins: the file may say where its values come from.
-
-    Returns:
-        The schema; descriptions have the unit and the numbers of the FANUC parameters. What depends on several keys
-        together is only checked when the file is read.
-    """
+    """JSON Schema (draft 2020-12) of a file."""
     found = model.model_json_schema(mode="validation")
     for table in (found, *found.get("$defs", {}).values()):
         for entry in table.get("properties", {}).values():
@@ -56,17 +46,7 @@ def _allow_origins(model: type[TomlTable], found: dict[str, Any], defs: dict[str
 
 
 def keys_schema(model: type[TomlTable], value: dict[str, Any], kind: str, defs: dict[str, Any]) -> dict[str, Any]:
-    """JSON Schema of a table that says something of some keys of a file, by their dotted names or as tables.
-
-    Args:
-        model: the table that the file is read as.
-        value: schema of what is said of a key.
-        kind: begins the names of the definitions.
-        defs: gets the definitions, one for each table of the file.
-
-    Returns:
-        The schema of the table. Entries of lists count from 1; a name in quotes with a dot in it is not looked into.
-    """
+    """JSON Schema of a table that says something of some keys of a file, by their dotted names or as tables."""
     name = f"{kind}.{model.__name__}"
     if name not in defs:
         defs[name] = {}
