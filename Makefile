@@ -59,11 +59,11 @@ help:
 	@echo 'make bench-realtime  MotionController: step(), push(), a loop of 1 ms, drift; options: REALTIME="--help"'
 	@echo 'make fuzz    FUZZ_SECONDS (600) of coverage-guided fuzzing of the program reader; findings in build/fuzz/findings/'
 	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
-	@echo 'make schemas  write docs/schema/ anew from the classes of the results'
+	@echo 'make schemas  JSON schemas of results and of TOML files into build/schemas; their keys into tests/golden/result_keys.txt'
 	@echo 'make man     manual pages into build/man'
 	@echo 'make wheel   sdist and wheels for pip into dist/, tried in fresh environments; WHEEL_PYTHONS="python3.11 python3.12"'
 	@echo 'make docs    the book: build/docs/html/index.html, with every program in it run; make docs-links asks the net too'
-	@echo 'make pages   write the pages of docs/ that come from the code, docs/schema/ too'
+	@echo 'make pages   write the pages of docs/ that come from the code'
 	@echo 'make format  lay out the C++ and Python sources as lint wants them'
 	@echo 'make clean   remove everything that was built or downloaded'
 
@@ -84,7 +84,7 @@ test:
 	$(PYTEST) -m 'not slow'
 
 # What takes longer than a person waits; .ci/run does of it what guards a file that changed since it last passed, which
-# tests/full_pass.txt tells. Commit that file with the change.
+# tests/full_pass.txt tells by folder. Commit that file with the change.
 test-all:
 	$(MAKE) test
 	$(MAKE) test-all-core
@@ -166,7 +166,7 @@ stubs: package dev
 	  --enum-class-locations '(ChipThickness|SpindleSense):shapegcode._core'
 
 schemas: package dev
-	$(BIN)/python tests/tools/write_schemas.py
+	$(BIN)/python tests/tools/write_schemas.py build/schemas --keys
 
 # An sdist, and from that alone a wheel for each Python: with what is compiled in, so that it needs no package of the
 # system. The tag is that of this system's C library (Debian 12: manylinux_2_35 or so); cibuildwheel makes older ones.
@@ -182,7 +182,7 @@ wheel: .venv/.runtime
 	done
 	@ls -l dist
 
-pages: schemas
+pages: package dev
 	$(BIN)/python tests/tools/write_docs.py
 
 # Warnings are errors: a link that leads nowhere, a page in no contents, a program that fails.

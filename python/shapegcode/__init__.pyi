@@ -86,14 +86,7 @@ from shapegcode.conversion.scheduled import convert_scheduled as convert_schedul
 from shapegcode.conversion.scheduled_result import ScheduledConversion as ScheduledConversion
 from shapegcode.cutting.stock import Stock as Stock
 from shapegcode.cutting.tool import Tool as Tool
-from shapegcode.demos.corner import corner_demo as corner_demo
-from shapegcode.demos.cycle_time import cycle_time_demo as cycle_time_demo
-from shapegcode.demos.evidence import evidence_demo as evidence_demo
-from shapegcode.demos.metrology import metrology_demo as metrology_demo
 from shapegcode.demos.path import path_demo as path_demo
-from shapegcode.demos.result import Demonstration as Demonstration
-from shapegcode.demos.shaper import shaper_demo as shaper_demo
-from shapegcode.demos.tap import tap_demo as tap_demo
 from shapegcode.errors import (
     ArgumentError as ArgumentError,
     DesignError as DesignError,
@@ -187,6 +180,7 @@ from shapegcode.model.stream import stream as stream
 from shapegcode.program import Program as Program
 from shapegcode.program.expand import expand as expand
 from shapegcode.program.result import Expansion as Expansion
+from shapegcode.results.json import schema as schema
 from shapegcode.results.motion_plots import View as View, plot_feed as plot_feed, plot_vibration as plot_vibration
 from shapegcode.results.path_plots import plot_path as plot_path
 from shapegcode.results.result import Pair as Pair, Result as Result, Xyz as Xyz

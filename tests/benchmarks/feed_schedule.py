@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,8 +24,6 @@ from table import markdown
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.demos.corner_program import CASES, CornerCase
-from shapegcode.demos.corner_study import CornerStudy, study_corner
 from shapegcode.feed.plan import limits_of
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, schedule_feed
@@ -35,7 +34,8 @@ from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.timing.cycle_time import cycle_time
 
-FEED = Path(__file__).resolve().parents[1] / "golden" / "feed"
+TESTS = Path(__file__).resolve().parents[1]
+FEED = TESTS / "golden" / "feed"
 POINT_MM = 0.02
 SLICE_MM = 0.2
 SAMPLES = 150
@@ -44,37 +44,45 @@ BLOCK_MM_LEAST = 0.6
 LARGEST_S = 10.0
 
 
-def corner(case: CornerCase, machine: Machine) -> dict[str, Any]:
+def paper_001() -> dict[int, Any]:
+    """The corners of docs/evidence/paper001.md, as its page works them out."""
+    sys.path.append(str(TESTS / "tools"))
+    from page_code import run_page
+
+    found: dict[int, Any] = run_page("evidence/paper001.md")["corners"]
+    return found
+
+
+def corner_row(corner: Any) -> dict[str, Any]:
     """A corner of the paper."""
-    study = study_corner(case, machine)
-    scheduled, target = study.scheduled, float(study.programmed.peak_n[0])
+    scheduled = corner.scheduled
     return {
-        "limit_n": target,
-        "peak_n": float(scheduled.result.resultant_force_n.emitted.max),
-        "finer_peak_n": float(scheduled.along.peak_n.max()),
-        "share_within_5_percent": study.share_within(),
-        "share_possible": _share_possible(study),
+        "limit_n": scheduled.target_n,
+        "peak_n": float(scheduled.schedule.resultant_force_n.emitted.max),
+        "finer_peak_n": float(scheduled.along.peak.max()),
+        "share_within_5_percent": scheduled.share_near,
+        "share_possible": _share_possible(corner),
         "time_s": scheduled.time_s,
-        "constant_feed_mm_per_min": scheduled.constant_feed_mm_per_min,
-        "constant_time_s": scheduled.constant_time_s,
-        "gain_percent": 100.0 * scheduled.gain,
+        "constant_feed_mm_per_min": scheduled.constant_mm_per_min,
+        "constant_time_s": scheduled.constant_s,
+        "gain_percent": scheduled.gain_percent,
     }
 
 
-def _share_possible(study: CornerStudy) -> float:
+def _share_possible(corner: Any) -> float:
     """Largest share of the path near the limit that blocks of the least length or longer can have, by trying them all.
 
     A block has one feed, that of its worst station, and ends where its line or arc does; steps of the feed are at once.
     """
-    target = float(study.programmed.peak_n[0])
+    target = corner.scheduled.target_n
     most, enough = (
-        np.asarray(_core.largest_feeds(study.force, study.track, limits, 1.0, 2000.0)[0])
+        np.asarray(_core.largest_feeds(corner.force, corner.track, limits, 1.0, 2000.0)[0])
         for limits in (
             _core.FeedLimits(peak_resultant_n=(1.0 - MARGIN) * target),
             _core.FeedLimits(peak_resultant_n=0.95 * target),
         )
     )
-    segment, s_mm, length = np.asarray(study.track.segment), np.asarray(study.track.s_mm), study.length_mm
+    segment, s_mm, length = np.asarray(corner.track.segment), corner.s_mm, corner.length_mm
     best_of_all = 0.0
     for number in np.unique(segment):
         inside = np.flatnonzero(segment == number)
@@ -296,7 +304,7 @@ def main() -> None:
     arguments = parser.parse_args()
     scale = 10 if arguments.quick else 1
     machine = Machine.load("vx500")
-    cuts = {f"corner {case.number}": corner(case, machine) for case in CASES}
+    cuts = {f"corner {number}": corner_row(corner) for number, corner in paper_001().items()}
     cuts["pocket"] = pocket(machine, SAMPLES // scale)
     speeds = [speed(machine, blocks // scale) for blocks in (25_000, 50_000, 100_000, 200_000)]
     print(markdown(["what", *cuts], list(_rows_of(cuts))))

@@ -65,7 +65,7 @@ TEST_CASE("tape: without the first tape mark there is a warning, without the las
 }
 
 TEST_CASE("tape: text behind the closing mark is not read, and a warning says so") {
-  for (const std::string text : {"%\nO1\n" + body + "%\nG1X99.\nM30\n", "%\nO1\n" + body + "%\n%\n\n(LEFT)\n%\n"}) {
+  for (const std::string& text : {"%\nO1\n" + body + "%\nG1X99.\nM30\n", "%\nO1\n" + body + "%\n%\n\n(LEFT)\n%\n"}) {
     const Program program = read_program(text);
     CHECK(program.final_state.position_mm.x() == 20.0);
     CHECK(warns(program, "text behind the '%'", text.find("LEFT") == std::string::npos ? 10 : 12));
@@ -85,7 +85,8 @@ TEST_CASE("tape: a line that ends with CR alone is refused where it stands") {
 
 TEST_CASE("tape: a byte-order mark is left out with a note") {
   const std::string mark = "\xEF\xBB\xBF";
-  for (const std::string text : {"%\nO1\n" + body + "%\n", "O1\n" + body, "\n%\nO1\nM98P2\n" + body + "O2\nM99\n%\n"}) {
+  for (const std::string& text :
+       {"%\nO1\n" + body + "%\n", "O1\n" + body, "\n%\nO1\nM98P2\n" + body + "O2\nM99\n%\n"}) {
     const Program plain = read_program(text);
     const Program marked = read_program(mark + text);
     CHECK(warns(marked, "byte-order mark", 1));

@@ -22,6 +22,7 @@ from shapegcode.cli.options import load_machine
 from shapegcode.cli.overrides import overridden
 from shapegcode.results.json import schema
 
+ROOT = Path(__file__).resolve().parents[2]
 GOOD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F12000\nG3X40.Y20.R20.\nG1Y40.\nG0Z50.\nM30\n%\n"
 PAIR = {"original", "emitted"}
 AXES = {"x", "y", "z"}
@@ -305,6 +306,14 @@ def test_demo_path(folder: Path) -> None:
     assert table.returncode == 0
     assert "0.0270" in table.stdout
     assert files(folder) == ["part.nc"]
+
+
+def test_demo_of_another_paper_names_its_page(folder: Path) -> None:
+    for name in ("corner", "shaper", "tap", "cycle-time", "metrology", "evidence"):
+        done = run(folder, "demo", name)
+        assert (done.returncode, done.stdout) == (2, "")
+        page = re.search(r"docs/evidence/\w+\.md", done.stderr)
+        assert page and (ROOT / page[0]).is_file()
 
 
 @pytest.mark.parametrize(

@@ -168,8 +168,8 @@ def imported_modules(file: Path) -> set[str]:
 
 # The folders of the package from the bottom up: each may import what stands before it.
 PACKAGE_FOLDERS = [
-    "settings",
     "io",
+    "settings",
     "results",
     "machine",
     "program",
@@ -363,6 +363,40 @@ def test_the_version_is_that_of_the_last_tag(tmp_path: Path) -> None:
     (clone / "PKG-INFO").write_text("Metadata-Version: 2.1\nName: shapegcode\nVersion: 7.0.1\n")
     shutil.rmtree(clone / ".git")
     assert shapegcode_version.version(clone) == "7.0.1"
+
+
+def test_the_long_checks_run_for_what_changed(tmp_path: Path) -> None:
+    """A source: all, and clang-tidy of its folder alone; a Python test, or one that is gone: the Python tests."""
+    texts = (
+        "cpp/src/a/x.cpp",
+        "cpp/src/a/y.hpp",
+        "cpp/src/b/z.cpp",
+        "tests/python/test_t.py",
+        "tests/python/test_u.py",
+    )
+    for name in (*texts, "tests/tools/full_pass.py", "CMakeLists.txt"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(f"{name}\n")
+    shutil.copy(ROOT / "tests/tools/full_pass.py", tmp_path / "tests/tools")
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+
+    def said(command: str) -> list[str]:
+        words = [sys.executable, "tests/tools/full_pass.py", command]
+        return subprocess.run(words, cwd=tmp_path, check=True, capture_output=True, text=True).stdout.split()
+
+    assert said("changed") == ["core", "python"]  # nothing ever passed
+    said("write")
+    assert len((tmp_path / "tests/full_pass.txt").read_text().splitlines()) == 4
+    assert (said("changed"), said("files")) == ([], [])
+    (tmp_path / texts[0]).write_text("other")
+    assert (said("changed"), said("files")) == (["core", "python"], list(texts[:2]))
+    (tmp_path / texts[0]).write_text(f"{texts[0]}\n")
+    assert said("changed") == []
+    (tmp_path / texts[4]).unlink()
+    assert (said("changed"), said("files")) == (["python"], [])
+    said("write")
+    (tmp_path / "cpp/src/b/new.cpp").write_text("new")
+    assert said("files") == ["cpp/src/b/new.cpp", texts[2]]
 
 
 def test_no_test_skips_silently() -> None:

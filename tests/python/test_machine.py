@@ -559,7 +559,7 @@ def test_full_disk_behind_standard_output_is_bad_input() -> None:
     with open("/dev/full", "w") as full:
         run = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert run.returncode == 2
-    assert run.stderr == "shapegcode: No space left on device\n"
+    assert run.stderr == "shapegcode: standard output: No space left on device\n"
 
 
 def test_write_text_keeps_the_old_file_when_it_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

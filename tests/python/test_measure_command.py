@@ -1,4 +1,4 @@
-"""`shapegcode measure` and `demo metrology` as a shell sees them: tables, JSON, pictures, exit codes."""
+"""`shapegcode measure` as a shell sees it: tables, JSON, pictures, exit codes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import pytest
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode.cli import main
-from shapegcode.demos.metrology import MetrologyDemo
 from shapegcode.results.json import schema
 
 LINES = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F12000\nG3X40.Y20.R20.\nG1Y40.\nG0Z50.\nM30\n%\n"
@@ -230,28 +229,6 @@ def test_bad_input(folder: Path, capsys: pytest.CaptureFixture[str], words: list
 def test_a_tool_is_needed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["measure", "part.nc", "-m", "vx500"]) == 2
     assert "--tool-diameter" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "240")
-    folder = tmp_path / "pictures"
-    assert main(["demo", "metrology", "--plots", str(folder), "--json", str(tmp_path / "demo.json")]) == 0
-    written = {file.name for file in folder.iterdir()}
-    assert written == {f"measure-{name}.{suffix}" for name in ("part", "walls") for suffix in ("png", "svg")}
-    assert "contour-preserving" in (folder / "measure-part.svg").read_text()
-    said = capsys.readouterr().out
-    for text in (
-        "walls of line, arc and line",
-        "18.350, 18.373",
-        "contour-preserving",
-        "not material and depth of cut",
-    ):
-        assert text in said, text
-    report = json.loads((tmp_path / "demo.json").read_text())
-    jsonschema.validate(report, schema(MetrologyDemo))
-    cases = report["cases"]
-    assert {(row["feed_mm_per_s"], row["program"]) for row in cases} >= {(100, "unshaped"), (200, "shaped 40 %")}
 
 
 def test_demo_without_pictures_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from page_code import run_page
 from scipy import ndimage, optimize, spatial
 
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode import _core
-from shapegcode.demos.metrology import MetrologyDemo, SpecimenCase, metrology_demo
 from shapegcode.demos.path import path_program
 from shapegcode.metrology.figures import FittedCircle
 from shapegcode.metrology.result import MeasuredRegion
@@ -328,25 +328,24 @@ def test_without_walls_there_is_nothing_to_draw() -> None:
         sg.plot_walls(plunge)
 
 
-@functools.cache
-def demo() -> MetrologyDemo:
-    return metrology_demo()
+# ---- specimens of paper 000: docs/evidence/paper000.md ------------------------------------------------------
 
 
-def case(feed: int, name: str) -> SpecimenCase:
-    return next(row for row in demo().cases if (row.feed_mm_per_s, row.program) == (feed, name))
+def specimen(feed: int, name: str) -> MeasuredRegion:
+    found: MeasuredRegion = run_page("evidence/paper000.md")["cases"][feed, name]
+    return found
 
 
-def arc_of(row: SpecimenCase) -> FittedCircle:
-    arc = row.sections[1].arc
+def arc_of(region: MeasuredRegion) -> FittedCircle:
+    arc = region.sections[1].arc
     assert arc is not None
     assert arc.response is not None
     return arc.response
 
 
 def test_the_band_narrows_and_the_radius_moves_as_the_model_must() -> None:
-    unshaped, ideal = case(200, "unshaped"), case(200, "shaped 1 %, paper's shaper")
-    kept = case(200, "contour-preserving")
+    unshaped, ideal = specimen(200, "unshaped"), specimen(200, "shaped 1 %, paper's shaper")
+    kept = specimen(200, "contour-preserving")
     bands = [row.sections[1].wall_deviation_um.left.band or 0.0 for row in (unshaped, ideal, kept)]
     assert bands[0] == pytest.approx(49.0, abs=1.0)
     assert bands[1] == pytest.approx(24.0, abs=1.0)
@@ -356,19 +355,23 @@ def test_the_band_narrows_and_the_radius_moves_as_the_model_must() -> None:
     assert radii[1] == pytest.approx(-13.0, abs=1.0)
     # Mean radius of both axes' magnification of a circle: each has its own mode.
     for feed in (100, 200):
-        arc = arc_of(case(feed, "unshaped"))
+        arc = arc_of(specimen(feed, "unshaped"))
         gains = [1.0 / (1.0 - (feed / 20.0 / (2 * math.pi * f)) ** 2) for f in (46.0, 131.0)]
         assert arc.mean_radius_deviation_um == pytest.approx((sum(gains) / 2 - 1) * 20e3, rel=0.05)
 
 
-def test_the_document_states_what_the_demo_gives() -> None:
-    text = (ROOT / "docs" / "howto" / "metrology.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (100|200) \| ([^|]+) \| (\d+\.\d+) \|[^|]+\| ([\d.]+) \| ([\d.]+) / ([\d.]+) / ([\d.]+) \|",
-                      text, re.MULTILINE)  # fmt: skip
-    assert len(rows) == len(demo().cases)
-    for feed, name, radius, band, *roughness in rows:
-        row = case(int(feed), name.strip())
-        assert row.inside_radius_mm == pytest.approx(float(radius), abs=1e-3)
-        assert row.sections[1].wall_deviation_um.left.band == pytest.approx(float(band), abs=0.11)
-        for section, stated in enumerate(roughness):
-            assert row.left_wall_um(section, "ra_um") == pytest.approx(float(stated), abs=0.006)
+def test_what_the_page_says_of_radius_width_and_roughness() -> None:
+    page = run_page("evidence/paper000.md")
+    for (feed, name), region in page["cases"].items():
+        line, arc, out = region.sections
+        off_um = 1e3 * (arc.arc.inside_wall.fitted_radius_mm - 18.5)
+        assert 2.0 < off_um < 20.0 if name == "unshaped" else -22.0 < off_um < -1.0, (feed, name)
+        assert line.roughness.left.ra_um < 0.03  # it vibrates along the cut there
+        limit_um = 40.0 if name == "unshaped" else 2.0
+        assert max(map(page["off_um"], region.sections)) < limit_um
+        if name != "unshaped":
+            unshaped = specimen(feed, "unshaped").sections
+            assert arc.roughness.left.ra_um < 0.47 * unshaped[1].roughness.left.ra_um
+            assert out.roughness.left.ra_um < 0.1 * unshaped[2].roughness.left.ra_um
+            assert out.residual_vibration_um.x < 0.2 and out.residual_vibration_um.y < 0.2
+    assert {name for _, name in page["PUBLISHED_MM"]} < {name for _, name in page["cases"]}

@@ -174,7 +174,7 @@ def test_the_page_of_feeds_has_the_cutting_force(tmp_path: Path) -> None:
         ("machine diff vx500 kimm004", 0),
         (f"machine import {ROOT / 'tests/golden/parameters/with_q.txt'} -o m.toml --rigid XYZ", 1),
         ("identify --tap-plan -m vx500", 0),
-        ("demo tap", 0),
+        ("demo path", 0),
     ],
 )
 def test_results_without_programs_have_pages_too(words: str, code: int, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import jsonschema
 import pytest
 import write_schemas
 
@@ -41,12 +42,7 @@ COMMANDS = {
     "MachineDescription": "machine show vx500",
     "TapPlan": "identify --tap-plan -m vx500",
     "CharacterisationTests": "characterize --write tests -m vx500",
-    "TapDemo": "demo tap",
-    "CornerDemo": "demo corner",
-    "MetrologyDemo": "demo metrology",
-    "CycleTimeDemo": "demo cycle-time",
     "PathDemo": "demo path",
-    "ShaperDemo": "demo shaper",
 }
 
 
@@ -74,6 +70,14 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Shown]:
     return once
 
 
+@pytest.fixture(scope="module")
+def schemas(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The schemas, as `make schemas` and the book write them."""
+    folder = tmp_path_factory.mktemp("schemas")
+    write_schemas.write(folder)
+    return folder
+
+
 @pytest.fixture(params=COMMANDS)
 def shown(request: pytest.FixtureRequest, kept: Callable[[str], Shown]) -> Shown:
     return kept(request.param)
@@ -94,6 +98,15 @@ def test_every_class_of_results_is_found() -> None:
     """The list of classes is that of the classes which there are, each in its module."""
     there = {name: cls.__module__.removeprefix("shapegcode.") for name, cls in write_schemas.results().items()}
     assert dict(MODULES) == there
+
+
+def test_a_result_is_what_its_schema_says(shown: Shown, schemas: Path) -> None:
+    """The file of the schema alone, as another program would read it; a key more or less is refused."""
+    written = json.loads(shown.json.read_text())
+    validator = jsonschema.Draft202012Validator(json.loads((schemas / f"{shown.name}.json").read_text()))
+    validator.validate(written)
+    assert not validator.is_valid(written | {"unheard": 1})
+    assert not validator.is_valid({key: value for key, value in written.items() if key != "next_step"})
 
 
 def test_a_result_comes_back_from_its_json(shown: Shown) -> None:

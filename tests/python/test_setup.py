@@ -363,7 +363,6 @@ def test_schemas_for_editors_take_real_files_and_refuse_wrong_ones(kind: str, tm
     done = run(tmp_path, "machine", "schema", kind)
     found = json.loads(done.stdout)
     assert found == toml_schema(model, f"{kind} file of shapegcode")
-    assert found == json.loads((ROOT / "docs" / "schema" / "files" / f"{kind}.json").read_text())
     jsonschema.Draft202012Validator.check_schema(found)
     for file in files:
         data = tomllib.loads((ROOT / file).read_text())

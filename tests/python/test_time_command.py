@@ -14,12 +14,12 @@ from typing import Any
 
 import jsonschema
 import pytest
+from page_code import run_page
 
 import shapegcode as sg
 from acceptance import PROGRAMS, SAMPLE_KEYS, SAMPLES, machine_with
 from effort import cpu_s
 from shapegcode.cli import main
-from shapegcode.demos import cycle_time as demos
 from shapegcode.results.json import schema
 from shapegcode.timing import cycle_time as timing
 
@@ -44,6 +44,10 @@ T2 M06
 M30
 %
 """
+
+
+def paper_004() -> dict[str, Any]:
+    return run_page("evidence/paper004.md")
 
 
 def timed(text: str, machine: sg.Machine | None = None, **options: Any) -> sg.CycleTime:
@@ -85,7 +89,7 @@ def test_a_tiny_program_by_hand() -> None:
 
 def test_the_second_set_of_constants_by_hand() -> None:
     """Rapids .600 + .120 and 2 * .078 + .020; the run ends .100 later."""
-    time = timed(HAND, demos.paper_004_machine(*SETS[1]))
+    time = timed(HAND, paper_004()["testbed"](*SETS[1]))
     assert time.cycle_time_s == pytest.approx((0.720 + 0.025) + (0.176 + 0.120) + (0.771 + 0.100) + 1.5, abs=1e-9)
 
 
@@ -138,7 +142,7 @@ def test_random_programs_after_the_equations_of_the_paper(constants: tuple[float
             expected += ticks(abs(way) / (feed / 60.0))
             run = True
     expected += cut_s if run else 0.0
-    time = timed("\n".join([*lines, "M30", "%"]) + "\n", demos.paper_004_machine(*constants), per_block=True)
+    time = timed("\n".join([*lines, "M30", "%"]) + "\n", paper_004()["testbed"](*constants), per_block=True)
     assert time.cycle_time_s == pytest.approx(expected, abs=1e-6)
     assert time.full_interpolation_s == pytest.approx(expected, abs=1e-6)
     assert sum(block.duration_s for block in time.blocks) == pytest.approx(expected, abs=1e-6)
@@ -159,7 +163,7 @@ def test_closed_form_and_full_interpolation_agree_on_every_sample(name: str, mac
 
 @pytest.mark.parametrize("constants", SETS)
 def test_closed_form_and_full_interpolation_agree_on_the_test_piece(constants: tuple[float, float, float]) -> None:
-    time = timed(demos.piece_text(), demos.paper_004_machine(*constants))
+    time = timed(paper_004()["piece"], paper_004()["testbed"](*constants))
     assert time.cycle_time_s > 1800.0
     assert time.difference_percent is not None
     assert abs(time.difference_percent) <= 0.5
@@ -185,7 +189,7 @@ def check_sums(time: sg.CycleTime) -> None:
 @pytest.mark.parametrize("machine_name", ["vx500", "kimm004"])
 def test_blocks_tools_and_regions_add_up(machine_name: str) -> None:
     machine = sg.Machine.load(machine_name)
-    for text in (demos.piece_text(), (PROGRAMS / "PARALLEL.NC").read_text(), (PROGRAMS / "G83.NC").read_text()):
+    for text in (paper_004()["piece"], (PROGRAMS / "PARALLEL.NC").read_text(), (PROGRAMS / "G83.NC").read_text()):
         program = sg.Program.from_text(text, machine)
         time = sg.cycle_time(program, machine, per_block=True, full=False)
         check_sums(time)
@@ -357,35 +361,28 @@ def test_python_entry_and_its_module_do_not_hide_each_other() -> None:
     assert isinstance(timed(HAND), sg.CycleTime)
 
 
-# ---- the demonstration -------------------------------------------------------------------------------------
+# ---- paper 004 ----------------------------------------------------------------------------------------------
 
 
 def test_the_closed_form_of_half_an_hour_does_not_play_it() -> None:
     """The paper's own claim is less than a second for more than half an hour."""
-    machine = demos.paper_004_machine(*SETS[0])
-    program = sg.Program.from_text(demos.piece_text(), machine)
+    machine = paper_004()["testbed"](*SETS[0])
+    program = sg.Program.from_text(paper_004()["piece"], machine)
     played_s = cpu_s(lambda: sg.cycle_time(program, machine), 1)
     assert cpu_s(lambda: sg.cycle_time(program, machine, full=False)) < 0.25 * played_s
 
 
-def test_demo_shows_both_sets_beside_the_paper(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["demo", "cycle-time", "--json", "demo.json"]) == 0
-    out = capsys.readouterr().out
-    assert "is not published" in " ".join(out.split())
-    assert "Lee, Ro, Song and Oh, 2022 (paper 004 in docs/evidence/references.md)" in out
-    data = json.loads((folder / "demo.json").read_text())
-    jsonschema.validate(data, schema(demos.CycleTimeDemo))
-    assert [row["published_measured_s"] for row in data["cases"]] == [2169.1, 2157.3]
-    assert [row["published_predicted_s"] for row in data["cases"]] == [2172.4, 2172.0]
-    assert [row["agreement"] for row in data["rows"]] == ["open", "open", "agrees", "agrees"]
-    for row in data["cases"]:
-        assert abs(row["difference_percent"]) <= 0.5
-        assert row["closed_form_computing_s"] > 0.0
-        assert row["closed_form_s"] > 1800.0
-    first, second = data["cases"]
+def test_the_page_shows_both_sets_beside_the_paper() -> None:
+    page = paper_004()
+    assert list(page["published"].values()) == [(2172.4, 2169.1), (2172.0, 2157.3)]
+    first, second = (time for time, _ in page["times"].values())
+    for time, computing_s in page["times"].values():
+        assert abs(time.difference_percent) <= 0.5
+        assert 0.0 < computing_s < 1.0  # the paper's limit
+        assert time.cycle_time_s > 1800.0
     # What does not accelerate does not change.
     for part in ("cutting_s", "rapid_s", "in_position_s", "dwell_s"):
-        assert first["parts"][part] == pytest.approx(second["parts"][part], abs=1e-6)
+        assert getattr(first, part) == pytest.approx(getattr(second, part), abs=1e-6)
 
 
 def test_an_override_that_the_program_switches_off_is_told(tmp_path: Path) -> None:

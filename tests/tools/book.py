@@ -24,7 +24,7 @@ HOUSE = {"ARCHITECTURE.md": "architecture.md", "CONTRIBUTING.md": "contributing.
 PLACES = {"README.md": "index.md"}
 """Pages of the root that the book has in another form."""
 
-SUFFIXES = {".md", ".png", ".svg", ".json"}
+SUFFIXES = {".md", ".png", ".svg"}
 
 LINK = re.compile(r"(!?\[[^\[\]]*\]\()([^()\s]+)(\))")
 CODE = re.compile(r"^(`{3,}|~{3,})[^\n]*\n.*?^\1[^\n]*$|^(?: {4}|\t)[^\n]*$|`[^`\n]+`", re.MULTILINE | re.DOTALL)

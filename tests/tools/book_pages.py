@@ -1,4 +1,6 @@
-"""Pages of the book that come from the code: what each command says of itself, the Python package, the C++ headers."""
+"""Pages of the book that come from the code: what each command says of itself, the Python package, the C++ headers,
+the schemas of the results.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import write_docs
+import write_schemas
 
 import shapegcode as sg
 from shapegcode import cli
@@ -45,8 +48,10 @@ PARTS = {
 
 
 def generated() -> dict[str, str]:
-    """Text of each page by its place in the book."""
-    return {**_commands(), **_python(), **_cpp()}
+    """Text of each page, and of the schemas, by its place in the book."""
+    schemas = {f"schema/{name}": text for name, text in write_schemas.texts().items()}
+    linked = {"reference/schemas.md": write_docs.schema_documentation(linked=True)}
+    return {**_commands(), **_python(), **_cpp(), **schemas, **linked}
 
 
 # --- Commands ---------------------------------------------------------------------------------------------------------

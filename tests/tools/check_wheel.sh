@@ -17,7 +17,14 @@ run() { env -i PATH="$work/venv/bin" HOME="$work" LANG=C.UTF-8 "$@"; }
 
 run shapegcode --version
 run shapegcode demo path --quiet
-run shapegcode demo tap --quiet
+run "$work/venv/bin/python" - >stop.csv <<'PYTHON'
+"""A decay of 46 Hz, 2 % damped."""
+import math
+print("time [s],acc_x [m/s^2]")
+for t in (i / 1000 for i in range(2000)):
+    print(f"{t},{math.exp(-5.8 * t) * math.sin(289 * t):.9g}")
+PYTHON
+run shapegcode identify stop.csv --axis x --quiet
 run shapegcode simulate part.nc -m vx500 --plant feed-drive --quiet
 run shapegcode convert part.nc -m vx500 -o out.nc --html out.html --quiet
 run "$work/venv/bin/python" - <<'PYTHON'

@@ -1,9 +1,9 @@
 """What changed since `make test-all` last passed: `full_pass.py write | changed [core|python] | files`.
 
-`write` puts a hash of each file that the long checks guard into tests/full_pass.txt, which is committed. `changed`
-prints the groups (core, python) in which a file is new, gone or another one; nothing: all of them passed as they are.
-`files` prints the changed sources and headers of the core, for clang-tidy. A change of the core counts for the Python
-tests too.
+`write` puts a hash of each group of files that the long checks guard into tests/full_pass.txt, which is committed: a
+folder of cpp/, or all of another place. `changed` prints what must run again (core, python) because a file of it is
+new, gone or another one; nothing: all of it passed as it is. `files` prints the sources and headers of the core's
+folders that changed, for clang-tidy, which reads a folder as one. A change of the core counts for the Python tests too.
 """
 
 from __future__ import annotations
@@ -43,47 +43,58 @@ SUFFIXES = {
 }
 
 
-def present() -> dict[str, str]:
-    """Name → hash of each guarded file: those that git tracks, and new ones that it does not ignore."""
+def guarded() -> dict[str, list[str]]:
+    """Names of the guarded files by group: those that git tracks, and new ones that it does not ignore."""
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
         cwd=ROOT,
         capture_output=True,
         check=True,
     )
-    names = sorted(set(listed.stdout.decode().split("\0")))
-    return {
-        name: hashlib.sha256((ROOT / name).read_bytes()).hexdigest()[:16]
-        for name in names
-        if name.startswith(CORE + PYTHON)
-        and (Path(name).suffix in SUFFIXES or name in CORE)
-        and (ROOT / name).is_file()
-    }
+    groups: dict[str, list[str]] = {}
+    for name in sorted(set(listed.stdout.decode().split("\0"))):
+        if (
+            name.startswith(CORE + PYTHON)
+            and (Path(name).suffix in SUFFIXES or name in CORE)
+            and (ROOT / name).is_file()
+        ):
+            groups.setdefault(group_of(name), []).append(name)
+    return groups
 
 
-def passed() -> dict[str, str]:
-    """The same as it was when everything last passed."""
-    lines = STAMP.read_text(encoding="utf-8").splitlines() if STAMP.is_file() else []
-    return {name: mark for mark, name in (line.split(" ", 1) for line in lines)}
+def group_of(name: str) -> str:
+    """The folder of a file of cpp/; else the place of `CORE` and `PYTHON` that it is in."""
+    if name.startswith("cpp/"):
+        return f"{Path(name).parent.as_posix()}/"
+    return next(place for place in CORE + PYTHON if name.startswith(place))
+
+
+def mark_of(names: list[str]) -> str:
+    """Hash of a group: of the names and contents of its files."""
+    lines = (f"{hashlib.sha256((ROOT / name).read_bytes()).hexdigest()[:16]} {name}\n" for name in names)
+    return hashlib.sha256("".join(lines).encode()).hexdigest()[:16]
 
 
 def main() -> None:
     """See the module's docstring."""
     command = sys.argv[1]
-    now = present()
+    groups = guarded()
+    now = {group: mark_of(names) for group, names in groups.items()}
     if command == "write":
-        STAMP.write_text("".join(f"{mark} {name}\n" for name, mark in now.items()), encoding="utf-8")
+        STAMP.write_text("".join(f"{mark} {group}\n" for group, mark in sorted(now.items())), encoding="utf-8")
         return
-    then = passed()
-    changed = {name for name in now.keys() | then.keys() if now.get(name) != then.get(name)}
+    lines = STAMP.read_text(encoding="utf-8").splitlines() if STAMP.is_file() else []
+    then = {group: mark for mark, group in (line.split(" ", 1) for line in lines)}
+    changed = {group for group in now.keys() | then.keys() if now.get(group) != then.get(group)}
     if command == "files":
-        sources = (name for name in sorted(changed) if name.startswith("cpp/") and name.endswith((".cpp", ".hpp")))
-        print(*(name for name in sources if name in now and not name.startswith("cpp/examples/")), sep="\n")
+        folders = (group for group in sorted(changed & now.keys()) if group.startswith(("cpp/src", "cpp/include")))
+        print(*(name for group in folders for name in groups[group] if name.endswith((".cpp", ".hpp"))), sep="\n")
         return
-    if any(name.startswith(CORE) for name in changed):
+    if any(group.startswith(CORE) for group in changed):
         print("core")
     if changed:
         print("python")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -155,38 +155,9 @@ ENTRIES = (
         {"clock": "Predicted over measured time of each run: whole, by tool, by kind of motion."},
         "clock",
     ),
-    Entry(
-        "Paper 001: force at corners", "demo corner",
-        {
-            "paper001-figure6a-radial-depth": "Radial depth along the corners.",
-            "paper001-figures6bc-forces": "Force in the frames of tool and machine.",
-            "paper001-figure9-resultant": "Resultant as programmed, by the paper's feed, and as scheduled.",
-            "paper001-figures11-12-surface": "Error of the wall; red: left standing, blue: cut too far.",
-            "paper001-scheduled": "Peak force and feed on all three corners.",
-        }, "paper001",
-    ),
-    Entry(
-        "Paper 002: shapers of two modes", "demo shaper",
-        {
-            "paper002-figure2-durations": "Durations of the minimal shapers.",
-            "paper002-figure3-amplitudes": "Their taps.",
-            "paper002-figure4-impulses": "Three of them.",
-            "paper002-figure5-sensitivity": "Their sensitivity.",
-            "paper002-figure6-responses": "How modes follow a shaped step.",
-            "paper002-figure8-stage-short": "The stage test, short shaper.",
-            "paper002-figure9-stage-long": "The stage test, long shaper.",
-        }, "paper002",
-    ),
-    Entry(
-        "Paper 003: a tap", "demo tap",
-        {
-            "paper003-figures2-3-acceleration": "The tap in time and frequency.",
-            "paper003-deflection": "How far end mill and collet give way.",
-        }, "paper003",
-    ),
 )  # fmt: skip
 KEPT = (
-    ("Two machining centres predicted", "shapegcode demo evidence --plots plots", "evidence-nist.png",
+    ("Two machining centres predicted", "python tests/benchmarks/evidence_nist.py --plots plots", "evidence-nist.png",
      "Predicted over measured time of runs that were left out; some 100 s of CPU, so drawn once."),
     ("The fewer runs, the less is known", "python tests/benchmarks/evidence_nist.py --curve --plots plots",
      "evidence-nist-runs.png", "Error by the number of runs learned from; ten minutes."),

@@ -74,17 +74,19 @@ _SCHEMAS = """\
 <!-- Generated: make docs -->
 
 `--json FILE` of a command writes its result. The keys of each kind of result stand in a JSON Schema, with units and
-meaning; Draft 2020-12, without references outside of the file.
+meaning; Draft 2020-12, without references outside of the file. They are made from the code: in Python by
+`sg.schema(sg.Conversion)`, all of them by `make schemas` (build/schemas), and in the built book each name of the table
+leads to its schema. Those of machine, tool, stock and study files, for editors: `shapegcode machine schema KIND`.
 
 | kind | what it is |
 |---|---|
 """
 
 
-def schema_documentation() -> str:
-    """Every kind of result with its schema."""
+def schema_documentation(*, linked: bool = False) -> str:
+    """Every kind of result, in the book linked to its schema."""
     rows = [
-        f"| [{name}](../schema/{name}.json) | {first_sentence(inspect.getdoc(cls) or '')} |"
+        f"| {f'[{name}](../schema/{name}.json)' if linked else name} | {first_sentence(inspect.getdoc(cls) or '')} |"
         for name, cls in write_schemas.results().items()
     ]
     return _SCHEMAS + "\n".join(rows) + "\n"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the test piece of `shapegcode demo cycle-time`: `write_test_piece.py > python/shapegcode/data/iso10791_7.nc`.
+"""Writes the test piece of paper 004's page: `write_test_piece.py > python/shapegcode/data/iso10791_7.nc`.
 
 A piece with the features of ISO 10791-7's contouring test (outer square, diamond, circle, sloped sides, bores); the
 dimensions, tools and passes are this project's own. Origin: centre of the finished top. All lengths in mm.

@@ -24,6 +24,7 @@ from shapegcode.batching.runs import OnBatch, Runs
 from shapegcode.batching.summary import summary_lines
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import is_temporary, write_lines
+from shapegcode.verdict.ahead import cores
 
 __all__ = ["Cluster", "batch"]
 
@@ -98,7 +99,7 @@ def batch(
         raise ArgumentError(f"jobs {jobs}, time limit {time_limit_s}, memory limit {memory_limit_bytes}: not below 0")
     begin = time.monotonic()
     folders = [Path(output), *([Path(html)] if html is not None else [])]
-    processes = jobs or os.cpu_count() or 1
+    processes = jobs or cores()
     with contextlib.ExitStack() as stack:
         hosts = Hosts()
         stack.callback(hosts.end)

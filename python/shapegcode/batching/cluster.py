@@ -27,23 +27,7 @@ _WAIT_S = 30
 def cluster_executor(
     scheduler: str, *, processes: int, command: str = "", tls_ca: str = "", tls_cert: str = "", tls_key: str = ""
 ) -> Iterator[tuple[Executor, int]]:
-    """An executor of a Dask cluster, whose workers were found to have this version of shapegcode.
-
-    Args:
-        scheduler: its address, such as ``tcp://host:8786``; "local": a cluster of this machine, as long as this lasts.
-        processes: workers of a local cluster.
-        command: of the jobs; the workers load it while the first is packed; empty: they are no commands.
-        tls_ca: certificate of the authority, as Dask takes it; likewise the next two.
-        tls_cert: of this client.
-        tls_key: of this client.
-
-    Yields:
-        The executor, and how many jobs run at a time.
-
-    Raises:
-        ArgumentError: Dask is not installed, the scheduler does not answer, it has no workers, or one of them has
-            another version of shapegcode.
-    """
+    """An executor of a Dask cluster, whose workers were found to have this version of shapegcode."""
     try:
         from distributed import Client, LocalCluster
         from distributed.security import Security

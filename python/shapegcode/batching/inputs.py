@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode.batching.manifest import MANIFEST, short
 from shapegcode.errors import ArgumentError
+from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file
 from shapegcode.program.reading import PROGRAM_SUFFIXES, program_loader
 from shapegcode.program.several import is_subprogram
 
@@ -43,20 +44,7 @@ class Source:
 
 
 def find_programs(given: Sequence[str], output: str | Path) -> tuple[Source, ...]:
-    """The programs that folders, patterns and lists name.
-
-    Args:
-        given: files, folders (all programs in them and below), patterns such as ``parts/*.nc``, and ``@LIST``, a file
-            with one of these per line (``#`` begins a comment; relative to the list).
-        output: folder of the results, in which no program is looked for.
-
-    Returns:
-        Each program once, in the order in which they were given, those of a folder by name.
-
-    Raises:
-        ArgumentError: something names no program, or two programs would have the same results.
-        OSError: a list or a folder cannot be read.
-    """
+    """The programs that folders, patterns and lists name."""
     found: list[Source] = []
     files, places = set[bytes](), set[bytes]()
     for source in _each(given, Path(output).absolute()):
@@ -89,7 +77,7 @@ def _each(given: Iterable[str], avoid: Path) -> Iterator[Source]:
 def _listed(file: Path, avoid: Path) -> Iterator[Source]:
     """What a list names; a message says where it stands."""
     try:
-        text = file.read_text()
+        text = read_file(file, MAX_SETTINGS_BYTES).decode()
     except UnicodeDecodeError:
         raise ArgumentError(f"{file}: no list of programs: it is no text") from None
     lines = [(number, _COMMENT.sub("", line).strip()) for number, line in enumerate(text.splitlines(), 1)]
@@ -144,7 +132,7 @@ def _in_folder(folder: Path, avoid: Path) -> Iterator[Source]:
 
 def _only_returns(path: str) -> bool:
     try:
-        return is_subprogram(Path(path).read_bytes())
+        return is_subprogram(read_file(path))
     except OSError:
         return False  # its run will say why
 
@@ -153,17 +141,6 @@ def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterato
     """Files of programs that a program may call, and those that these may.
 
     More than are called may be among them: any number behind a P counts, of a program that calls at all.
-
-    Args:
-        path: of the program.
-        machine: whose folders and macro codes count too.
-        base: folder from which the machine names its folders.
-
-    Returns:
-        Name of each, beside the program, and the file.
-
-    Raises:
-        OSError: a file cannot be read.
     """
     beside = Path(path).parent
     folders = [beside, *(Path(base, Path(name).expanduser()) for name in machine.input.program_folders)]
@@ -172,7 +149,7 @@ def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterato
     numbers = [*bound.g_macros.values(), *bound.m_macros.values(), *bound.m_subprograms.values()]
     numbers += [bound.tool_program] if bound.tool_program else []
     seen: set[int] = set()
-    waiting = [*numbers, *_mentioned(Path(path).read_bytes(), folders)]
+    waiting = [*numbers, *_mentioned(read_file(path), folders)]
     while waiting:
         number = waiting.pop()
         if number in seen:

@@ -36,25 +36,11 @@ class Base:
     folder: str
 
     def name_of(self, path: str | Path) -> str:
-        """Name of a file in the folder of a run.
-
-        Args:
-            path: as it was given, absolute or from the current folder.
-
-        Returns:
-            A relative name with as few dots as there can be.
-        """
+        """Name of a file in the folder of a run."""
         return os.path.relpath(path, self.folder)
 
     def path_of(self, name: str) -> str:
-        """The inverse of it.
-
-        Args:
-            name: in the folder of a run.
-
-        Returns:
-            The path from the current folder.
-        """
+        """The inverse of it."""
         return os.path.normpath(os.path.join(os.path.relpath(self.folder), name))
 
 
@@ -136,18 +122,7 @@ class JobOutcome:
 def pack(
     job: BatchJob, files: Mapping[str, bytes], *, seconds: float = 0.0, memory_bytes: int = 0, scratch: str = ""
 ) -> Packed:
-    """A run that can travel.
-
-    Args:
-        job: the run.
-        files: what it reads: content by name.
-        seconds: see `Packed`.
-        memory_bytes: see `Packed`.
-        scratch: see `Packed`.
-
-    Returns:
-        The run with its files.
-    """
+    """A run that can travel."""
     version = this_version()
     return Packed(
         job.words, files, version, _fingerprint(job.words, files, version), seconds, memory_bytes, scratch

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import bisect
 import contextlib
-import fcntl
 import hashlib
 import json
 import os
+import sys
 from array import array
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -31,18 +31,7 @@ _FOLDER = "folder"
 
 
 def begun_in(output: str | Path) -> str:
-    """The folder in which the batch of an output folder was begun.
-
-    Args:
-        output: folder of the results.
-
-    Returns:
-        Its absolute path; the current folder if there is no batch yet.
-
-    Raises:
-        ArgumentError: what lies there is no manifest of this version.
-        OSError: it cannot be read.
-    """
+    """The folder in which the batch of an output folder was begun."""
     try:
         with (Path(output) / MANIFEST).open("rb") as stream:
             return _base_of(stream, output) or os.getcwd()
@@ -51,14 +40,7 @@ def begun_in(output: str | Path) -> str:
 
 
 def short(text: str) -> bytes:
-    """Sixteen bytes that stand for a text of any length.
-
-    Args:
-        text: a key or a path.
-
-    Returns:
-        Its hash.
-    """
+    """Sixteen bytes that stand for a text of any length."""
     return hashlib.blake2b(os.fsencode(text), digest_size=16).digest()
 
 
@@ -78,18 +60,10 @@ class Manifest:
     def __init__(self, folder: Path, *, resume: bool, base: str = "") -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.path = folder / MANIFEST
-        # The folder itself is locked: that leaves no file behind, however the batch ends.
-        self._lock = os.open(folder, os.O_RDONLY)
         self._before: BinaryIO | None = None
         self._known: dict[bytes, int] = {}
         self._old, self._new = array("q"), array("q")
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            os.close(self._lock)
-            raise ArgumentError(
-                f"{folder}: another batch is writing there; wait for it or name another folder"
-            ) from None
+        self._lock = _locked(folder)
         try:
             # The file of before stays open, so that its rows can be read though a new one has its name.
             with contextlib.suppress(FileNotFoundError):
@@ -105,14 +79,7 @@ class Manifest:
             raise
 
     def earlier(self, key: str) -> dict[str, Any] | None:
-        """The row of an earlier batch, also one that is forgotten: its files are known by it.
-
-        Args:
-            key: of a run.
-
-        Returns:
-            The row; None: there is none.
-        """
+        """The row of an earlier batch, also one that is forgotten: its files are known by it."""
         at = self._known.get(short(key))
         if at is None or self._before is None:
             return None
@@ -121,28 +88,11 @@ class Manifest:
         return row
 
     def kept_at(self, key: str) -> int:
-        """Where the row of an earlier batch stands now.
-
-        Args:
-            key: of a run that has one, which is not forgotten.
-
-        Returns:
-            Where it begins in the file.
-        """
+        """Where the row of an earlier batch stands now."""
         return self._new[bisect.bisect_left(self._old, self._known[short(key)])]
 
     def add(self, row: Mapping[str, Any]) -> int:
-        """Write a row, to the disk itself.
-
-        Args:
-            row: with its "key".
-
-        Returns:
-            Where it begins in the file.
-
-        Raises:
-            OSError: a full disk; the row is then not there.
-        """
+        """Write a row, to the disk itself."""
         with named_errors(self.path):
             end = self._stream.tell()
             try:
@@ -184,6 +134,23 @@ class Manifest:
             self._new.append(end)
             end += len(line)
             yield line.decode()
+
+
+def _locked(folder: Path) -> int:
+    """Lock a folder, in a way that leaves nothing behind however the batch ends; gives what to close."""
+    lock = -1
+    try:
+        if sys.platform == "win32":  # deleted by the system when it is closed
+            return os.open(folder / ".batch.lock", os.O_CREAT | os.O_EXCL | os.O_TEMPORARY)
+        import fcntl
+
+        lock = os.open(folder, os.O_RDONLY)
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, FileExistsError):
+        if lock >= 0:
+            os.close(lock)
+        raise ArgumentError(f"{folder}: another batch is writing there; wait for it or name another folder") from None
+    return lock
 
 
 def _base_of(stream: BinaryIO, output: str | Path) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from shapegcode.batching.inputs import Source, called_files
 from shapegcode.batching.job import Base, BatchJob
 from shapegcode.errors import ArgumentError
+from shapegcode.io.data_file import read_file
 from shapegcode.machine import Machine
 
 __all__ = ["COMMANDS", "WRITES", "Plan", "plan"]
@@ -64,14 +65,7 @@ class Plan:
         return len(self.sources) * len(self.lines)
 
     def job(self, rank: int) -> BatchJob:
-        """A run.
-
-        Args:
-            rank: from 0 on.
-
-        Returns:
-            The run; nothing is read for it.
-        """
+        """A run."""
         line, source = self._of(rank)
         target = os.path.join(self.output, line.below, source.place)
         page = os.path.join(self.html, line.below, f"{source.place}.html") if self.html else ""
@@ -82,33 +76,16 @@ class Plan:
         return BatchJob(source.path, line.given, tuple(words), target)
 
     def files(self, rank: int) -> dict[str, bytes]:
-        """What a run reads.
-
-        Args:
-            rank: of the run.
-
-        Returns:
-            Content by name in the folder of the run.
-
-        Raises:
-            OSError: a file cannot be read.
-        """
+        """What a run reads."""
         line, source = self._of(rank)
         name = self.base.name_of(source.path)
-        found = {name: Path(source.path).read_bytes()}
+        found = {name: read_file(source.path)}
         for called, path in called_files(source.path, line.machine, self.base.path_of(".")):
-            found[self.base.name_of(called)] = Path(path).read_bytes()
+            found[self.base.name_of(called)] = read_file(path)
         return found | {key: content for key, content in self.shared.items() if key in line.files}
 
     def size_bytes(self, rank: int) -> int:
-        """How large the program of a run is.
-
-        Args:
-            rank: of the run.
-
-        Returns:
-            Its size; 0 if nobody may read it.
-        """
+        """How large the program of a run is."""
         try:
             return os.path.getsize(self._of(rank)[1].path)
         except OSError:
@@ -128,25 +105,7 @@ def plan(
     html: str | Path | None,
     base: Base,
 ) -> Plan:
-    """The runs of programs on machines.
-
-    Args:
-        sources: the programs.
-        machines: files or names of built-in ones.
-        output: folder of the results.
-        command: of `COMMANDS`.
-        options: further words of each command line.
-        html: folder of the pages; None: none.
-        base: folder in which the batch was begun.
-
-    Returns:
-        The runs.
-
-    Raises:
-        ArgumentError: there is no machine, or two would have the same folder.
-        MachineError: one is none.
-        OSError: a file of a machine or an option cannot be read.
-    """
+    """The runs of programs on machines."""
     if not machines:
         raise ArgumentError("no machine: name one with -m")
     labels = [Path(machine).stem for machine in machines]
@@ -156,12 +115,12 @@ def plan(
         if word.partition("=")[0] in _OF_ONE_RUN:
             raise ArgumentError(f"{word} behind --: names a file of one run; a batch has -m, -o and --html itself")
     words, given = _with_files(options, base)
-    shared = {name: Path(path).read_bytes() for name, path in given}
+    shared = {name: read_file(path) for name, path in given}
     lines: list[_OnMachine] = []
     for name, label in zip(machines, labels, strict=True):
         machine = Machine.load(name)
         own = [base.name_of(name)] if os.path.exists(name) else []
-        shared |= {key: Path(name).read_bytes() for key in own}
+        shared |= {key: read_file(name) for key in own}
         below = label if len(machines) > 1 else ""
         lines.append(_OnMachine(name, own[0] if own else name, below, machine, (*own, *(key for key, _ in given))))
     page = base.name_of(html) if html else ""

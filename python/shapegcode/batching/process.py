@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode.batching.job import FAILED_CODES, Ending, JobOutcome, Packed
+from shapegcode.io.atomic import named_errors
 from shapegcode.results.made import this_version
 
 __all__ = ["Hosts", "begin_host", "run_packed"]
@@ -88,26 +89,12 @@ class Hosts:
         self._ended = False
 
     def begin(self, command: str) -> None:
-        """Have one load while its first job is still looked for.
-
-        Args:
-            command: of the jobs.
-        """
+        """Have one load while its first job is still looked for."""
         host = self._ready[command] = _Host(command)
         self._all.add(host)
 
     def run(self, packed: Packed) -> JobOutcome:
-        """Run a job in a process of its own, in a folder that is gone afterwards.
-
-        Args:
-            packed: the job.
-
-        Returns:
-            What it wrote and how it ended; a crash is an outcome, not an error.
-
-        Raises:
-            OSError: there is no room for its folder.
-        """
+        """Run a job in a process of its own, in a folder that is gone afterwards."""
         if packed.version != (mine := this_version()):
             return JobOutcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
         folder = Path(tempfile.mkdtemp(prefix="job-", dir=packed.scratch or None))
@@ -145,7 +132,8 @@ class Hosts:
         for name, content in packed.files.items():
             target = Path(os.path.normpath(cwd / name))
             target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(content)
+            with named_errors(target):
+                target.write_bytes(content)
         for word in packed.words:
             _make_parent(cwd, word)
         host = self._host(packed.words[0])
@@ -174,26 +162,12 @@ _of_worker = Hosts()
 
 
 def begin_host(command: str) -> None:
-    """Have a Dask worker load what its first run needs.
-
-    Args:
-        command: of the runs.
-    """
+    """Have a Dask worker load what its first run needs."""
     _of_worker.begin(command)
 
 
 def run_packed(packed: Packed) -> JobOutcome:
-    """`Hosts.run` on a Dask worker, whose hosts last as long as it does.
-
-    Args:
-        packed: the job.
-
-    Returns:
-        What it wrote and how it ended.
-
-    Raises:
-        OSError: there is no room for its folder.
-    """
+    """`Hosts.run` on a Dask worker, whose hosts last as long as it does."""
     return _of_worker.run(packed)
 
 

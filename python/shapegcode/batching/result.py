@@ -78,14 +78,7 @@ class BatchRow:
 
 
 def figures_of(report: Mapping[str, Any]) -> dict[str, Any]:
-    """The figures of a row from the JSON of a command.
-
-    Args:
-        report: of `convert`, `time`, `check`, `feed`, `measure` or `simulate`.
-
-    Returns:
-        Values of `BatchRow` by name, as JSON knows them; None where the command does not find one.
-    """
+    """The figures of a row from the JSON of a command."""
     return {
         "residual_um": _pair(report.get("residual_vibration_um"), _largest),
         "contour_um": _pair(_contour(report), _contour_largest),
@@ -149,7 +142,7 @@ _FIGURES = (
 )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Batch(Result):
     """A command over many programs and machines.
 

@@ -25,15 +25,7 @@ _PREFIX = "shapegcode: "
 
 
 def row_of(job: BatchJob, outcome: JobOutcome) -> tuple[BatchRow, Mapping[str, bytes]]:
-    """The row of a run, and the files of it that count.
-
-    Args:
-        job: the run.
-        outcome: what came back.
-
-    Returns:
-        The row, and the content of files by name: none of a run that failed.
-    """
+    """The row of a run, and the files of it that count."""
     ended: Ended = _ENDED.get(outcome.code, "failed") if outcome.ending == "ended" else "failed"
     if ended == "refused" and any(os.strerror(code) in outcome.complained for code in (errno.ENOSPC, errno.EDQUOT)):
         ended = "failed"  # not the program's fault
@@ -67,15 +59,7 @@ def _said(outcome: JobOutcome, ended: Ended) -> str:
 
 
 def row_read(row: Mapping[str, Any], *, earlier: bool) -> BatchRow:
-    """A row of JSON.
-
-    Args:
-        row: values by name.
-        earlier: it was done by an earlier batch.
-
-    Returns:
-        The row.
-    """
+    """A row of JSON."""
     pairs: dict[str, Any] = {
         name: None if row[name] is None else Pair(row[name]["original"], row[name]["emitted"]) for name in _PAIRS
     }

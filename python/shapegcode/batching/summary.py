@@ -15,14 +15,7 @@ __all__ = ["summary_lines"]
 
 
 def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
-    """The rows as CSV.
-
-    Args:
-        rows: of a batch.
-
-    Returns:
-        Lines with their ends, the first with the names; a figure before and after has two columns.
-    """
+    """The rows as CSV."""
     names = ["residual_um", "contour_um", "cycle_time_s"]
     heads: list[str] = []
     for field in fields(BatchRow):

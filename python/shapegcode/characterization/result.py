@@ -143,7 +143,7 @@ class WrittenTest:
     purpose: str
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class CharacterisationTests(Result):
     """The test programs that were written.
 
@@ -196,7 +196,7 @@ def _run_for(test: WrittenTest) -> str:
     return test.kind if test.override_percent == 100 else f"{test.kind} {test.override_percent} %"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Characterisation(Result):
     """What a controller does with blocks, as the results of its tests say.
 

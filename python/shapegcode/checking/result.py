@@ -164,7 +164,7 @@ class SerialLine:
     regions: tuple[StarvedRun, ...]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Check(Result):
     """What was found in a program.
 

@@ -16,6 +16,7 @@ import contextlib
 import errno
 import importlib
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ from shapegcode.cli.arguments import CommandParser
 __all__ = ["COMMANDS", "Command", "ExitCode", "main", "parser_of"]
 
 _DEBUG = "--debug"
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _WITH_REST = "batch"
 """Behind -- it takes words for the command that it runs."""
 
@@ -150,6 +152,8 @@ def _message(error: Exception) -> str:
         # One line per problem, each with the command's name, so that each can be read alone.
         return str(error).replace("\n", "\nshapegcode: ") or type(error).__name__
     if error.filename is None:
+        if error.errno in _FULL:  # every file is written under its name
+            return f"standard output: {error.strerror}"
         return error.strerror or str(error) or type(error).__name__
     path = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else str(error.filename)
     reason = error.strerror or type(error).__name__
@@ -178,24 +182,34 @@ def _run(argv: list[str]) -> int:
         sys.stdout.flush()
 
 
+class _Interrupts:
+    """Whether Ctrl-C came: a module that is being loaded may make another error of it."""
+
+    def __init__(self, of_process: bool) -> None:
+        self.came = False
+        self._mine = of_process and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if self._mine:
+            signal.signal(signal.SIGINT, self._handle)
+
+    def _handle(self, _number: int, _frame: object) -> None:
+        self.came = True
+        raise KeyboardInterrupt
+
+    def end(self) -> None:
+        """The work is done: how this process ends is no longer to be changed."""
+        if self._mine:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line and return the exit code (see :class:`ExitCode`).
-
-    Args:
-        argv: the arguments without the program's name; None: those of the process.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        Exception: with ``--debug``, the error as it is; without it, only what is a defect of shapegcode.
-    """
+    """Run the command line and return the exit code (see :class:`ExitCode`)."""
     words = list(sys.argv[1:] if argv is None else argv)
     if "numpy" not in sys.modules:
         # Matrices of a command are small: further threads of OpenBLAS would only wait, and burn processor time.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if "_ARGCOMPLETE" in os.environ:  # a shell asks at TAB
         importlib.import_module(f"{__name__}.completion").complete()
+    ctrl_c = _Interrupts(argv is None)
     try:
         return _run([word for word in words if word != _DEBUG])
     except SystemExit as stop:
@@ -209,12 +223,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         _discard_output()
         return ExitCode.BROKEN_PIPE
     except Exception as error:
+        if ctrl_c.came:
+            print("shapegcode: stopped", file=sys.stderr)
+            return ExitCode.INTERRUPTED
         if _DEBUG in words or not _expected(error):
             raise
         print(f"shapegcode: {_message(error)}", file=sys.stderr)
         if isinstance(error, OSError) and error.errno == errno.ENOSPC:
             _discard_output()
         return ExitCode.BAD_INPUT
+    finally:
+        ctrl_c.end()
 
 
 def _discard_output() -> None:

@@ -73,48 +73,25 @@ class CommandParser(argparse.ArgumentParser):
     """A parser that puts each option into its group."""
 
     def __init__(self, **kwargs: Any) -> None:
-        """Make it.
-
-        Args:
-            **kwargs: as for `argparse.ArgumentParser`.
-        """
+        """Make it."""
         self._titled: dict[str, argparse._ArgumentGroup] = {}
         super().__init__(**({"formatter_class": _Formatter} | kwargs))
 
     def group(self, title: str) -> argparse._ArgumentGroup:
-        """The group of that title.
-
-        Args:
-            title: of `GROUPS`.
-
-        Returns:
-            The group, made when it is first asked for.
-        """
+        """The group of that title."""
         if title not in self._titled:
             self._titled[title] = self.add_argument_group(title)
         return self._titled[title]
 
     def add_argument(self, *names: str, **kwargs: Any) -> argparse.Action:
-        """Declare an argument, in its group.
-
-        Args:
-            *names: of the option.
-            **kwargs: as for `argparse.ArgumentParser.add_argument`.
-
-        Returns:
-            The argument.
-        """
+        """Declare an argument, in its group."""
         title = _GROUP_OF.get(kwargs.get("dest") or _dest(names))
         if title is None:
             return super().add_argument(*names, **kwargs)
         return self.group(title).add_argument(*names, **kwargs)
 
     def format_help(self) -> str:
-        """The help text, its groups in the order of `GROUPS`, with examples and exit codes below.
-
-        Returns:
-            The text.
-        """
+        """The help text, its groups in the order of `GROUPS`, with examples and exit codes below."""
         ranks = {title: rank for rank, title in enumerate(GROUPS, start=1)}
         # First what argparse makes itself: options, actions.
         self._action_groups.sort(key=lambda group: ranks.get(group.title or "", 0))
@@ -126,11 +103,7 @@ class CommandParser(argparse.ArgumentParser):
             self.epilog = kept
 
     def epilogue(self) -> str | None:
-        """What stands below the options: examples, and the exit codes.
-
-        Returns:
-            The text; None: nothing.
-        """
+        """What stands below the options: examples, and the exit codes."""
         words = self.prog.split(maxsplit=1)
         lines = EXAMPLES.get(words[1] if len(words) > 1 else "", ())
         if not lines:
@@ -142,28 +115,13 @@ class CommandParser(argparse.ArgumentParser):
 
 
 def one_of(parser: argparse.ArgumentParser, title: str, *, required: bool = False) -> argparse._MutuallyExclusiveGroup:
-    """Options of which one alone can be given, in their group.
-
-    Args:
-        parser: of the command.
-        title: of the group.
-        required: one of them must be given.
-
-    Returns:
-        Where they are declared.
-    """
+    """Options of which one alone can be given, in their group."""
     group = parser.group(title) if isinstance(parser, CommandParser) else parser.add_argument_group(title)
     return group.add_mutually_exclusive_group(required=required)
 
 
 def add_alias(parser: argparse.ArgumentParser, old: str, option: str) -> None:
-    """Let an option be typed by the name that it had before; no help shows that.
-
-    Args:
-        parser: of the command.
-        old: what the option was called.
-        option: what it is called.
-    """
+    """Let an option be typed by the name that it had before; no help shows that."""
     found = next(action for action in parser._actions if option in action.option_strings)
     parser._option_string_actions[old] = found
 

@@ -75,12 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the batch.
-
-    Raises:
-        MachineError, ArgumentError: bad input: of the batch, not of one program.
-        OSError: a file cannot be read or written.
-    """
+    """Run the batch."""
     from dataclasses import replace
 
     from shapegcode.batching.batch import Cluster, batch

@@ -78,12 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the tests or fit their results; see the module.
-
-    Raises:
-        ArgumentError, MachineError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Write the tests or fit their results; see the module."""
     from shapegcode.cli import runner
 
     _check_options(args)

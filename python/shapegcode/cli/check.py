@@ -22,12 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check one program.
-
-    Raises:
-        ProgramError, MachineError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Check one program."""
     from shapegcode.checking.check import check
     from shapegcode.cli import runner
 

@@ -29,18 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compare two programs.
-
-    Args:
-        args: of the command.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        ProgramError, MachineError, ArgumentError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Compare two programs."""
     from shapegcode.cli import runner
     from shapegcode.comparison.compare import compare
 

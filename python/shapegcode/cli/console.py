@@ -46,16 +46,7 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def output_console(json_target: str | None = None, *, file: TextIO | None = None, least: int = 0) -> Console:
-    """Console for tables and text on standard output; silent where the JSON goes there (``--json -``).
-
-    Args:
-        json_target: of ``--json``.
-        file: in place of standard output.
-        least: characters that a line must hold, also where the terminal is narrower.
-
-    Returns:
-        The console.
-    """
+    """Console for tables and text on standard output; silent where the JSON goes there (``--json -``)."""
     from rich.console import Console
 
     stream = file or sys.stdout
@@ -81,12 +72,7 @@ def wrapped(text: str) -> str:
 
 
 def write_json(data: object, target: str | Path) -> None:
-    """Write *data* as stable JSON: sorted keys, two spaces, one newline at the end; ``-`` is standard output.
-
-    Raises:
-        ValueError: a number in it is NaN or infinite.
-        OSError: the file cannot be written; what was there before stays.
-    """
+    """Write *data* as stable JSON: sorted keys, two spaces, one newline at the end; ``-`` is standard output."""
     encoder = json.JSONEncoder(sort_keys=True, indent=2, allow_nan=False, ensure_ascii=False)
     pieces = itertools.chain(encoder.iterencode(data), ["\n"])
     # Not word by word, nor all at once: there may be millions.

@@ -133,13 +133,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Convert one program; see the module.
-
-    Raises:
-        ProgramError, DesignError, MachineError: bad input.
-        ArgumentError: a bad file name, or a budget that no choice fits.
-        OSError: a file cannot be read or written.
-    """
+    """Convert one program; see the module."""
     from shapegcode._core import ArgumentError
     from shapegcode.cli import runner
     from shapegcode.program.compensation import read_for_conversion

@@ -1,77 +1,53 @@
-"""``shapegcode demo``: repeat a paper's figures, or hold a prediction against what machines did."""
+"""``shapegcode demo``: repeat a paper's figures with this program's models."""
 
 from __future__ import annotations
 
 import argparse
-import importlib
-from collections.abc import Callable
 
-from shapegcode.cli.options import add_result_arguments
+from shapegcode.cli.options import add_plots_argument, add_result_arguments
 
-__all__ = ["add_arguments", "run"]
-
-_FOLDER = "demo-output"
-# Name of a demonstration: its module, which has the function `<module>_demo(on_progress)`, and what it repeats.
-_DEMOS = {
-    "path": ("path", "line, arc, line at both feeds and reductions: Ko, Lim and Hong, 2023 (paper 000)"),
-    "cycle-time": (
-        "cycle_time",
-        "a test piece with the features of ISO 10791-7, both sets of constants: Lee, Ro, Song and Oh, 2022 (paper 004)",
-    ),
-    "shaper": (
-        "shaper",
-        "two-mode shapers, figures 2 to 6, and their test on a stage: Park, Hong and Danielson, 2009 (paper 002)",
-    ),
-    "metrology": ("metrology", "the specimens, measured on the model: Ko, Lim and Hong, 2023 (paper 000)"),
-    "tap": (
-        "tap",
-        "equivalent systems, and what end mill and collet deflect: Back, Ko and Kim, 2003 (paper 003)",
-    ),
-    "corner": ("corner", "cornering cuts, the feeds of the paper and the scheduler's: Kim and Ko, 2001 (paper 001)"),
-    "evidence": (
-        "evidence",
-        "clocks of two machining centres learned from their logs, other programs predicted: NIST's test bed (minutes)",
-    ),
+_PAGES = {
+    "metrology": "docs/evidence/paper000.md",
+    "corner": "docs/evidence/paper001.md",
+    "shaper": "docs/evidence/paper002.md",
+    "tap": "docs/evidence/paper003.md",
+    "cycle-time": "docs/evidence/paper004.md",
+    "evidence": "docs/evidence/evidence.md",
 }
+"""Pages of the book that repeat what the command of that name did up to version 0.1.0."""
+
+
+def _name(word: str) -> str:
+    if word in _PAGES:
+        raise argparse.ArgumentTypeError(
+            f"{word} is a page of the book now, which says what repeats its figures: {_PAGES[word]}"
+        )
+    return word
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Repeats the figures of a paper with this program's models, and shows both; papers in full: "
-        "docs/evidence/references.md. evidence: predicted beside measured, docs/evidence/evidence.md. "
-        "Exit code 1 if a statement of the paper differs and why is not known, or a prediction is out of its limits."
+        "Repeats the figures of a paper with this program's models, and shows both. Other papers are pages of the "
+        "book: docs/evidence/figures.md. Exit code 1 if a statement of the paper differs and why is not known."
     )
     parser.add_argument(
         "name",
         metavar="NAME",
-        choices=tuple(_DEMOS),
-        help="; ".join(f"{name}: {what}" for name, (_, what) in _DEMOS.items()),
+        type=_name,
+        choices=("path",),
+        help="path: line, arc, line at both feeds and reductions: Ko, Lim and Hong, 2023 (paper 000)",
     )
-    parser.add_argument(
-        "--plots",
-        metavar="DIR",
-        default=None,
-        help=f"folder for the pictures, where there are some (PNG and SVG; default: {_FOLDER})",
-    )
+    add_plots_argument(parser, "folder for the pictures, where there are some (PNG and SVG)")
     add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run one demonstration.
-
-    Raises:
-        OSError: the JSON file or a picture cannot be written.
-    """
+    """Repeat a paper's figures."""
     from shapegcode.cli import runner
-    from shapegcode.demos.result import Demonstration
+    from shapegcode.demos.path import path_demo
 
     runner.check_files(args)
-    module = _DEMOS[args.name][0]
-    found = importlib.import_module(f"shapegcode.demos.{module}")
-    demo: Callable[[Callable[[float], None]], Demonstration] = getattr(found, f"{module}_demo")
     with runner.progress(f"demo {args.name}", args) as bar:
-        result = demo(bar.update)
-    if args.plots is None and result.plots():
-        args.plots = _FOLDER
+        result = path_demo(bar.update)
     return runner.finish(result, args)

@@ -114,9 +114,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "shapegcode report result.json -o result.html --html-script beside",
     ),
     "completion": ("shapegcode completion bash", "shapegcode completion fish"),
-    "demo": (
-        "shapegcode demo path",
-        "shapegcode demo corner --plots pictures --html corner.html",
-    ),
+    "demo": ("shapegcode demo path", "shapegcode demo path --json path.json --html path.html"),
 }
 """By command and action: what a user could type. Each is read by that command's parser in a test."""

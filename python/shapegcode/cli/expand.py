@@ -28,18 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Expand one program; see the module.
-
-    Args:
-        args: of the command.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        ProgramError, MachineError, ArgumentError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Expand one program; see the module."""
     from shapegcode.cli import runner
     from shapegcode.program.expand import expand
 

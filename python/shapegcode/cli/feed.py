@@ -50,12 +50,7 @@ def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) ->
 
 
 def read_cutting_arguments(args: argparse.Namespace) -> dict[str, Any]:
-    """What `add_cutting_arguments` declared, as `schedule_feed` and `convert_scheduled` take it.
-
-    Raises:
-        ToolError, StockError: a bad file.
-        OSError: a file cannot be read.
-    """
+    """What `add_cutting_arguments` declared, as `schedule_feed` and `convert_scheduled` take it."""
     from shapegcode.cutting.stock import Stock
     from shapegcode.cutting.tool import Tool
     from shapegcode.feed.schedule import MARGIN
@@ -88,12 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Schedule the feeds of one program.
-
-    Raises:
-        ProgramError, MachineError, ToolError, StockError, ArgumentError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Schedule the feeds of one program."""
     from shapegcode.cli import runner
     from shapegcode.feed.schedule import schedule_feed
     from shapegcode.program.compensation import read_for_conversion

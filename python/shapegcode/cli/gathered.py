@@ -38,23 +38,11 @@ class Gathered:
         return self.places[self.at].address
 
     def names(self, indices: set[int]) -> str:
-        """Addresses of some of the programs, in their order.
-
-        Args:
-            indices: of the programs.
-
-        Returns:
-            The addresses in one line.
-        """
+        """Addresses of some of the programs, in their order."""
         return ", ".join(self.places[index].address for index in sorted(indices))
 
     def add(self, report: dict[str, Any], output: tuple[Path | str, bytes | memoryview] | None) -> None:
-        """Keep what a run wants written.
-
-        Args:
-            report: for --json.
-            output: the file and the program in it; None: the command writes none.
-        """
+        """Keep what a run wants written."""
         self.reports.append({**report, "program_address": self.address})
         if output is not None:
             self.written[self.at] = output[0], bytes(output[1])

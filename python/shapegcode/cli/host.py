@@ -14,7 +14,6 @@ import gc
 import importlib
 import json
 import os
-import resource
 import select
 import signal
 import sys
@@ -50,16 +49,11 @@ _OF_COMMAND = {
 """What a run imports when it gets there: each would do so anew."""
 _REHEARSED = {"convert": ("-o", os.devnull), "feed": ("-o", os.devnull), "measure": ("--tool-diameter", "10mm")}
 _CODES = {name: code for code, name in FAILED_CODES.items()}
-_C = ctypes.CDLL(None)
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl
 
 
 def main() -> int:
-    """Serve until the input ends.
-
-    Returns:
-        The exit code.
-    """
+    """Serve until the input ends."""
     for command in sys.argv[1:]:
         for name in (*_LOADED, f"shapegcode.cli.{command}", *_OF_COMMAND[command]):
             importlib.import_module(name)
@@ -164,7 +158,7 @@ def _be_the_command(job: Mapping[str, Any], parent: int) -> None:
 def _follow(parent: int) -> None:
     """End when the host ends, though nobody tells this process."""
     if sys.platform == "linux":
-        _C.prctl(_DIE_WITH_PARENT, signal.SIGKILL)
+        ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(_CODES["crashed"])
 
@@ -173,6 +167,8 @@ def _limit_memory(more_bytes: int) -> None:
     """So much memory more than the host had loaded already."""
     if sys.platform != "linux":
         return  # no other system counts what is used instead of what is reserved
+    import resource
+
     pages = int(Path("/proc/self/statm").read_text().split()[5])
     most = pages * resource.getpagesize() + more_bytes
     resource.setrlimit(resource.RLIMIT_DATA, (most, most))

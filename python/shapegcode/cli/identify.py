@@ -87,12 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Identify modes, or say how to do the test.
-
-    Raises:
-        ArgumentError, MachineError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Identify modes, or say how to do the test."""
     from shapegcode.cli import runner
     from shapegcode.errors import ArgumentError
 
@@ -142,11 +137,7 @@ def _identify(args: argparse.Namespace) -> int:
 
 
 def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> None:
-    """Have somebody decide over modes of the other axes that nobody measured on this machine.
-
-    Raises:
-        ArgumentError: neither options nor answers do.
-    """
+    """Have somebody decide over modes of the other axes that nobody measured on this machine."""
     from shapegcode.identification.other_axes import open_modes, require_decisions
 
     found = open_modes(machine, axis)

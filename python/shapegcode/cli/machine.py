@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.cli import modes
@@ -110,16 +109,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the action.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        MachineError: the machine file is bad, or there is no built-in machine of that name.
-        ArgumentError: the file to write exists.
-        OSError: a file cannot be read or written.
-    """
+    """Run the action."""
     actions = {"init": _init, "import": _import, "show": _show, "diff": _diff, "schema": _schema}
     return actions[args.action](args)
 
@@ -164,18 +154,14 @@ def _modes_of(machine: Machine | None) -> dict[str, str]:
 
 
 def _sorted(files: list[str]) -> tuple[str, list[str]]:
-    """The parameter dump among some files, and the tables.
-
-    Raises:
-        ArgumentError: no dump, or more than one.
-        OSError: a file cannot be read.
-    """
+    """The parameter dump among some files, and the tables."""
     from shapegcode.errors import ArgumentError
+    from shapegcode.io.data_file import read_file
     from shapegcode.machine.fanuc_tables import is_table
 
     if len(files) == 1:
         return files[0], []
-    tables = [file for file in files if is_table(Path(file).read_bytes())]
+    tables = [file for file in files if is_table(read_file(file))]
     dumps = [file for file in files if file not in tables]
     if len(dumps) != 1:
         said = f"more than one: {', '.join(dumps)}" if dumps else "none: tables of offsets do not make a machine"
@@ -243,14 +229,7 @@ def _diff(args: argparse.Namespace) -> int:
 
 
 def file_schema(kind: str) -> str:
-    """JSON Schema of a TOML file, as text.
-
-    Args:
-        kind: one of `FILES`.
-
-    Returns:
-        The text.
-    """
+    """JSON Schema of a TOML file, as text."""
     from shapegcode.cutting.stock import Stock
     from shapegcode.cutting.tool import Tool
     from shapegcode.machine import Machine
@@ -275,11 +254,7 @@ def _schema(args: argparse.Namespace) -> int:
 
 
 def _write(args: argparse.Namespace, text: str) -> None:
-    """Write the machine file of ``-o``.
-
-    Raises:
-        ArgumentError: it exists, and nobody said ``--force``.
-    """
+    """Write the machine file of ``-o``."""
     from shapegcode.errors import ArgumentError
     from shapegcode.io.atomic import write_text
 

@@ -25,14 +25,7 @@ MACHINES = ("machine", "base", "files")
 
 
 def given_files(args: argparse.Namespace) -> Iterator[tuple[str, str]]:
-    """What was given to the options that name files to read.
-
-    Args:
-        args: of the command.
-
-    Returns:
-        Name of the option and of the file, in pairs.
-    """
+    """What was given to the options that name files to read."""
     for role in READ:
         value = getattr(args, role, None)
         for entry in value if isinstance(value, list | tuple) else [value]:
@@ -46,17 +39,7 @@ def made_by(
     output: tuple[str | Path, bytes | memoryview] | None = None,
     wrote: Sequence[str | Path] = (),
 ) -> Made:
-    """Of what a command made its result.
-
-    Args:
-        result: of the command.
-        args: of the command.
-        output: the program that is about to be written.
-        wrote: files that were written already.
-
-    Returns:
-        What stands in the JSON under `made`.
-    """
+    """Of what a command made its result."""
     from shapegcode.results.made import FORMAT, Made, MadeFile, this_version
 
     files = [_read(role, name) for role, name in given_files(args)]

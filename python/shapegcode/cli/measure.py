@@ -65,12 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure programs.
-
-    Raises:
-        ProgramError, MachineError, ArgumentError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Measure programs."""
     from shapegcode.cli import runner
     from shapegcode.metrology.measure import measure
     from shapegcode.program import Program

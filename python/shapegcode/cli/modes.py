@@ -12,12 +12,7 @@ __all__ = ["add_modes_arguments", "decided_modes"]
 
 
 def add_modes_arguments(parser: argparse.ArgumentParser, keep: str) -> None:
-    """Declare what decides over modes that were not measured on this machine.
-
-    Args:
-        parser: of the command.
-        keep: name of the option that keeps them.
-    """
+    """Declare what decides over modes that were not measured on this machine."""
     parser.add_argument(
         keep,
         dest="keep_modes",
@@ -36,16 +31,7 @@ def add_modes_arguments(parser: argparse.ArgumentParser, keep: str) -> None:
 
 
 def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], said: str) -> tuple[str, str]:
-    """What the options say, and at a terminal the answers to a question for each axis that they leave open.
-
-    Args:
-        args: of the command.
-        open_modes: per axis the modes that nobody measured here, in words.
-        said: what the question begins with.
-
-    Returns:
-        Letters of axes whose modes are kept, and of those that are rigid.
-    """
+    """What the options say, and at a terminal the answers to a question for each axis that they leave open."""
     keep, rigid = args.keep_modes or "", args.rigid or ""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return keep, rigid

@@ -34,12 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Choose.
-
-    Raises:
-        StudyFileError, MachineError, ProgramError, ArgumentError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Choose."""
     from shapegcode.cli import runner
     from shapegcode.studies.optimize import optimize
 

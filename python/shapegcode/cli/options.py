@@ -94,11 +94,7 @@ def add_program_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def load_machine(args: argparse.Namespace) -> Machine:
-    """The machine of ``-m`` with the values of ``--set``.
-
-    Raises:
-        MachineError: a bad file, key or value.
-    """
+    """The machine of ``-m`` with the values of ``--set``."""
     from shapegcode.errors import MachineError, Problem
     from shapegcode.machine import Machine
 
@@ -116,18 +112,19 @@ def _toml_value(text: str) -> Any:
     # A bare word is a string: quotes would have to be escaped from the shell.
     import tomllib
 
+    from shapegcode.errors import MachineError, Problem
+    from shapegcode.io.data_file import toml_tables
+
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return toml_tables(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text
+    except ValueError as error:
+        raise MachineError("--set", (Problem("", "", str(error)),)) from None
 
 
 def output_file(name: str) -> Path:
-    """The file of ``-o``.
-
-    Raises:
-        ArgumentError: it is standard output or a folder.
-    """
+    """The file of ``-o``."""
     from shapegcode._core import ArgumentError
 
     if name == "-":
@@ -139,11 +136,7 @@ def output_file(name: str) -> Path:
 
 
 def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
-    """Refuse to write a file that is read, or written otherwise, in the same run.
-
-    Raises:
-        ArgumentError: a target is one of the others.
-    """
+    """Refuse to write a file that is read, or written otherwise, in the same run."""
     from shapegcode._core import ArgumentError
 
     others = list(others)

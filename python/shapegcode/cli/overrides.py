@@ -27,12 +27,7 @@ _MOST_CHOICES_SHOWN = 4
 
 
 def add_override_arguments(parser: argparse.ArgumentParser, keys: Mapping[str, str]) -> None:
-    """Declare an option for each key, without a default: what is not typed is the machine's own.
-
-    Args:
-        parser: of the command.
-        keys: dotted key of the machine file by option: ``{"--part-mass": "shaping.part_mass_kg"}``.
-    """
+    """Declare an option for each key, without a default: what is not typed is the machine's own."""
     for option, key in keys.items():
         meaning, unit, kind = _facts(key)
         said: dict[str, Any] = {"default": None}
@@ -53,30 +48,14 @@ def add_override_arguments(parser: argparse.ArgumentParser, keys: Mapping[str, s
 
 
 def overridden(machine: Machine, args: argparse.Namespace, keys: Mapping[str, str]) -> Machine:
-    """The machine with the values that were typed.
-
-    Args:
-        machine: of ``-m`` and ``--set``.
-        args: of the command.
-        keys: what `add_override_arguments` declared.
-
-    Returns:
-        The machine itself where nothing was typed.
-
-    Raises:
-        MachineError: a value that a machine file could not have.
-    """
+    """The machine with the values that were typed."""
     typed = {key: getattr(args, option.removeprefix("--").replace("-", "_")) for option, key in keys.items()}
     stated = {key: value for key, value in typed.items() if value is not None}
     return machine.with_values(stated, source="options") if stated else machine
 
 
 def _facts(key: str) -> tuple[str, str, Any]:
-    """Meaning, unit and type of a key of the machine file.
-
-    Raises:
-        KeyError: there is no such key.
-    """
+    """Meaning, unit and type of a key of the machine file."""
     from shapegcode.machine import Machine
     from shapegcode.settings.keys import facts, table_type
 

@@ -22,15 +22,7 @@ _WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement
 
 
 def changes(made: Made, folder: Path) -> tuple[dict[tuple[str, str], Path], list[str]]:
-    """Look for the files of a run where they were, and in a folder.
-
-    Args:
-        made: of what the result was made.
-        folder: where else to look.
-
-    Returns:
-        Where each is that is as it was, by role and name; and what is not as it was, in words.
-    """
+    """Look for the files of a run where they were, and in a folder."""
     found: dict[tuple[str, str], Path] = {}
     problems = []
     for file in made.files:
@@ -72,16 +64,7 @@ def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
 def played_again(
     made: Made, found: Mapping[tuple[str, str], Path], report: Mapping[str, Any]
 ) -> tuple[PlayedPrograms | None, str]:
-    """Read the programs and the machine of a run again, with the options that it was run with.
-
-    Args:
-        made: of what the result was made.
-        found: where its files are.
-        report: the JSON of the result.
-
-    Returns:
-        What a page can play; None where there is no motion to show. And why not, if there should be.
-    """
+    """Read the programs and the machine of a run again, with the options that it was run with."""
     from shapegcode._core import ShapegcodeError
 
     if made.result not in _WITH_MOTION or not made.command or "program_address" in report:

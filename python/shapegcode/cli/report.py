@@ -34,12 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Make the pages.
-
-    Raises:
-        ArgumentError: no JSON of a result, or a bad file name.
-        OSError: a file cannot be read or written.
-    """
+    """Make the pages."""
     from shapegcode._core import ArgumentError
     from shapegcode.cli import runner
     from shapegcode.cli.options import refuse_same_file

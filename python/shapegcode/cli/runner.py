@@ -37,16 +37,7 @@ _NEVER_PIPED = {"npz": "an archive", "html": "a page"}
 def check_files(
     args: argparse.Namespace, *, also_written: Sequence[str | Path] = (), also_read: Sequence[str | Path] = ()
 ) -> None:
-    """Refuse to write a file that the same run reads, or writes twice; only one of them can have standard output.
-
-    Args:
-        args: of the command; of its options those are looked at whose names say that they are files.
-        also_written: files that no option names, such as the one of a program out of tolerance.
-        also_read: the same, such as those that a folder or another file leads to.
-
-    Raises:
-        ArgumentError: names both files.
-    """
+    """Refuse to write a file that the same run reads, or writes twice; only one of them can have standard output."""
     from shapegcode._core import ArgumentError
     from shapegcode.cli.options import refuse_same_file
 
@@ -71,15 +62,7 @@ def standard_output(args: argparse.Namespace) -> str | None:
 
 @contextlib.contextmanager
 def progress(description: str, args: argparse.Namespace) -> Iterator[terminal.ProgressBar]:
-    """A bar on standard error for the block, if that is a terminal and the work takes longer than a second.
-
-    Args:
-        description: what is being done.
-        args: of the command.
-
-    Returns:
-        The bar, within the block; as long as it is not updated it shows that work goes on.
-    """
+    """A bar on standard error for the block, if that is a terminal and the work takes longer than a second."""
     with terminal.progress(description, standard_output(args)) as bar:
         yield bar
 
@@ -138,23 +121,7 @@ def finish(
     wrote: Sequence[str | Path] = (),
     output: tuple[str | Path, bytes | memoryview] | None = None,
 ) -> int:
-    """Write --json, --html, --plots and the program, and say it: answer, tables, warnings, notes, files, next step.
-
-    Args:
-        result: what was found.
-        args: of the command; `json`, `html` and `plots` are looked at where they are there.
-        tables: to show; None: those of the result.
-        warnings: to show; None: those of the result.
-        notes: further lines, below the warnings.
-        wrote: files that the command has written already.
-        output: name and content of a program to write; "-" is standard output.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        OSError: a file cannot be written.
-    """
+    """Write --json, --html, --plots and the program, and say it: answer, tables, warnings, notes, files, next step."""
     report = result.to_json()
     plots = getattr(args, "plots", None)
     pictures: list[str] = []

@@ -68,12 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Ask, and write the machine file.
-
-    Raises:
-        AnswersError, MachineError, ArgumentError: a bad answer; the machine file exists; no terminal to ask at.
-        OSError: a file cannot be read or written.
-    """
+    """Ask, and write the machine file."""
     from shapegcode.cli import runner
     from shapegcode.errors import ArgumentError
     from shapegcode.io.atomic import write_text
@@ -99,14 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def ask_all() -> Answers:
-    """Ask every question that the answers before it leave open; `<` goes back to the one before.
-
-    Returns:
-        The answers; what is not known is left out.
-
-    Raises:
-        KeyboardInterrupt: the user gave up.
-    """
+    """Ask every question that the answers before it leave open; `<` goes back to the one before."""
     from shapegcode.setup.answers import EXPLAINED, Answers, read_answers
 
     given: dict[str, Any] = {}
@@ -210,11 +198,7 @@ def _choices(annotation: Any) -> list[str]:
 
 
 def _parsed(name: str, typed: str) -> Any:
-    """A text, a number, or one number for each axis; a unit may stand behind.
-
-    Raises:
-        ValueError: it is none.
-    """
+    """A text, a number, or one number for each axis; a unit may stand behind."""
     text = typed.strip()
     if not text:
         return None

@@ -24,18 +24,7 @@ _TABLES = ("csv", "npz", "html")
 
 
 def run_all(args: argparse.Namespace) -> int:
-    """Run a command for every program of its file that no other one calls.
-
-    Args:
-        args: of the command, with ``--program all``.
-
-    Returns:
-        The worst exit code of all runs.
-
-    Raises:
-        ProgramError, MachineError, ArgumentError: bad input: of the command, or of the file as a whole.
-        OSError: a file cannot be read or written.
-    """
+    """Run a command for every program of its file that no other one calls."""
     from shapegcode._core import ArgumentError, ProgramError
     from shapegcode.cli.options import load_machine
     from shapegcode.cli.runner import check_files

@@ -86,13 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compare shapers.
-
-    Raises:
-        ArgumentError, MachineError: bad input.
-        DesignError: a mode cannot be cancelled on the grid, or no family has a design.
-        OSError: a file cannot be read or written.
-    """
+    """Compare shapers."""
     from shapegcode._core import ArgumentError
     from shapegcode.cli import runner
     from shapegcode.cli.console import output_console

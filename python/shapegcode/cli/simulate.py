@@ -68,13 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Play one program.
-
-    Raises:
-        ProgramError, MachineError, ArgumentError: bad input.
-        NumericError: the integrator of a feed drive fails.
-        OSError: a file cannot be read or written.
-    """
+    """Play one program."""
     from dataclasses import replace
 
     from shapegcode.cli import runner

@@ -23,12 +23,7 @@ def add_study_arguments(parser: argparse.ArgumentParser, what: str, draws: str) 
 
 
 def load(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
-    """The file and the machine; the program and the machine then stand among what the command reads.
-
-    Raises:
-        StudyFileError, MachineError, ArgumentError: bad input.
-        OSError: a file cannot be read.
-    """
+    """The file and the machine; the program and the machine then stand among what the command reads."""
     from shapegcode.cli import runner
     from shapegcode.errors import ArgumentError
     from shapegcode.studies.study_file import load_study
@@ -67,12 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the study.
-
-    Raises:
-        StudyFileError, MachineError, ProgramError, ArgumentError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Run the study."""
     from shapegcode.batching.batch import Cluster
     from shapegcode.cli import runner
     from shapegcode.io.atomic import write_lines

@@ -122,12 +122,7 @@ def _add_fit(actions: Any) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write a test cut, or fit; see the module.
-
-    Raises:
-        ArgumentError, MachineError, ToolError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Write a test cut, or fit; see the module."""
     return int(args.act(args))
 
 
@@ -211,18 +206,12 @@ def _records(texts: list[str]) -> dict[int, str]:
 
 
 def _refuse_whole_tool_file(name: str) -> None:
-    """Refuse to write the table [cutting] over a file that holds more than that.
-
-    Raises:
-        ArgumentError: it does.
-    """
-    import tomllib
-    from pathlib import Path
-
+    """Refuse to write the table [cutting] over a file that holds more than that."""
     from shapegcode.errors import ArgumentError
+    from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file, toml_tables
 
     try:
-        more = sorted(set(tomllib.loads(Path(name).read_text(encoding="utf-8"))) - {"cutting"})
+        more = sorted(set(toml_tables(read_file(name, MAX_SETTINGS_BYTES).decode())) - {"cutting"})
     except (OSError, ValueError):  # not there, or nothing of ours
         return
     if more:

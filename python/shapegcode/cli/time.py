@@ -44,12 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Time one program.
-
-    Raises:
-        ProgramError, MachineError, ArgumentError: bad input.
-        OSError: a file cannot be read or written.
-    """
+    """Time one program."""
     from shapegcode.cli import runner
     from shapegcode.io.atomic import write_lines
     from shapegcode.model.shaped_program import shaped_note

@@ -17,17 +17,7 @@ _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
 
 def program_number(text: str) -> int:
-    """An O number with or without its letter.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The number.
-
-    Raises:
-        ArgumentTypeError: no number from 1 to 99999999.
-    """
+    """An O number with or without its letter."""
     match = re.fullmatch(r"[Oo]?0*([1-9][0-9]{0,7})", text)
     if match is None:
         raise argparse.ArgumentTypeError(f"{text!r}: must be a program number, O1 ... O99999999")
@@ -35,17 +25,7 @@ def program_number(text: str) -> int:
 
 
 def program_choice(text: str) -> int | str:
-    """Which program of a file: its O number, an address, or all of them.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The number; else the text: ``all``, ``/FOLDER/O12``, ``<NAME>`` or ``#3``.
-
-    Raises:
-        ArgumentTypeError: none of these.
-    """
+    """Which program of a file: its O number, an address, or all of them."""
     if text == "all" or re.fullmatch(r"#[1-9][0-9]{0,8}|(.*/)?<[^<>]+>|.*/[Oo]?[0-9]{1,8}", text):
         return text
     try:
@@ -57,17 +37,7 @@ def program_choice(text: str) -> int | str:
 
 
 def axes(text: str) -> str:
-    """Axes such as ``XZ``, ``x,z`` or ``"x z"``.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        Their letters, small, each once, in the order x, y, z.
-
-    Raises:
-        ArgumentTypeError: something else than X, Y, Z.
-    """
+    """Axes such as ``XZ``, ``x,z`` or ``"x z"``."""
     letters = set(re.sub(r"[\s,]+", "", text.lower()))
     if not letters or letters - set("xyz"):
         raise argparse.ArgumentTypeError(f"{text!r}: must be axes, for example X or XZ")
@@ -75,17 +45,7 @@ def axes(text: str) -> str:
 
 
 def line_range(text: str) -> tuple[int, int]:
-    """Lines such as ``120-180`` or ``120``, first and last, from 1.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        First and last line.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """Lines such as ``120-180`` or ``120``, first and last, from 1."""
     match = re.fullmatch(r"0*([1-9][0-9]{0,9})(?:-0*([1-9][0-9]{0,9}))?", text)
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
     if first > last:
@@ -94,32 +54,12 @@ def line_range(text: str) -> tuple[int, int]:
 
 
 def line_ranges(text: str) -> tuple[tuple[int, int], ...]:
-    """Ranges of lines such as ``12-80,95-240``.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        First and last line of each.
-
-    Raises:
-        ArgumentTypeError: one of them is no range of lines.
-    """
+    """Ranges of lines such as ``12-80,95-240``."""
     return tuple(line_range(part.strip()) for part in text.split(","))
 
 
 def count(text: str) -> int:
-    """A whole number, 1 or more.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The number.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A whole number, 1 or more."""
     match = re.fullmatch(r"0*([1-9][0-9]{0,11})", text)
     if match is None:
         raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 1 or more")
@@ -127,17 +67,7 @@ def count(text: str) -> int:
 
 
 def ratio(text: str) -> float:
-    """A share such as ``60%`` or ``0.6``, above 0 and at most 1.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The share, 0.6 for ``60%``.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A share such as ``60%`` or ``0.6``, above 0 and at most 1."""
     value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 < value <= 1.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most 100%")
@@ -145,17 +75,7 @@ def ratio(text: str) -> float:
 
 
 def share(text: str) -> float:
-    """A share such as ``3%`` or ``0.03``, at least 0 and below 1.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The share, 0.03 for ``3%``.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A share such as ``3%`` or ``0.03``, at least 0 and below 1."""
     value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 <= value < 1.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be at least 0 and below 100%")
@@ -163,17 +83,7 @@ def share(text: str) -> float:
 
 
 def override(text: str) -> float:
-    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes).
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The override, 0.8 for ``80%``.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
     value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 < value <= _LARGEST_OVERRIDE:
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most {_LARGEST_OVERRIDE:.0%}")
@@ -181,17 +91,7 @@ def override(text: str) -> float:
 
 
 def seconds(text: str) -> float:
-    """A time with its unit, such as ``5ms`` or ``0.005s``.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The time in s.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A time with its unit, such as ``5ms`` or ``0.005s``."""
     return _with_unit(text, "time", _TIME_UNITS, "5ms")
 
 
@@ -201,17 +101,7 @@ def start_time(text: str) -> float:
 
 
 def frequency_band(text: str) -> tuple[float, float]:
-    """Two frequencies in Hz such as ``20:400``, ascending.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        Lowest and highest, in Hz.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """Two frequencies in Hz such as ``20:400``, ascending."""
     low, _, high = text.partition(":")
     try:
         band = float(low), float(high)
@@ -223,17 +113,7 @@ def frequency_band(text: str) -> tuple[float, float]:
 
 
 def micrometres(text: str) -> float:
-    """A length with its unit, such as ``5um`` or ``0.005mm``, in µm.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The length in µm.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A length with its unit, such as ``5um`` or ``0.005mm``, in µm."""
     return _with_unit(text, "length", _LENGTH_UNITS, "5um")
 
 
@@ -253,17 +133,7 @@ def _with_unit(text: str, what: str, units: Mapping[str, float], example: str) -
 
 
 def size(text: str) -> int:
-    """A number of bytes such as ``262144``, ``256k``, ``1M`` or ``2G`` (1024 bytes, 1024 k, 1024 M), above 0.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The number of bytes.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A number of bytes such as ``262144``, ``256k``, ``1M`` or ``2G`` (1024 bytes, 1024 k, 1024 M), above 0."""
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([kMG]?)", text)
     value = math.floor(float(match[1]) * _SIZE_UNITS[match[2]]) if match else 0
     if value < 1:
@@ -272,17 +142,7 @@ def size(text: str) -> int:
 
 
 def positive(text: str) -> float:
-    """A number above 0.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The number.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A number above 0."""
     value = number(text)
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0")
@@ -290,17 +150,7 @@ def positive(text: str) -> float:
 
 
 def nonzero(text: str) -> float:
-    """A number other than 0.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The number.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A number other than 0."""
     value = number(text)
     if not math.isfinite(value) or value == 0.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be a number other than 0")
@@ -308,17 +158,7 @@ def nonzero(text: str) -> float:
 
 
 def number(text: str) -> float:
-    """A number.
-
-    Args:
-        text: as it is typed.
-
-    Returns:
-        The number.
-
-    Raises:
-        ArgumentTypeError: the text is none.
-    """
+    """A number."""
     try:
         return float(text)
     except ValueError:

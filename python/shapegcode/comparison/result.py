@@ -70,7 +70,7 @@ class ProgramDifference:
         return f"line {self.emitted_line} of the other program"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Comparison(Result):
     """What differs between two programs.
 

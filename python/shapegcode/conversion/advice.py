@@ -54,18 +54,7 @@ def filter_advice(
     judge: Judge,
     originals: Sequence[_core.PlaybackFigures],
 ) -> FilterAdvice | None:
-    """Whether a smaller filter of the control would do instead of shaping.
-
-    Args:
-        program: the original.
-        machine: its file says which filter acts.
-        model: of the machine.
-        judge: says what the contour tolerance is about.
-        originals: the cuts, simulated.
-
-    Returns:
-        The advice; None: the contour is within its limit, vibration is the cause, or a smaller filter is no cure.
-    """
+    """Whether a smaller filter of the control would do instead of shaping."""
     limit_um, floor_um = machine.tolerance.contour_um, machine.tolerance.residual_floor_um
     errors = [(getattr(run, judge.target).max_abs_mm * 1e3, run.command.max_abs_mm * 1e3) for run in originals]
     if not any(error > limit_um for error, _ in errors):

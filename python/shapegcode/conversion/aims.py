@@ -121,16 +121,7 @@ class Aims:
         return tightened
 
     def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], attempts_left: int) -> bool:
-        """Loosen cuts that take longer than the price of one cut; leave unchanged what costs more in any case.
-
-        Args:
-            written: what was shaped.
-            keepable: whether a cut may be left unchanged, by its index.
-            attempts_left: in the last but one nothing is slowed, in the last what costs more is left unchanged.
-
-        Returns:
-            False: every cut was within the price.
-        """
+        """Loosen cuts that take longer than the price of one cut; leave unchanged what costs more in any case."""
         percent = self._machine.price.cut_time_percent
         changed = False
         for place in written.placed:
@@ -156,16 +147,7 @@ class Aims:
     def keep_program_price(
         self, excess_s: float, gains_um: Mapping[int, float], keepable: Callable[[int], bool]
     ) -> bool:
-        """Loosen cuts, all to one tolerance, until the program is within its price; then leave cuts unchanged.
-
-        Args:
-            excess_s: time above what the price allows.
-            gains_um: of each shaped cut.
-            keepable: whether a cut may be left unchanged, by its index.
-
-        Returns:
-            False: nothing can be done.
-        """
+        """Loosen cuts, all to one tolerance, until the program is within its price; then leave cuts unchanged."""
         cuts = [index for index in gains_um if not self.reasons[index]]
         wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
 
@@ -214,15 +196,7 @@ class Aims:
         return min(self._asked_s[index], self._planned_s(index, tolerance_um * MARGIN))
 
     def tolerance_curve(self, original_s: float, original_um: float) -> ToleranceCurve | None:
-        """Tolerance against time of the program.
-
-        Args:
-            original_s: time of the original program.
-            original_um: its contour error.
-
-        Returns:
-            The curve of the cuts that were shaped once, whether they still are or not; None: there are none.
-        """
+        """Tolerance against time of the program."""
         cuts = list(self.emitted_s)
         if not cuts:
             return None

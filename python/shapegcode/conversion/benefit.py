@@ -21,25 +21,11 @@ def _figures_um(played: _core.PlaybackFigures) -> tuple[float, float]:
 
 
 def most_to_gain_um(original: _core.PlaybackFigures) -> float:
-    """The most that shaping can gain: what is there.
-
-    Args:
-        original: the region as programmed, played.
-
-    Returns:
-        The larger of residual vibration and contour error of the machine table, µm.
-    """
+    """The most that shaping can gain: what is there."""
     return max(_figures_um(original))
 
 
 def gain_um(figures: RegionFigures) -> float:
-    """What shaping gained: the larger fall of the two figures, the emitted one in the worse rule.
-
-    Args:
-        figures: the region as programmed and as emitted.
-
-    Returns:
-        In µm; 0 where nothing became better.
-    """
+    """What shaping gained: the larger fall of the two figures, the emitted one in the worse rule."""
     after = np.max([_figures_um(run) for run in figures.emitted], axis=0)
     return max(0.0, float(np.max(np.asarray(_figures_um(figures.original)) - after)))

@@ -151,17 +151,7 @@ class BudgetOutcome:
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
-    """The load of a shaped region; a stretch lasts as long as the shaper: no transition is shorter.
-
-    Args:
-        region: of the original.
-        shaped: its replacement.
-        grid: on which it is written.
-        bits_per_character: on the serial line.
-
-    Returns:
-        Bytes, bit/s and blocks/s that it asks for.
-    """
+    """The load of a shaped region; a stretch lasts as long as the shaper: no transition is shorter."""
     durations = np.empty(shaped.blocks)
     np.concatenate(shaped.block_periods, out=durations, casting="same_kind")
     durations *= grid.block_period_s

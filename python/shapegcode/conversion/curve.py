@@ -99,18 +99,7 @@ class ToleranceCurve:
 def plan_curve(
     path: _core.Path, fir: _core.Fir, options: _core.ShapingOptions, asked_um: float, original_um: float
 ) -> CutCurve:
-    """Plan a cut at several tolerances, from no slowing to what was asked; each search starts from the last speeds.
-
-    Args:
-        path: of the cut.
-        fir: the shaper.
-        options: how it is shaped.
-        asked_um: deviation that is planned for the tolerance as asked.
-        original_um: contour error of the original, planned for too.
-
-    Returns:
-        Its time at each.
-    """
+    """Plan a cut at several tolerances, from no slowing to what was asked; each search starts from the last speeds."""
     wanted = sorted(
         {*(factor * asked_um for factor in (*FACTORS, *_BETWEEN)), max(original_um, asked_um)}, reverse=True
     )
@@ -150,11 +139,7 @@ class CutCurves:
         self._feed_ratio: dict[int, float] = {}
 
     def note(self, written: Written) -> None:
-        """Remember cuts that the tolerance does not slow: nothing needs to be planned for them.
-
-        Args:
-            written: what was shaped.
-        """
+        """Remember cuts that the tolerance does not slow: nothing needs to be planned for them."""
         grid = self._writer().grid
         for index in written.unslowed:
             known = self._known.get(index)
@@ -165,14 +150,7 @@ class CutCurves:
                 )
 
     def of(self, index: int) -> CutCurve:
-        """The curve of a cut.
-
-        Args:
-            index: of the cut.
-
-        Returns:
-            Its time over the deviation that it is planned for.
-        """
+        """The curve of a cut."""
         writer = self._writer()
         known = self._known.get(index)
         if known is not None and known[0] is writer.grid:
@@ -187,15 +165,7 @@ class CutCurves:
 
 
 def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | None:
-    """Rank of the point that lies furthest below the line from first to last, over logarithms.
-
-    Args:
-        tolerances_um: ascending.
-        times_s: of each.
-
-    Returns:
-        The rank; None: time hardly depends on the tolerance. Source: Satopaa et al. 2011, "Kneedle".
-    """
+    """Rank of the point that lies furthest below the line from first to last, over logarithms."""
     if len(times_s) < 3 or times_s[0] <= times_s[-1] * (1.0 + _FLAT):
         return None
     x, y = np.log(tolerances_um), np.log(times_s)
@@ -207,14 +177,7 @@ def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | N
 
 
 def curve_table(curve: ToleranceCurve) -> Table:
-    """The curve as a table.
-
-    Args:
-        curve: of a program.
-
-    Returns:
-        A row for each tolerance.
-    """
+    """The curve as a table."""
     columns = (
         Column("contour tolerance", value="name", text=True),
         Column("µm", value="tolerance_um", digits=1),

@@ -70,20 +70,7 @@ def outcome_of(
     tool: int | None,
     size: Pair[int],
 ) -> CutOutcome:
-    """A row of the table.
-
-    Args:
-        cut: as it was judged.
-        is_shaped: it is.
-        reason: why it was left unchanged.
-        gain_um: what shaping gains or would gain.
-        tolerance_um: for which it was shaped.
-        tool: that cuts.
-        size: bytes of its text.
-
-    Returns:
-        The row.
-    """
+    """A row of the table."""
     residual = cut.residual_vibration_um
     return CutOutcome(
         lines=cut.lines,
@@ -116,15 +103,7 @@ def _cure(reason: str) -> str:
 
 
 def cut_table(cuts: Sequence[CutOutcome], *, every: bool = False) -> Table:
-    """The cuts: those first that miss a limit, then those with the largest gain.
-
-    Args:
-        cuts: of a conversion.
-        every: all of them, in the order of the program.
-
-    Returns:
-        The table.
-    """
+    """The cuts: those first that miss a limit, then those with the largest gain."""
     ranked = sorted(cuts, key=lambda cut: (not cut.misses, -cut.gain_um))
     shown = list(cuts) if every else sorted(ranked[:_SHOWN], key=lambda cut: cut.lines)
     columns = (
@@ -158,19 +137,7 @@ def _sizes(pair: Pair[int]) -> str:
 
 
 def chosen_cuts(program: Program, only: Sequence[Lines] | None, leave: Sequence[Lines]) -> dict[int, str]:
-    """Cuts that are not to be shaped because their lines were not chosen.
-
-    Args:
-        program: the original.
-        only: shape nothing but the cuts in these lines; None: every cut.
-        leave: leave the cuts in these lines unchanged.
-
-    Returns:
-        Why, by the index of each cut.
-
-    Raises:
-        ArgumentError: lines that the program does not have, or in which it has no cut.
-    """
+    """Cuts that are not to be shaped because their lines were not chosen."""
     last = program.core.line_count
     spans = [(region.first_line, region.last_line) for region in program.regions]
     for option, ranges in (("--only", only or ()), ("--leave", leave)):
@@ -205,14 +172,7 @@ def _overlap(one: Lines, other: Lines) -> bool:
 
 
 def tools_of_cuts(program: Program) -> Mapping[int, int]:
-    """T number in the spindle while each cut runs.
-
-    Args:
-        program: the original.
-
-    Returns:
-        By the index of the cut; none where the program names no tool before it.
-    """
+    """T number in the spindle while each cut runs."""
     functions = program.core.functions
     changes = any(_TOOL_CHANGE in codes for codes, _, _ in functions)  # else T alone changes the tool
     found: dict[int, int] = {}

@@ -16,19 +16,7 @@ __all__ = ["open_axes"]
 
 
 def open_axes(program: Program | str | Path, machine: Machine) -> tuple[RestsOn, ...]:
-    """Axes that may have a mode or not, by how much a usual mode would swing behind the program as it is.
-
-    Args:
-        program: what to play, or its file.
-        machine: without any mode.
-
-    Returns:
-        The axes, that which would swing most first; the limit is `tolerance.residual_floor_um`.
-
-    Raises:
-        ProgramError: the program cannot be read.
-        OSError: its file cannot be read.
-    """
+    """Axes that may have a mode or not, by how much a usual mode would swing behind the program as it is."""
     unknown = unknown_axes(machine)
     assumed = {
         key: value

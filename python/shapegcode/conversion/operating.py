@@ -56,20 +56,7 @@ def at_the_control(
     block_period_s: float,
     restarts: Sequence[CutRestarts],
 ) -> tuple[ControlNote, ...]:
-    """What to heed with an emitted program.
-
-    Args:
-        emitted: the program.
-        placed: its shaped regions; none: nothing to heed.
-        loads: what regions ask of line and control.
-        figures: as played.
-        model: of the machine that shall run it.
-        block_period_s: of the shaped blocks.
-        restarts: restart points of each shaped region.
-
-    Returns:
-        The notes, in the order in which one meets them.
-    """
+    """What to heed with an emitted program."""
     if not placed:
         return ()
     machine = model.machine
@@ -88,14 +75,7 @@ def at_the_control(
 
 
 def control_table(notes: Sequence[ControlNote]) -> Table:
-    """The notes as a table.
-
-    Args:
-        notes: caution, before you run.
-
-    Returns:
-        One row for each.
-    """
+    """The notes as a table."""
     columns = (
         Column("at the control", value="topic", text=True),
         Column("caution, before you run", value="text", text=True),
@@ -104,14 +84,7 @@ def control_table(notes: Sequence[ControlNote]) -> Table:
 
 
 def restart_table(points: Sequence[RestartPoint]) -> Table:
-    """Restart points inside of cuts, with what must be in force before the start.
-
-    Args:
-        points: of the program.
-
-    Returns:
-        One row for each; of many those that come first.
-    """
+    """Restart points inside of cuts, with what must be in force before the start."""
     columns = (
         Column("restart", value=lambda point: f"N{point.number}", left=True, priority=0),
         Column("line", value="line", priority=0),

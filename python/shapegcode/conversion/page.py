@@ -48,15 +48,7 @@ _RUN_FIRST = ("first run",)
 
 
 def light_of(conversion: Conversion) -> tuple[Light, str]:
-    """Colour of the traffic light, and the reason.
-
-    Args:
-        conversion: what was made.
-
-    Returns:
-        Red where nobody should run it; amber where a limit is missed, a warning is open, or an unverified parameter
-        could turn the verdict; calm where nothing was shaped; else green.
-    """
+    """Colour of the traffic light, and the reason."""
     if not conversion.is_written_as_output:
         return "red", conversion.reason
     if not conversion.within_tolerance:
@@ -72,15 +64,7 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
 
 
 def sections_of(conversion: Conversion, made: Made | None = None) -> tuple[Section, ...]:
-    """What stands on the page.
-
-    Args:
-        conversion: what was made.
-        made: of what; None: it is not known.
-
-    Returns:
-        The sections, in their order.
-    """
+    """What stands on the page."""
     return tuple(_sections(conversion, made))
 
 

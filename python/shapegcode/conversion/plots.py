@@ -18,15 +18,8 @@ __all__ = ["plot_tolerance", "plots_of"]
 
 
 def plots_of(conversion: Conversion) -> dict[str, Plot]:
-    """Path, feed and vibration of the region that vibrates most after its stop, before and after.
-
-    Args:
-        conversion: its region is played again when the first picture is drawn.
-
-    Returns:
-        By name; none for a program without shaped regions.
-    """
-    found = motion_pictures(partial(_played, conversion)) if conversion.placed else {}
+    """Path, feed and vibration of the region that vibrates most after its stop, before and after."""
+    found = motion_pictures(partial(_played, conversion)) if conversion.regions else {}
     if conversion.tolerance_curve is not None and len(conversion.tolerance_curve.points) > 1:
         found["tolerance"] = partial(plot_tolerance, conversion.tolerance_curve)
     return found

@@ -36,15 +36,6 @@ def prove(original: Program, emitted: Program, machine: Machine, *, rapids_shape
 
     What shaping changes is allowed: blocks and feeds of cuts, calls that were expanded, the path within its tolerance,
     which the verdict judges.
-
-    Args:
-        original: the program.
-        emitted: what was made of it, read back.
-        machine: whose controller reads both.
-        rapids_shaped: rapids were written as cutting moves.
-
-    Returns:
-        The proof.
     """
     kinds = {"feeds", "blocks", "calls"}
     kinds |= {"shaped-rapids"} if rapids_shaped else set()

@@ -23,19 +23,7 @@ _STATE_FIELDS = (
 
 
 def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) -> Program:
-    """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps.
-
-    Args:
-        parts: of the whole emitted text; empty behind it, so that the text stands in memory once.
-        placed: its regions.
-        machine: whose controller reads it.
-
-    Returns:
-        The emitted program as it was read.
-
-    Raises:
-        RoundTripError: something differs; the message names the line and both values.
-    """
+    """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps."""
     # Half an increment: a program may carry more digits than the controller resolves.
     tolerance_mm = {units: 0.5 * least_increment_mm(machine, units) + 1e-9 for units in (20, 21)}
     probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]

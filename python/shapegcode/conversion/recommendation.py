@@ -53,14 +53,7 @@ class Situation:
 
 
 def recommend(situation: Situation) -> tuple[Grade, str]:
-    """The grade and its reason: the first that applies, from "do not run" upwards.
-
-    Args:
-        situation: of the program that was written.
-
-    Returns:
-        Both in words.
-    """
+    """The grade and its reason: the first that applies, from "do not run" upwards."""
     worse = next((_at(cut, why) for cut in situation.cuts for why in cut.worse), "")
     if worse:
         return "do not run", worse
@@ -88,14 +81,6 @@ def benefits(cut: RegionVerdict, contour_limit_um: float, least_gain_um: float) 
 
     A figure that missed its limit, or a residual vibration above the least gain, falls by the least gain and either by
     30 % or to within the limit.
-
-    Args:
-        cut: as judged.
-        contour_limit_um: of its contour error.
-        least_gain_um: `shaping.least_gain_um`.
-
-    Returns:
-        True for one figure or more.
     """
     pairs = [(cut.original_contour_error_um, cut.contour_error_um, contour_limit_um, contour_limit_um)]
     residual = cut.residual_vibration_um

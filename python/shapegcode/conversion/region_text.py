@@ -40,12 +40,7 @@ class RegionText:
         return self._parts
 
     def number(self, restarts: Sequence[RestartMark], numbers: Sequence[int]) -> None:
-        """Give restart points their N words.
-
-        Args:
-            restarts: of the region.
-            numbers: of each.
-        """
+        """Give restart points their N words."""
         if not numbers or numbers == self._numbers:
             return
         parts: list[bytes | bytearray] = list(self.parts())
@@ -63,12 +58,7 @@ class RegionText:
         self._parts = self._inside = None
 
     def stands_in(self, program: Program, begin: int) -> None:
-        """The text is part of that of a program.
-
-        Args:
-            program: which was read.
-            begin: byte at which it stands there.
-        """
+        """The text is part of that of a program."""
         self._parts, self._inside = None, (program, begin)
 
     def joined(self) -> bytes:
@@ -120,15 +110,7 @@ class Room:
     machine: Machine
 
     def require(self, text_bytes: int, blocks: int) -> None:
-        """Refuse what is more; called piece by piece, so that no more than a piece is written in vain.
-
-        Args:
-            text_bytes: written so far.
-            blocks: written so far.
-
-        Raises:
-            NoRoomError: it is more; the message says of what.
-        """
+        """Refuse what is more; called piece by piece, so that no more than a piece is written in vain."""
         controller = self.machine.controller
         if text_bytes > self.bytes:
             limit = f"{controller.max_program_bytes} bytes (controller.max_program_bytes)"

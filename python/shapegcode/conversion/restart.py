@@ -62,15 +62,7 @@ class RestartPlaces:
         """Why there can be none; empty: there can."""
 
     def low(self, piece: _core.ShapedCommand, at: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Where the command of a piece is slow, and a start from rest leaves the contour within its tolerance.
-
-        Args:
-            piece: of the region.
-            at: periods of it that may be chosen, ascending.
-
-        Returns:
-            Those of them; the amplitude that a start from rest leaves there, mm; the speed there, mm/s.
-        """
+        """Where the command of a piece is slow, and a start from rest leaves the contour within its tolerance."""
         grid = np.asarray(piece.grid_mm)
         at = at[(at > 0) & (at < len(grid) - 1)]
         before, behind = (grid[at] - grid[at - 1]) / self._period_s, (grid[at + 1] - grid[at]) / self._period_s
@@ -83,19 +75,7 @@ class RestartPlaces:
     def choose(
         self, at: IntArray, left: FloatArray, end: int, *, last: bool, usable: Callable[[int], bool]
     ) -> Iterator[int]:
-        """Points of a piece, such that no more than the interval lies between two of them where there are places.
-
-        Args:
-            at: periods of the region that are low, ascending.
-            left: amplitude that a start there leaves: what leaves little is taken in the second half of the interval,
-                else the smallest of all.
-            end: period at which the piece ends.
-            last: whether the region ends with it.
-            usable: whether a block can be written as a restart point, by its index in `at`.
-
-        Returns:
-            Indices of `at`.
-        """
+        """Points of a piece, such that no more than the interval lies between two of them where there are places."""
         near = self._interval * _APART
         if last:
             at = at[: np.searchsorted(at, end - near)]
@@ -123,16 +103,7 @@ class RestartPlaces:
         self.last = period
 
     def further_stops(self, points: Sequence[int], reached: Sequence[int], end: int) -> list[int]:
-        """Segments before which the command shall come to rest, where it is nowhere near that for too long.
-
-        Args:
-            points: periods of the points that there are.
-            reached: period at which each segment begins, from the second one on.
-            end: of the region.
-
-        Returns:
-            Indices of the segments, ascending.
-        """
+        """Segments before which the command shall come to rest, where it is nowhere near that for too long."""
         stops: list[int] = []
         begins = np.asarray(reached)
         near = self._interval * _APART
@@ -151,15 +122,7 @@ class RestartPlaces:
 
 
 def decimal(value: float, decimals: int) -> str:
-    """A number in FANUC's decimal notation: always with a point, no trailing zeros.
-
-    Args:
-        value: of a word.
-        decimals: behind the point, at most.
-
-    Returns:
-        The number.
-    """
+    """A number in FANUC's decimal notation: always with a point, no trailing zeros."""
     text = f"{value:.{decimals}f}".rstrip("0") if decimals else f"{value:.0f}."
     return "0." if text in {"-0.", "0."} else text
 
@@ -175,15 +138,7 @@ def _why_none(region: _core.Region) -> str:
 
 
 def block_lines(text: bytes, blocks: int) -> tuple[IntArray, IntArray]:
-    """Where the lines of blocks stand in a text; comment lines between them are none.
-
-    Args:
-        text: of a piece of a region.
-        blocks: how many there are.
-
-    Returns:
-        Bytes at which each begins, and behind its line feed.
-    """
+    """Where the lines of blocks stand in a text; comment lines between them are none."""
     letters = np.frombuffer(text + b"(", dtype=np.uint8)  # so that there is one behind the last line end
     ends = np.flatnonzero(letters == ord("\n")) + 1
     begins = np.concatenate([[0], ends[:-1]]).astype(np.int64)[: len(ends)]
@@ -217,18 +172,7 @@ class RegionRestarts:
     def add(
         self, text: bytes, piece: _core.ShapedCommand, fitted: _core.FittedBlocks, state: tuple[int, int], *, last: bool
     ) -> bytes:
-        """The next piece with its restart points.
-
-        Args:
-            text: of it.
-            piece: its command.
-            fitted: its blocks.
-            state: G codes of motion and plane before it.
-            last: whether it is the last one.
-
-        Returns:
-            The text: other words in the lines of the points, else the same.
-        """
+        """The next piece with its restart points."""
         firsts, ends = fitted.first_periods.astype(np.int64), fitted.ends
         at, left, speed = self._places.low(piece, firsts)
         # The last block of a region may have to stop exactly.
@@ -267,16 +211,7 @@ class RegionRestarts:
         return written
 
     def result(self, head: bytes, stops: int, stops_s: float) -> CutRestarts:
-        """What the region has of them.
-
-        Args:
-            head: what stands before its blocks.
-            stops: that were put in.
-            stops_s: what they cost.
-
-        Returns:
-            The points, counted from the begin of the region's text.
-        """
+        """What the region has of them."""
         lines = head.count(b"\n")
         marks = tuple(replace(each, byte=each.byte + len(head), line=each.line + lines) for each in self._marks)
         longest_s = self._places.longest * self._fit.block_period_s

@@ -123,17 +123,7 @@ class FreeNumbers:
         self._free: list[int] | None = None
 
     def first(self, count: int) -> list[int]:
-        """So many of them, always the same, ascending where there is room.
-
-        Args:
-            count: how many.
-
-        Returns:
-            The numbers.
-
-        Raises:
-            ProgramError: there are not so many.
-        """
+        """So many of them, always the same, ascending where there is room."""
         if self._free is None:
             self._free = self._found()
         if count > len(self._free):
@@ -158,28 +148,13 @@ class FreeNumbers:
 
 
 def system_of(state: _core.ModalState) -> str:
-    """The coordinate system in force, as it is programmed.
-
-    Args:
-        state: of the control.
-
-    Returns:
-        Such as "G54" or "G54.1P3".
-    """
+    """The coordinate system in force, as it is programmed."""
     extra = state.coordinate_system == EXTRA_SYSTEM
     return f"G54.1P{state.coordinate_number}" if extra else f"G{state.coordinate_system}"
 
 
 def restart_points(program: Program, places: Iterable[tuple[Placed, CutRestarts]]) -> tuple[RestartPoint, ...]:
-    """The restart points of a program, with what is in force at each.
-
-    Args:
-        program: the original.
-        places: of each shaped region its place in the emitted program, and its restart points.
-
-    Returns:
-        The points, in their order.
-    """
+    """The restart points of a program, with what is in force at each."""
     tools = _Tools(program)
     return tuple(
         RestartPoint(

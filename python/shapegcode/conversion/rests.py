@@ -128,19 +128,7 @@ class _Region:
 def begin_rests(
     judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
 ) -> Begun:
-    """Begin to play what `rests_on` will play with the contour, where only one region can decide.
-
-    Args:
-        judge: that judges the text.
-        machine: the trials move its values.
-        place: the region.
-        emitted: the text, read back.
-        tracker: of the programmed path.
-        pool: runs the playbacks.
-
-    Returns:
-        What `rests_on` is given.
-    """
+    """Begin to play what `rests_on` will play with the contour, where only one region can decide."""
     region = _Region(place, emitted, judge, tracker)
     trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
     return {_name(trial): pool.submit(region.play, trial, contour=True) for trial in trials}
@@ -160,22 +148,7 @@ def rests_on(
     begun: Begun,
     on_step: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> tuple[tuple[RestsOn, ...], int]:
-    """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit.
-
-    Args:
-        judge: that judged the text.
-        machine: for which it was judged.
-        played: every shaped region, its figures, and a tracker of its programmed path.
-        emitted: the text, read back.
-        deciding_lines: first and last line of the region that comes nearest to a limit.
-        pool: runs the playbacks.
-        begun: what is being played already: see `begin_rests`.
-        on_step: called with playbacks done and playbacks in all.
-
-    Returns:
-        At most eight values, none that moves a figure by less than a hundredth of its limit, but for axes that may
-        have a mode or not; and how many were tried.
-    """
+    """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit."""
     regions = [(_Region(place, emitted, judge, tracker), figures) for place, figures, tracker in played]
     deciding, decided = next(pair for pair in regions if pair[0].place.original_lines == deciding_lines)
     moving = deciding.moving
@@ -262,14 +235,7 @@ class UnknownAxis:
 
 
 def unknown_axes(machine: Machine) -> dict[str, UnknownAxis]:
-    """Axes of which nobody knows whether they have a mode, each with a usual one.
-
-    Args:
-        machine: any.
-
-    Returns:
-        By letter.
-    """
+    """Axes of which nobody knows whether they have a mode, each with a usual one."""
     values = {value.key: value for value in machine.values()}
     return {
         letter: UnknownAxis(

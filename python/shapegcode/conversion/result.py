@@ -43,7 +43,7 @@ _LEAST_SHOWN_UM = 0.05
 _DEVIATIONS = {"max": "largest", "rms": "RMS", "gouge": "gouge", "excess": "excess"}
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class Conversion(PlayedFigures, Result):
     """A program, shaped: the emitted program, and what simulating it beside the original showed.
 
@@ -112,6 +112,9 @@ class Conversion(PlayedFigures, Result):
     placed: tuple[Placed, ...] = field(metadata=hidden())
     model: MachineModel = field(metadata=hidden())
     played: PlayedPrograms | None = field(default=None, compare=False, metadata=hidden())
+
+    __eq__ = Result.__eq__
+    __hash__ = Result.__hash__
 
     @property
     def text(self) -> bytes:

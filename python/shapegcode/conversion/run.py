@@ -262,14 +262,7 @@ class Run:
         return self.model.cycle_time_s(settled.emitted.core) - original_s - price_s
 
     def is_benefit(self, settled: Settled) -> bool:
-        """Whether a shaped cut gains enough, see `benefits`.
-
-        Args:
-            settled: the program.
-
-        Returns:
-            True for one cut or more.
-        """
+        """Whether a shaped cut gains enough, see `benefits`."""
         least, limit_um = self.machine.shaping.least_gain_um, self.machine.tolerance.contour_um
         return any(benefits(verdict, limit_um, least) for verdict in self._verdicts(settled))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from shapegcode.conversion.plots import plots_of
 from shapegcode.conversion.result import Conversion
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.results.result import Plot
@@ -14,7 +13,7 @@ from shapegcode.results.table import Table
 __all__ = ["ScheduledConversion"]
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class ScheduledConversion(Conversion):
     """A program with scheduled feeds, shaped; `original` is the program with these feeds, not yet shaped.
 
@@ -47,4 +46,4 @@ class ScheduledConversion(Conversion):
 
     def plots(self) -> Mapping[str, Plot]:
         """Those of the conversion and those of the schedule."""
-        return {**plots_of(self), **self.feed_schedule.plots()}
+        return {**super().plots(), **self.feed_schedule.plots()}

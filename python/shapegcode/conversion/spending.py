@@ -79,17 +79,7 @@ class Spending:
         design: Callable[[float], Grid],
         write: Callable[[Grid], WrittenText],
     ) -> Grid:
-        """The block period on which the most that is worth shaping is not too fast; of equals the shortest shaper.
-
-        Args:
-            grid: what is used without a budget.
-            residuals_mm: residual vibration of each of the original's regions: what shaping it is worth.
-            design: grid of a block period.
-            write: writes all regions on a grid.
-
-        Returns:
-            The grid of that period.
-        """
+        """The block period on which the most that is worth shaping is not too fast; of equals the shortest shaper."""
         weights = [residual * 1e3 / unit for unit, residual in zip(self._unit_um, residuals_mm, strict=True)]
         written = write(grid)
         loads = written.loads
@@ -119,19 +109,7 @@ class Spending:
         return best
 
     def give_up(self, grid: Grid, written: WrittenText, verdicts: Sequence[RegionVerdict]) -> bool:
-        """Choose regions that must keep their text; False if the text fits.
-
-        Args:
-            grid: on which the text is written.
-            written: the whole text with its loads.
-            verdicts: of the shaped regions.
-
-        Returns:
-            Whether any was given up.
-
-        Raises:
-            ArgumentError: no choice fits; with value and limit.
-        """
+        """Choose regions that must keep their text; False if the text fits."""
         self._before = self._before or _needs(grid, written)
         loads = written.loads
         played = dict(zip(loads, verdicts, strict=True))

@@ -70,29 +70,14 @@ _BEFORE_AFTER = (
 
 
 def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
-    """Original against emitted, in groups of figures.
-
-    Args:
-        groups: from top to bottom; a line stands between them.
-
-    Returns:
-        The table.
-    """
+    """Original against emitted, in groups of figures."""
     filled = [group for group in groups if group]
     sections = [sum(len(group) for group in filled[:rank]) for rank in range(1, len(filled))]
     return Table("", _BEFORE_AFTER, [row for group in filled for row in group], sections=sections)
 
 
 def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
-    """The values that nobody measured on this machine and that the verdict rests on.
-
-    Args:
-        rows: those that move it furthest first.
-        tried: how many values were moved.
-
-    Returns:
-        The table.
-    """
+    """The values that nobody measured on this machine and that the verdict rests on."""
     columns = (
         Column("key", left=True),
         Column("assumed → tested", value=_moved, text=True),

@@ -22,15 +22,7 @@ _WORSE_RATIO, _WORSE_UM = 1.2, 5.0
 
 
 def open_axes(program: Program, machine: Machine) -> list[str]:
-    """Axes that move in the regions of a program, have no mode and are not said to be rigid.
-
-    Args:
-        program: the original.
-        machine: that shall run it.
-
-    Returns:
-        A warning for each: what was judged took it as rigid.
-    """
+    """Axes that move in the regions of a program, have no mode and are not said to be rigid."""
     reach = [np.ptp(np.asarray(region.path.polyline()), axis=0) for region in program.regions]
     stated = {value.key for value in machine.values() if not value.unmeasured}
     return [
@@ -44,17 +36,7 @@ def open_axes(program: Program, machine: Machine) -> list[str]:
 
 
 def played_warnings(program: Program, figures: PlayedFigures, machine: Machine, *, is_priced: bool) -> list[str]:
-    """What playing the emitted program showed: misses, the tolerance that binds, figures made worse.
-
-    Args:
-        program: the original.
-        figures: of its regions.
-        machine: whose tolerances were applied.
-        is_priced: a cut was shaped for a larger tolerance, because of its price.
-
-    Returns:
-        The warnings, each with its remedy where there is one.
-    """
+    """What playing the emitted program showed: misses, the tolerance that binds, figures made worse."""
     expanded = " expanded" if program.core.expanded else ""
     misses = [
         f"{program.place(region.lines[0])}: lines {region.lines[0]} to {region.lines[1]}{expanded}: {miss}"
@@ -68,19 +50,7 @@ def played_warnings(program: Program, figures: PlayedFigures, machine: Machine, 
 def text_warnings(
     program: Program, placed: Sequence[Placed], figures: PlayedFigures, machine: Machine, size: int, blocks: int
 ) -> list[str]:
-    """What the control must be told or cannot do with the emitted text.
-
-    Args:
-        program: the original.
-        placed: its shaped regions.
-        figures: of these.
-        machine: that shall run it.
-        size: of the text in bytes.
-        blocks: shaped blocks in it.
-
-    Returns:
-        The warnings, each with its remedy where there is one.
-    """
+    """What the control must be told or cannot do with the emitted text."""
     fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
     return [
         *_mode_left_on(program, placed, machine.emission.prologue),

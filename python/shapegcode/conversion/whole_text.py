@@ -47,16 +47,7 @@ def why_kept(program: Program, region: _core.Region, machine: Machine, grid: Gri
 
 
 def why_off_grid(program: Program, region: _core.Region, machine: Machine) -> str:
-    """Why the end of a move cannot be written exactly enough for what follows in the other unit; empty if it can.
-
-    Args:
-        program: of which it is a part; its cuts may be in G20 and in G21.
-        region: of the program, or in place of one of its rapids.
-        machine: whose controller reads it.
-
-    Returns:
-        The reason, with axis and position.
-    """
+    """Why the end of a move cannot be written exactly enough for what follows in the other unit; empty if it can."""
     if region.incremental:
         return ""
     units = {region.exit.units, *(each.exit.units for each in program.regions)}
@@ -106,17 +97,7 @@ class Written:
     restarts: list[CutRestarts]
 
     def read_back(self, machine: Machine) -> Program:
-        """Read the text and hold it against the original; from then on it stands in the program that is given.
-
-        Args:
-            machine: whose controller reads it.
-
-        Returns:
-            The emitted program as it was read.
-
-        Raises:
-            RoundTripError: something differs, see `read_back`.
-        """
+        """Read the text and hold it against the original; from then on it stands in the program that is given."""
         for text, _ in self.texts:
             text.hand_over()
         emitted = read_back(self.parts, self.placed, machine)
@@ -149,28 +130,14 @@ class TextWriter:
         self._begun: tuple[dict[int, Aim], Ahead[EmittedRegion]] | None = None
 
     def begin(self, reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> None:
-        """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain.
-
-        Args:
-            reasons: as `write` takes them; likewise the others.
-            room_um: of each region.
-            feed_share: of each region.
-        """
+        """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain."""
         aims = _aims(reasons, room_um, feed_share)
         if len(aims) < cores():
             self._begun = aims, self._ahead(aims, lambda _done: None)
             self._begun[1].begin()
 
     def options(self, index: int, feed_ratio: float) -> _core.ShapingOptions:
-        """How a cut is shaped, but for its tolerance.
-
-        Args:
-            index: of the cut.
-            feed_ratio: of the programmed feed that it is planned with.
-
-        Returns:
-            The options of the core.
-        """
+        """How a cut is shaped, but for its tolerance."""
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         limits.feed_override = feed_ratio
         offset = self._model.offset(self._program.regions[index])
@@ -184,21 +151,7 @@ class TextWriter:
         untold: Collection[int] = (),
         on_progress: Step = lambda _done, _total: None,
     ) -> Written:
-        """The whole text.
-
-        Args:
-            reasons: why a region keeps its text, per region; empty: it is shaped.
-            room_um: deviation that its feed is planned for, per region, µm.
-            feed_share: of the programmed feed that it is planned with, per region.
-            untold: indices of kept regions that need no warning of their own.
-            on_progress: called with the moves that are shaped, and how many there are to shape.
-
-        Returns:
-            The text, and where its shaped regions stand.
-
-        Raises:
-            ProgramError: a region cannot be written.
-        """
+        """The whole text."""
         core, regions = self._program.core, self._program.regions
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)

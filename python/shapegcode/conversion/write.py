@@ -35,16 +35,7 @@ _TARGETS = {
 
 
 def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
-    """What keeps the shaped command within a tolerance at corners and on arcs.
-
-    Args:
-        grid: what follows the look-ahead; its spread limits the speed.
-        own: with which the controller smooths the shaped program once more.
-        contour_tolerance_um: deviation allowed to it, µm.
-
-    Returns:
-        The tolerance, in mm.
-    """
+    """What keeps the shaped command within a tolerance at corners and on arcs."""
     tolerance = _core.FilterTolerance()
     tolerance.variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own.variance_s2
     tolerance.mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own.mean_deviation_s
@@ -137,17 +128,7 @@ class RegionWriter:
     def options(
         self, limits: _core.MotionLimits, tolerance: _core.FilterTolerance, offset: Offset = NO_OFFSET
     ) -> _core.ShapingOptions:
-        """How a region is shaped: what the core needs.
-
-        Args:
-            limits: of the look-ahead.
-            tolerance: see `filter_tolerance`.
-            offset: from the region's positions to the machine's; where it is not known of the axis that the grid's
-                track follows, the grid's one shaper is used.
-
-        Returns:
-            The options of the core.
-        """
+        """How a region is shaped: what the core needs."""
         grid, plant = self._grid, self._model.options(offset=offset)
         options = _core.ShapingOptions()
         options.limits = limits
@@ -179,21 +160,6 @@ class RegionWriter:
         """Shape one region and write it.
 
         The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
-
-        Args:
-            program: whose region it is.
-            region: what is replaced.
-            limits: of the look-ahead.
-            tolerance: see `tolerance`.
-            room: what the text may have at most; None: there is no limit.
-            on_progress: called with the share that is written.
-
-        Returns:
-            The text of the region and the blocks in it.
-
-        Raises:
-            ArgumentError: it cannot be shaped or written.
-            NoRoomError: its text is more than there is room for.
         """
         options = self.options(limits, tolerance, self._model.offset(region))
         # Periods without the stops for restart points, and how many stops there are.
@@ -340,9 +306,6 @@ def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, 
     """The pieces of a region, how much of it they come to, and whether one is the last.
 
     The next one is shaped while one is written: of a region of several pieces in a thread of its own.
-
-    Raises:
-        _WithdrawnError: the pieces given are void, see `RegionShaper.begin_early`.
     """
 
     def shaped() -> tuple[_core.ShapedCommand | None, float]:

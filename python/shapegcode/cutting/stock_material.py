@@ -35,24 +35,6 @@ def build_material(
     """The material before the first block of a program.
 
     What a roughing program leaves is computed by sweeping its tool through what was there before.
-
-    Args:
-        stock: the stock file.
-        paths: cutting moves of the tool; the material gets its layers at their heights.
-        tool: that makes them; of several the smallest.
-        resolution_mm: grid of the material.
-        machine: whose controller runs the programs.
-        others: further cutting moves, which take part in the layers but not in the walls of an allowance.
-
-    Returns:
-        The material, to be swept by the program's moves.
-
-    Raises:
-        StockError: the stock does not suit the program, or its roughing program cannot be swept.
-        ToolError: the tool file of the roughing program is bad.
-        ProgramError: the roughing program cannot be read.
-        ArgumentError: a grid that does not fit into memory.
-        OSError: a file that the stock file names cannot be read.
     """
     pieces = stock_polygons(stock, paths, tool.radius_mm)
     bottom, top = pieces[0].bottom_mm, pieces[0].top_mm

@@ -47,17 +47,6 @@ class StockPiece:
 def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
     """The stock as prisms over polygons; of the kind `program`: what was there before that program.
 
-    Args:
-        stock: the stock file.
-        paths: cutting moves of the program, for an allowance.
-        tool_radius_mm: of the tool that the program runs with, for an allowance.
-
-    Returns:
-        One prism per connected area, with its holes, mm.
-
-    Raises:
-        StockError: a polygon that crosses itself; an allowance that does not suit the program or the tool.
-
     Source: this project; the allowance with its rough corner is the case of Kim and Ko, 2001 (paper 001).
     """
     if stock.allowance is not None:

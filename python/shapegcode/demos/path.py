@@ -6,26 +6,24 @@ Ko, Lim and Hong, 2023 (paper 000 in docs/evidence/references.md): table 2 and t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import resources
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from shapegcode import _core
 from shapegcode.conversion.convert import convert
-from shapegcode.demos.result import Demonstration, Statement, compared, stated
 from shapegcode.machine import Machine
 from shapegcode.machine.output import ANY_PRICE
 from shapegcode.model.controller import motion_limits
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.results.figures import largest_xyz_um
-from shapegcode.results.result import Xyz
+from shapegcode.results.result import Result, Xyz
 from shapegcode.results.table import Column, Table
 
-__all__ = ["PathCondition", "PathDemo", "PathRun", "ideal_command", "path_demo", "path_program"]
-
+_PAPER = "Ko, Lim and Hong, 2023 (paper 000 in docs/evidence/references.md)"
 # Table 2 (orbit error of the command in %) and the text on time.
 _PAPER_ORBIT_PERCENT = {(100, 40): 0.0270, (200, 40): 0.1075, (100, 1): 0.1051, (200, 1): 0.3546}
 _PAPER_TIME = {40: ("up to +37 %", 37.0), 1: ("under +4 %", 4.0)}
@@ -38,6 +36,36 @@ _REMARK = (
     "stretch of constant speed before the arc lasts 125.25 (25.25) ms, off a 0.1 ms simulation grid; losing "
     "50 us shifts the arc, and a path shifted so gives .1050 and .3544. Nothing here is tuned to the paper."
 )
+
+Agreement = Literal["agrees", "differs", "explained", "open"]
+"""Of a statement: it holds here; it does not; it does not, and why is known (a slip of the paper, other conditions);
+or the paper leaves open what it depends on."""
+
+_SAID: dict[Agreement, str] = {"agrees": "yes", "differs": "NO", "explained": "explained", "open": ""}
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What a paper states, beside what comes out here.
+
+    Attributes:
+        place: where in the paper: figure, table, section or equation.
+        what: is stated.
+        published: as the paper has it, with its unit.
+        ours: as it comes out here, with its unit.
+        agreement: whether both say the same: agrees, differs, explained (differs for a known reason) or open (the paper
+            leaves open what it depends on).
+        difference_percent: ours over the published figure, in % of the latter; null where it is no figure.
+        note: why they differ, or under which conditions ours holds; empty: nothing to add.
+    """
+
+    place: str
+    what: str
+    published: str
+    ours: str
+    agreement: Agreement
+    difference_percent: float | None = None
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,22 +110,41 @@ class PathCondition:
     published_orbit_error_percent: float
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
-class PathDemo(Demonstration):
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
+class PathDemo(Result):
     """Line, quarter arc, line: ideal command, emitted program and the paper.
 
     Attributes:
+        paper: authors, year, and under which name docs/evidence/references.md has it in full.
+        title: what is repeated.
+        rows: the paper's statements beside ours.
+        remark: how to read the differences.
+        warnings: none as a rule.
         machine: name of the machine.
         conditions: both feeds at both reductions.
     """
 
+    paper: str
+    title: str
+    rows: tuple[Statement, ...]
+    remark: str
+    warnings: tuple[str, ...] = ()
     machine: str
     conditions: tuple[PathCondition, ...]
 
     @property
     def ok(self) -> bool:
         """Whether every statement agrees or is explained, and every emitted program is within tolerance."""
-        return super().ok and all(each.ok for each in self.conditions)
+        return all(row.agreement != "differs" for row in self.rows) and all(each.ok for each in self.conditions)
+
+    @property
+    def answer(self) -> str:
+        """How many statements of the paper agree."""
+        agreements = [row.agreement for row in self.rows]
+        said = f"{self.title}: {agreements.count('agrees')} of {len(self.rows)} statements of {self.paper} agree"
+        others = {"differs": "DIFFER", "explained": "differ for a known reason", "open": "cannot be compared"}
+        counts = [f"{agreements.count(kind)} {words}" for kind, words in others.items() if kind in agreements]
+        return ", ".join([said, *counts])
 
     @property
     def next_step(self) -> str:
@@ -106,6 +153,15 @@ class PathDemo(Demonstration):
 
     def tables(self) -> list[Table]:
         """The statements; what the path costs and leaves in each way of driving it."""
+        statements = (
+            Column("place", left=True),
+            Column("what", text=True),
+            Column("paper", value="published", text=True),
+            Column("here", value="ours", text=True),
+            Column("differs", "%", "difference_percent", digits=2),
+            Column("agrees", value=lambda row: _SAID[row.agreement], text=True),
+            Column("note", text=True),
+        )
         rows = [
             (each, name, run)
             for each in self.conditions
@@ -122,7 +178,10 @@ class PathDemo(Demonstration):
             Column("longer", "%", lambda row: row[2].time_increase_percent or None, digits=1),
         )
         title = f"by condition, on {self.machine}; the emitted program has blocks of 5 ms"
-        return [*super().tables(), Table(title, columns, rows, sections=range(3, len(rows), 3))]
+        return [
+            Table("", statements, self.rows, caption=self.remark),
+            Table(title, columns, rows, sections=range(3, len(rows), 3)),
+        ]
 
 
 def path_program(feed_mm_per_s: float, machine: Machine) -> Program:
@@ -133,16 +192,7 @@ def path_program(feed_mm_per_s: float, machine: Machine) -> Program:
 
 
 def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> tuple[Any, _core.PlaybackFigures]:
-    """The paper's own way: the minimal shaper of both modes in continuous time, nothing written as blocks.
-
-    Args:
-        path: what is driven.
-        machine: with one mode on X and one on Y.
-        arc_feed_ratio: feed on arcs over the programmed one.
-
-    Returns:
-        Set-points in mm, (n, 3), every 10 us, and their figures.
-    """
+    """The paper's own way: its minimal shaper in continuous time; set-points in mm every 10 us, and their figures."""
     modes = [mode for axis in machine.axes.as_tuple() for mode in axis.modes]
     first, second = (_core.Mode(mode.frequency_hz, mode.damping_ratio) for mode in modes)
     designs = _core.minimal_two_mode(first, second, _LONGEST_IDEAL_S)
@@ -172,9 +222,9 @@ def path_demo(on_progress: Callable[[float], None] = lambda _: None) -> PathDemo
         on_progress(done / len(_PAPER_ORBIT_PERCENT))
         conditions.append(_condition(feed, reduction, machine))
     return PathDemo(
-        paper=PathDemo.cited("000"),
+        paper=_PAPER,
         title="Line, quarter arc R20, line with 46 Hz on X and 131 Hz on Y",
-        rows=tuple(row for each in conditions for row in _statements(each)),
+        rows=tuple(row for each in conditions for row in statements(each)),
         remark=_REMARK,
         machine=machine.name,
         conditions=tuple(conditions),
@@ -209,15 +259,17 @@ def _condition(feed: int, reduction: int, machine: Machine) -> PathCondition:
     )
 
 
-def _statements(each: PathCondition) -> list[Statement]:
+def statements(each: PathCondition) -> list[Statement]:
     """What the paper says of a condition, beside the ideal command."""
     name = f"{each.feed_mm_per_s} mm/s, arc −{each.reduction_percent} %"
-    orbit = compared(
-        "table 2", f"orbit error: {name}", each.published_orbit_error_percent, each.ideal.orbit_error_percent, "%",
-        digits=4, within=_ORBIT_WITHIN_PERCENT,
+    published, ours = each.published_orbit_error_percent, each.ideal.orbit_error_percent
+    agrees = abs(ours - published) <= _ORBIT_WITHIN_PERCENT
+    orbit = Statement(
+        "table 2", f"orbit error: {name}", f"{published:.4f} %", f"{ours:.4f} %",
+        "explained" if each.reduction_percent == 1 else "agrees" if agrees else "differs",
+        (ours / published - 1.0) * 100.0, _SHIFTED if each.reduction_percent == 1 else "",
     )  # fmt: skip
-    if each.reduction_percent == 1:
-        orbit = replace(orbit, agreement="explained", note=_SHIFTED)
-    said, most_percent = _PAPER_TIME[each.reduction_percent]
+    said, max_percent = _PAPER_TIME[each.reduction_percent]
     longer_percent = each.ideal.time_increase_percent
-    return [orbit, stated("text", f"time: {name}", said, f"+{longer_percent:.1f} %", longer_percent <= most_percent)]
+    longer: Agreement = "agrees" if longer_percent <= max_percent else "differs"
+    return [orbit, Statement("text", f"time: {name}", said, f"+{longer_percent:.1f} %", longer)]

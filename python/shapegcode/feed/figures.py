@@ -41,22 +41,7 @@ def feed_figures(
     surveyed: Survey, plans: Plans, loads: Loads, machine: Machine, *, margin: float, text: bytes, written: Program,
     cycle_time_s: Pair[float], blocks: Pair[int],
 ) -> FeedSchedule:  # fmt: skip
-    """The result of a schedule.
-
-    Args:
-        surveyed: what the tool meets.
-        plans: the feeds of each region that may change; None for the others.
-        loads: along each region; None where nothing is known.
-        machine: whose limits count beside those of the tools.
-        margin: share of each limit that was left free.
-        text: the program with its new feeds.
-        written: the same, as read back.
-        cycle_time_s: before and after.
-        blocks: likewise.
-
-    Returns:
-        Everything that the JSON, the tables and the pictures show.
-    """
+    """The result of a schedule."""
     program = surveyed.program
     moves = tuple(_move(move, machine) for move in surveyed.moves)
     parts = list(zip(surveyed.regions, plans, loads, strict=True))

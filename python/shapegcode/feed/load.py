@@ -73,19 +73,7 @@ class PathLoad(Pair[Load]):
 def region_load(
     part: SurveyedRegion, plan: FeedPlan | None, written: _core.Path, machine: Machine, *, before: Mover, after: Mover
 ) -> PathLoad | None:
-    """Load along a region as programmed and as written; None where engagement or spindle speed are not known.
-
-    Args:
-        part: the region.
-        plan: its new feeds; None: they did not change.
-        written: its path as read back.
-        machine: the machine.
-        before: how the original is run.
-        after: how the written program is run.
-
-    Returns:
-        Load at the stations of the region's track, before and after.
-    """
+    """Load along a region as programmed and as written; None where engagement or spindle speed are not known."""
     if part.track is None or part.tool is None or not part.spindle_rev_per_min > 0.0 or len(part.track) == 0:
         return None
     stations = np.asarray(part.track.s_mm)
@@ -108,15 +96,7 @@ def move_load(move: SurveyedMove) -> PathLoad | None:
 
 
 def load_of(part: SurveyedRegion | SurveyedMove, travelled: Travelled) -> Load:
-    """Load along a region, or along a move outside of them.
-
-    Args:
-        part: with what the tool meets and the speed of the spindle.
-        travelled: how fast the machine really goes, (n,) as the stations of its track.
-
-    Returns:
-        One value per station, (n,).
-    """
+    """Load along a region, or along a move outside of them."""
     assert part.tool is not None and part.track is not None
     # What a station meets is met with the feed of the stretch before it and of the one behind it.
     feeds = travelled.feed_mm_per_min.copy()

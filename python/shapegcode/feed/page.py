@@ -18,15 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def with_forces(scene: Scene, schedule: FeedSchedule) -> Scene:
-    """The motion with the largest resultant in a revolution, by place along each region.
-
-    Args:
-        scene: original and written program.
-        schedule: with the loads of both.
-
-    Returns:
-        The same with the channel "force"; zero where nothing is cut, or nothing is known.
-    """
+    """The motion with the largest resultant in a revolution, by place along each region."""
     loads = schedule.loads
     regions = [[part.region for part in schedule.survey.regions], list(schedule.written.regions)]
     variants = []

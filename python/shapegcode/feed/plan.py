@@ -69,16 +69,7 @@ class FeedPlan:
 
 
 def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
-    """The limits of tool and machine together.
-
-    Args:
-        tool: its `[limits]`.
-        machine: torque and power of its spindle.
-        margin: share of each limit that is left free; the limits of the chip have none.
-
-    Returns:
-        What a revolution may bear; inf: no limit.
-    """
+    """The limits of tool and machine together."""
     room = 1.0 - margin
 
     def least(*values: float | None) -> float:
@@ -100,17 +91,6 @@ def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
 def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divisible: list[bool], margin: float,
                 feed_unit_mm_per_min: float) -> FeedPlan:  # fmt: skip
     """Choose the feeds of a region whose feeds may change.
-
-    Args:
-        surveyed: the region.
-        machine: its feed control.
-        motion: how the blocks will be run; the feeds are lowered until this motion keeps the limits.
-        divisible: per segment whether its block may be divided.
-        margin: share of each limit that is left free.
-        feed_unit_mm_per_min: feeds are whole multiples of it.
-
-    Returns:
-        The feeds as stretches along the region's path, and what holds them at each station.
 
     Source: this project; that a feed must stand for a least length is of Kim and Ko, 2001 (paper 001).
     """

@@ -98,22 +98,7 @@ def schedule_survey(
     margin: float = MARGIN,
     on_progress: Progress = lambda _done: None,
 ) -> FeedSchedule:
-    """As :func:`schedule_feed`, for a program whose engagement is known already.
-
-    Args:
-        surveyed: what the tool meets.
-        machine: as `schedule_feed`.
-        motion: likewise.
-        margin: likewise.
-        on_progress: likewise.
-
-    Returns:
-        The program with its new feeds, and what they gain.
-
-    Raises:
-        ArgumentError: a margin outside its range.
-        RoundTripError: the written text would not be equivalent: a defect of shapegcode.
-    """
+    """As :func:`schedule_feed`, for a program whose engagement is known already."""
     if not 0.0 <= margin < 1.0:
         raise _core.ArgumentError(f"margin is {margin:g}, must be at least 0 and below 1")
     program = surveyed.program

@@ -61,16 +61,7 @@ class FeedTraces:
 def feed_traces(
     survey: Survey, plans: Sequence[FeedPlan | None], loads: Sequence[PathLoad | None]
 ) -> FeedTraces | None:
-    """The curves of all regions whose load is known; None: there is none.
-
-    Args:
-        survey: what the tool meets.
-        plans: the feeds of each region that may change; None for the others.
-        loads: along each region; None where nothing is known.
-
-    Returns:
-        (n,) stations of all these regions in a row.
-    """
+    """The curves of all regions whose load is known; None: there is none."""
     parts = [
         (part, part.track, plan, load)
         for part, plan, load in zip(survey.regions, plans, loads, strict=True)
@@ -163,14 +154,6 @@ def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTrac
     """The walls along the cutting path; None: none are made.
 
     A column speaks for a stretch of the path, taken where the peak resultant was largest before.
-
-    Args:
-        survey: what the tool meets.
-        loads: along each region; None where nothing is known.
-        traces: the curves of them.
-
-    Returns:
-        Error over distance and height, (m, h), before and after, µm.
 
     Source: the error of a wall is that of Kim and Ko, 2001 (paper 001), section 2.3; its map is of this project.
     """

@@ -25,21 +25,7 @@ def draw_walls(
     ax: Axes | None, edges_mm: Vector, height_mm: Vector, maps: Mapping[str, Vector], colours: Sequence[str], *,
     along: str, title: str, part: str,
 ) -> Axes:  # fmt: skip
-    """Maps of the wall's error below each other in one scale, and in the last panel the largest of each column.
-
-    Args:
-        ax: where to draw; None: a new figure.
-        edges_mm: of the columns, (m + 1,).
-        height_mm: above the tip, evenly spaced, (h,).
-        maps: error in µm by name, (m, h); NaN: no wall.
-        colours: of their curves in the last panel.
-        along: name of the axis along the wall.
-        title: of the whole picture.
-        part: which part of the program it shows.
-
-    Returns:
-        The uppermost panel.
-    """
+    """Maps of the wall's error below each other in one scale, and in the last panel the largest of each column."""
     everything = np.concatenate([each[np.isfinite(each)] for each in maps.values()])
     low, high = min(float(everything.min()), 0.0), max(float(everything.max()), 0.0)
     high = high if high > low else low + 1e-3

@@ -17,6 +17,7 @@ from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.result import Identification
 from shapegcode.identification.support import ACCEPTED_PERCENT
 from shapegcode.identification.sweep import find_swept_modes
+from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.klipper import is_klipper, read_sweep
 from shapegcode.io.read import ReadOptions, read_measurement
@@ -160,5 +161,5 @@ def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
 
 
 def _beginning(path: Path) -> bytes:
-    with path.open("rb") as file:
+    with open_file(path) as file:
         return file.read(400)

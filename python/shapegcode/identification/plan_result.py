@@ -52,7 +52,7 @@ class RapidStop:
     program: str
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class TapPlan(Result):
     """How to do a tap test.
 

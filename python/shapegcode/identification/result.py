@@ -127,7 +127,7 @@ class MachineFile:
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class Identification(Result):
     """Modes found in one or several records of the same point.
 

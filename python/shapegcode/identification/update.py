@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from shapegcode.errors import ArgumentError
+from shapegcode.errors import ArgumentError, MachineError
 from shapegcode.identification.mode import IdentifiedMode
 from shapegcode.identification.mode_tables import ModeTables
 from shapegcode.identification.other_axes import decide_axes, open_modes, require_decisions
 from shapegcode.identification.result import Identification, MachineFile
 from shapegcode.machine import Machine
+from shapegcode.settings.load import read_text
 
 __all__ = ["MachineUpdate", "check_updatable", "update_machine", "update_machine_file", "update_modes"]
 
@@ -104,7 +105,7 @@ def update_machine_file(
         OSError: it cannot be read.
     """
     check_updatable(path)
-    text = Path(path).read_bytes().decode("utf-8")
+    text = read_text(Path(path), MachineError)
     return update_modes(
         text, axis, modes, source=source, refused=refused, keep_modes=keep_modes, rigid=rigid, file=str(path)
     )
@@ -120,7 +121,7 @@ def check_updatable(path: str | Path) -> Machine:
         What the file says now.
 
     Raises:
-        ArgumentError: a built-in machine, or no regular file.
+        ArgumentError: a built-in machine.
         MachineError: the file is bad.
         OSError: it cannot be read.
     """
@@ -129,8 +130,6 @@ def check_updatable(path: str | Path) -> Machine:
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "
             "file of it that can be updated"
         )
-    if Path(path).exists() and not Path(path).is_file():
-        raise ArgumentError(f"{path}: not a regular file")
     return Machine.load(path)
 
 

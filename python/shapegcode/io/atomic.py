@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import re
+import secrets
 import stat
 import sys
 from collections.abc import Iterable, Iterator
@@ -23,6 +24,7 @@ __all__ = [
 ]
 
 _passing = False
+_LONGEST_NAME = 200  # of a file, so that more has room behind it
 
 
 def write_in_passing() -> None:
@@ -31,22 +33,12 @@ def write_in_passing() -> None:
     _passing = True
 
 
-_TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
+_TEMPORARY = re.compile(r"\..+\.[0-9a-f]+\.tmp")  # digits alone: of versions before
 
 
 @contextlib.contextmanager
 def named_errors(path: str | Path) -> Iterator[None]:
-    """Errors of the file system get the name of *path*: a failed write() has none, that of a temporary file misleads.
-
-    Args:
-        path: named in the errors.
-
-    Yields:
-        A context.
-
-    Raises:
-        OSError: with the name of *path* and the reason.
-    """
+    """Errors of the file system get the name of *path*: a failed write() has none, a temporary file another."""
     try:
         yield
     except OSError as error:
@@ -57,26 +49,19 @@ def named_errors(path: str | Path) -> Iterator[None]:
 def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
     """A stream whose content takes the place of a file when the block ends well; otherwise the file stays as it was.
 
-    A symbolic link is followed; a device or pipe is written to directly.
-
-    Args:
-        path: of the file.
-
-    Yields:
-        The stream to write to.
-
-    Raises:
-        OSError: the file cannot be written, for example a full disk or a missing folder.
+    A symbolic link is followed, but not round in a circle; a device or pipe is written to directly.
     """
-    target = Path(os.path.realpath(path))
+    target = _target_of(path)
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
         with open(target, "wb") as stream:
             yield stream
         return
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")  # see is_temporary
+    # No number of a process: a container counts from 1 again, and threads have the same one. See is_temporary.
+    temporary = target.with_name(f".{target.name[:_LONGEST_NAME]}.{secrets.token_hex(8)}.tmp")
+    stream = open(temporary, "xb")  # noqa: SIM115 - what another one has written is not removed below
     try:
-        with open(temporary, "xb") as stream:
+        with stream:
             yield stream
             stream.flush()
             if not _passing:
@@ -89,30 +74,21 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
         raise
 
 
+def _target_of(path: str | Path) -> Path:
+    """The file that a symbolic link leads to."""
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():  # realpath gives up only where links lead to each other
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    return target
+
+
 def is_temporary(path: str | Path) -> bool:
-    """Whether a file has the name of one that was being written and never took its place: its process was killed.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        True for such a name.
-    """
+    """Whether a file has the name of one that was being written and never took its place: its process was killed."""
     return _TEMPORARY.fullmatch(Path(path).name) is not None
 
 
 def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
-    """Write a UTF-8 file so that it is either complete or as it was before; line ends as they are.
-
-    Args:
-        path: the file; a symbolic link is followed; a device or pipe is written to directly.
-        text: its content.
-        overwrite: False: an existing file is an error, even if it appears at the last moment.
-
-    Raises:
-        FileExistsError: the file exists and *overwrite* is False.
-        OSError: with the name of *path* and the reason, for example a full disk or a missing folder.
-    """
+    """Write a UTF-8 file so that it is either complete or as it was before; line ends as they are."""
     write_bytes(path, _encoded(text), overwrite=overwrite)
 
 
@@ -122,15 +98,7 @@ def _encoded(text: str) -> bytes:
 
 
 def write_lines(path: str | Path, lines: Iterable[str]) -> None:
-    """As `write_text`, line by line, without holding all of them; ``-`` is standard output.
-
-    Args:
-        path: of the file, or ``-``.
-        lines: with their line ends.
-
-    Raises:
-        OSError: with the name of *path* and the reason.
-    """
+    """As `write_text`, line by line, without holding all of them; ``-`` is standard output."""
     if path == "-":
         sys.stdout.writelines(lines)
         return
@@ -140,23 +108,13 @@ def write_lines(path: str | Path, lines: Iterable[str]) -> None:
 
 
 def write_bytes(path: str | Path, data: bytes | memoryview, *, overwrite: bool = True) -> None:
-    """As :func:`write_text`, for bytes.
-
-    Args:
-        path: of the file.
-        data: its content.
-        overwrite: False: an existing file is an error.
-
-    Raises:
-        FileExistsError: the file exists and *overwrite* is False.
-        OSError: with the name of *path* and the reason.
-    """
+    """As :func:`write_text`, for bytes."""
     with named_errors(path):
         if overwrite:
             with replaced_file(path) as stream:
                 stream.write(data)
         else:
-            _write_new(Path(os.path.realpath(path)), data)
+            _write_new(_target_of(path), data)
 
 
 def _write_new(target: Path, data: bytes | memoryview) -> None:

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from shapegcode.errors import RecordError
+from shapegcode.io.data_file import read_file
 
 __all__ = [
     "cells_of", "has_thousands", "is_clock_time", "is_number", "refuse_binary", "utf8_text", "without_thousands",
@@ -22,18 +23,8 @@ _COMMA_NUMBER = re.compile(
 
 
 def utf8_text(path: Path) -> bytes:
-    """The text as ASCII-compatible bytes with line feeds.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        The whole file, one byte per ASCII character.
-
-    Raises:
-        RecordError: it is not text.
-    """
-    data = path.read_bytes()
+    """The text as ASCII-compatible bytes with line feeds."""
+    data = read_file(path)
     if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         data = data.decode("utf-16", errors="replace").encode("utf-8")
     data = data.removeprefix(b"\xef\xbb\xbf")
@@ -44,16 +35,7 @@ def utf8_text(path: Path) -> bytes:
 
 
 def refuse_binary(path: Path, head: bytes, needed: str) -> None:
-    """Refuse a file that is no text.
-
-    Args:
-        path: of the file, for messages.
-        head: its beginning.
-        needed: what it should be, for messages.
-
-    Raises:
-        RecordError: a byte that no text has.
-    """
+    """Refuse a file that is no text."""
     strange = sorted(set(head) - _TEXT_BYTES)
     if strange:
         place = head.index(bytes([strange[0]]))
@@ -61,15 +43,7 @@ def refuse_binary(path: Path, head: bytes, needed: str) -> None:
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
-    """The cells of a line, without quotes and surrounding blanks.
-
-    Args:
-        line: of the file.
-        delimiter: between cells; " " stands for any run of blanks.
-
-    Returns:
-        One text per cell.
-    """
+    """The cells of a line, without quotes and surrounding blanks."""
     if delimiter == " ":
         return line.split()
     if '"' in line:
@@ -79,51 +53,22 @@ def cells_of(line: str, delimiter: str) -> list[str]:
 
 
 def is_number(cell: str, decimal_comma: bool) -> bool:
-    """Whether a cell is a number, NaN and infinity included.
-
-    Args:
-        cell: its text.
-        decimal_comma: numbers have a comma for the point.
-
-    Returns:
-        True for a number.
-    """
+    """Whether a cell is a number, NaN and infinity included."""
     return (_COMMA_NUMBER if decimal_comma else _NUMBER).fullmatch(cell) is not None
 
 
 def is_clock_time(cell: str) -> bool:
-    """Whether a cell is a time of the day, with a date or without: ``10:15:00,000391``.
-
-    Args:
-        cell: its text.
-
-    Returns:
-        True for a time of the day.
-    """
+    """Whether a cell is a time of the day, with a date or without: ``10:15:00,000391``."""
     return re.search(r"\d{1,2}:\d{2}", cell) is not None
 
 
 def has_thousands(cell: str) -> bool:
-    """Whether a number with a decimal comma has points for thousands: ``1.265,02``.
-
-    Args:
-        cell: its text.
-
-    Returns:
-        True for such a number.
-    """
+    """Whether a number with a decimal comma has points for thousands: ``1.265,02``."""
     return "." in cell and is_number(cell, True)
 
 
 def without_thousands(data: bytes) -> bytes:
-    """Text of numbers with decimal commas, points for thousands left out.
-
-    Args:
-        data: text with such numbers.
-
-    Returns:
-        The same text without these points.
-    """
+    """Text of numbers with decimal commas, points for thousands left out."""
     if b"." not in data:
         return data
     return re.sub(rb"(?<![\d.,])" + _THOUSANDS.encode(), lambda found: found[0].replace(b".", b""), data)

@@ -65,28 +65,12 @@ class Label:
 
 
 def words_of(name: str) -> list[str]:
-    """The words of a name, in lower case.
-
-    Args:
-        name: of a column.
-
-    Returns:
-        Its words, in order.
-    """
+    """The words of a name, in lower case."""
     return re.findall(r"[^\W\d_]+", name.lower())
 
 
 def read_label(text: str, unit_text: str, names: Names) -> Label:
-    """Read a label.
-
-    Args:
-        text: the label.
-        unit_text: what a row of units below it says; empty: there is none.
-        names: of the kind of file.
-
-    Returns:
-        What it measures, of what, in which unit.
-    """
+    """Read a label."""
     if text.strip().lower() in {"x_value", "x value"}:  # LabVIEW's name of the time, which it writes in seconds
         return Label(text, Meaning("time", "time"), find_unit(unit_text or "s"))
     name, unit, unknown = _split_unit(text, names)
@@ -145,20 +129,7 @@ def _is_name(text: str, names: Names) -> bool:
 
 
 def unit_of(where: str, label: Label, allowed: tuple[Measured, ...], remedy: str = "") -> Unit | None:
-    """The unit that a label states for a quantity; None: it states none.
-
-    Args:
-        where: file and line, for messages.
-        label: of the column.
-        allowed: kinds of quantity that the column may hold.
-        remedy: what else the user can do, for messages.
-
-    Returns:
-        The unit, or None.
-
-    Raises:
-        RecordError: a unit that is not known, or one of another quantity.
-    """
+    """The unit that a label states for a quantity; None: it states none."""
     needed = f"needed is one of {units_of(*allowed)}"
     if label.unit is None and label.unknown_unit:
         raise RecordError(
@@ -191,15 +162,7 @@ _WITH_AXIS = re.compile(r"(a|acc|accel|acceleration|v|vel|velocity|d|u|disp|disp
 
 
 def tap_label(text: str, unit_text: str = "") -> Label:
-    """Read a label of a tap file: where its name says nothing, or "response" only, its unit says what it is.
-
-    Args:
-        text: the label.
-        unit_text: what a row of units below it says; empty: there is none.
-
-    Returns:
-        What it measures, of what, in which unit.
-    """
+    """Read a label of a tap file: where its name says nothing, or "response" only, its unit says what it is."""
     label = read_label(text, unit_text, _tap_names)
     if label.unit is None or label.measures not in {None, "response"}:
         return label

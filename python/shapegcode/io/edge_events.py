@@ -42,15 +42,7 @@ class Events:
     path: str = ""
 
     def read(self, name: str, payload: list[dict[str, Any]]) -> None:
-        """Take the events of a file.
-
-        Args:
-            name: of the file, for messages.
-            payload: of it.
-
-        Raises:
-            RecordError: an entry that is none, or without its counter.
-        """
+        """Take the events of a file."""
         for index, entry in enumerate(payload):
             for kind, content in entry.items():
                 where = f"{name}: Payload[{index}].{kind}"

@@ -6,11 +6,8 @@ Source of the format: Siemens, SINUMERIK Data Recorder, "Data output format"; of
 
 from __future__ import annotations
 
-import gzip
 import json
 import math
-import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from shapegcode.errors import RecordError
+from shapegcode.io.data_file import DataFile
 from shapegcode.io.edge_capture import EdgeAxis, EdgeCapture, EdgeGap
 from shapegcode.io.edge_events import EVENTS, Events, key_of
 from shapegcode.io.edge_rows import Rows, read_rows
@@ -26,20 +24,12 @@ from shapegcode.io.edge_rows import Rows, read_rows
 __all__ = ["is_edge_json", "read_edge_json"]
 
 _VERSIONS = ((0, 6), (1, 1))
-_MAX_BYTES = 2 << 30
 _MOST_GAPS = 10
 _CYCLE_MS = (0.05, 50.0)
 
 
 def is_edge_json(head: bytes) -> bool:
-    """Whether a file may be such a capture, by its first bytes.
-
-    Args:
-        head: its first bytes, some 200 of them.
-
-    Returns:
-        Whether it begins as JSON with a Header or a Payload, or is packed by gzip or zip.
-    """
+    """Whether a file may be such a capture, by its first bytes."""
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     return head[:2] == b"\x1f\x8b" or head[:4] == b"PK\x03\x04" or (text[:1] == b"{" and text[1:].lstrip()[:1] == b'"')
 
@@ -60,9 +50,8 @@ def read_edge_json(path: str | Path) -> EdgeCapture:
         OSError: the file cannot be read.
     """
     path = Path(path)
-    if path.exists() and not path.is_file():
-        raise RecordError(f"{path}: not a regular file")
-    parts = [_Part(where, _parsed(where, data)) for where, data in _contents(path)]
+    with DataFile(path) as file:
+        parts = [_Part(where, _parsed(file, where, data)) for where, data in _contents(file)]
     if not parts:
         raise RecordError(f"{path}: the archive holds no .json file")
     parts.sort(key=lambda each: each.first_counter)
@@ -72,54 +61,30 @@ def read_edge_json(path: str | Path) -> EdgeCapture:
     return _capture(path, parts, rows)
 
 
-def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
+def _contents(file: DataFile) -> Iterator[tuple[str, bytes]]:
     """(name for messages, text) of the file, or of each file in an archive."""
-    with path.open("rb") as file:
-        head = file.read(4)
-    try:
-        if head == b"PK\x03\x04":
-            with zipfile.ZipFile(path) as archive:
-                names = [each for each in archive.infolist() if each.filename.lower().endswith(".json")]
-                _check_size(path, sum(each.file_size for each in names))
-                for each in names:
-                    yield f"{path}({each.filename})", archive.read(each)
-            return
-        if head[:2] == b"\x1f\x8b":
-            with gzip.open(path) as packed:
-                data = packed.read(_MAX_BYTES + 1)
-        else:
-            _check_size(path, path.stat().st_size)
-            data = path.read_bytes()
-    except (zipfile.BadZipFile, gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise RecordError(f"{path}: the packed file is cut off or damaged: {error}") from error
-    _check_size(path, len(data))
-    yield str(path), data
+    if file.kind == "zip":
+        for name, data in file.members(".json"):
+            yield f"{file.path}({name})", data
+    else:
+        yield str(file.path), file.read()
 
 
-def _check_size(path: Path, size: int) -> None:
-    if size > _MAX_BYTES:
-        raise RecordError(
-            f"{path}: {size} bytes: at most {_MAX_BYTES} are read at once; the recorder divides its files"
-        )
-
-
-def _parsed(where: str, data: bytes) -> dict[str, Any]:
+def _parsed(file: DataFile, where: str, data: bytes) -> dict[str, Any]:
     """The JSON object of a file."""
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise RecordError(f"{where}: not UTF-8 text: byte {error.start} is {data[error.start]:#04x}") from error
-    if not text.strip():
+    if not data.strip():
         raise RecordError(f"{where}: the file is empty; needed is JSON with Header, Payload and Footer")
     try:
-        found = json.loads(text)
+        found = file.json(where, data)
+    except UnicodeDecodeError as error:
+        raise RecordError(f"{where}: not UTF-8 text: byte {error.start} is {error.object[error.start]:#04x}") from error
     except json.JSONDecodeError as error:
-        cut = "it is cut off there; record it again or mend it" if error.pos >= len(text.rstrip()) - 1 else error.msg
+        length = len(error.doc)
+        cut = "it is cut off there; record it again or mend it"
+        cut = cut if error.pos >= len(error.doc.rstrip()) - 1 else error.msg
         raise RecordError(
-            f"{where}:{error.lineno}: not whole JSON: column {error.colno}, character {error.pos} of {len(text)}: {cut}"
+            f"{where}:{error.lineno}: not whole JSON: column {error.colno}, character {error.pos} of {length}: {cut}"
         ) from error
-    except RecursionError as error:
-        raise RecordError(f"{where}: not a capture: JSON nested too deeply") from error
     if not isinstance(found, dict) or not isinstance(found.get("Header"), dict):
         raise RecordError(f"{where}: no Header: not a file of the SINUMERIK Data Recorder (Header, Payload, Footer)")
     return found

@@ -36,19 +36,7 @@ class Rows:
 
 
 def read_rows(source: str, addresses: tuple[str, ...], files: Iterable[tuple[str, list[Any]]]) -> Rows:
-    """Join the rows of all entries "HFData".
-
-    Args:
-        source: file, for messages.
-        addresses: of the signals in a row; "CYCLE" among them.
-        files: name and payload of each file, in order.
-
-    Returns:
-        The samples; a row that is repeated word for word is left out.
-
-    Raises:
-        RecordError: a row of another length, a value that is no finite number or none, a counter that does not rise.
-    """
+    """Join the rows of all entries "HFData"."""
     pieces: list[FloatArray] = []
     places: list[str] = []  # of each piece, for messages
     for name, payload in files:

@@ -25,16 +25,6 @@ def edge_runs(path: Path) -> Iterator[RunLog]:
 
     The blocks are those of the program that has most of them in the capture; those of cycles and subprograms stand in
     the texts only, since their lines count in other files.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        One run.
-
-    Raises:
-        RecordError: no such capture, or none with block events.
-        OSError: the file cannot be read.
     """
     capture = read_edge_json(path)
     count = Counter(block.path for block in capture.blocks if block.line is not None)

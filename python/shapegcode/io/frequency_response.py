@@ -87,20 +87,7 @@ class FrequencyResponse:
 def checked_lines(
     where: str, frequency_hz: FloatArray, response: ComplexArray, coherence: FloatArray | None
 ) -> tuple[FloatArray, ComplexArray, FloatArray | None, list[str]]:
-    """Lines as `FrequencyResponse` wants them: the one at 0 Hz left out.
-
-    Args:
-        where: file, for messages.
-        frequency_hz: (n,).
-        response: (n,).
-        coherence: (n,) or None.
-
-    Returns:
-        The three, and notes.
-
-    Raises:
-        RecordError: frequencies that do not ascend, with the number of the line; a coherence beyond 0 to 1.
-    """
+    """Lines as `FrequencyResponse` wants them: the one at 0 Hz left out."""
     steps = np.diff(frequency_hz)
     if np.any(steps <= 0.0):
         row = int(np.flatnonzero(steps <= 0.0)[0]) + 1
@@ -120,14 +107,7 @@ def checked_lines(
 
 
 def ratio_unit(text: str) -> tuple[Unit, float] | None:
-    """Unit of a response over a force: ``m/N``, ``(m/s²)/N``, ``µm/N``, ``g/N``, ``m/s^2/N``, ``1/kg``.
-
-    Args:
-        text: of a label.
-
-    Returns:
-        The response's unit, and what a value is multiplied with to give SI; None: it is none.
-    """
+    """Unit of a response over a force: ``m/N``, ``(m/s²)/N``, ``µm/N``, ``g/N``, ``m/s^2/N``, ``1/kg``."""
     plain = text.strip().strip("[]")
     if re.fullmatch(r"(1/kg|kg\^?-1)", plain):
         unit = find_unit("m/s²")
@@ -146,32 +126,13 @@ def ratio_unit(text: str) -> tuple[Unit, float] | None:
 
 
 def quantity_of_name(text: str) -> Quantity | None:
-    """What a name such as "Receptance" or "accelerance" says.
-
-    Args:
-        text: of a label or title.
-
-    Returns:
-        What was divided by the force; None: the text does not say.
-    """
+    """What a name such as "Receptance" or "accelerance" says."""
     words = re.findall(r"[^\W\d_]+", text.lower())
     return next((_NAMES[word] for word in words if word in _NAMES), None)
 
 
 def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, float, list[str]]:
-    """Quantity and factor to SI of a response over force, by options, unit or name.
-
-    Args:
-        where: file and line, for messages.
-        label: what the file says of unit or kind; empty: nothing.
-        options: what the user says.
-
-    Returns:
-        Quantity, factor and warnings.
-
-    Raises:
-        RecordError: neither says what it is.
-    """
+    """Quantity and factor to SI of a response over force, by options, unit or name."""
     force = stated_unit(options.force_unit, ("force",))
     over = options.force_scale or (1.0 if force is None else force.factor)
     named = options.quantity or quantity_of_name(label)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import io
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from shapegcode.errors import RecordError
+from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse, checked_lines, scale_of
 from shapegcode.io.options import ReadOptions
 
@@ -17,35 +22,50 @@ __all__ = ["is_mat", "read_frf_mat"]
 _FREQUENCIES = ("f", "freq", "frequency", "freqs", "frequencies", "f_hz", "freq_hz", "hz")
 _ANGULAR = ("w", "omega", "om")
 _COHERENCES = ("coh", "coherence", "gamma2", "c")
+#: Runs in a process of its own, with limits: SciPy's reader crashes on damaged files, and takes what sizes they state.
+_READER = """
+import os, sys, io, warnings
+try:
+    import resource
+    size = os.fstat(0).st_size
+    resource.setrlimit(resource.RLIMIT_AS, (768 * 2**20 + 4 * size,) * 2)
+    resource.setrlimit(resource.RLIMIT_CPU, (6 + size // 2**20,) * 2)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+except ImportError:  # a system without limits
+    pass
+try:
+    import numpy as np
+    from scipy.io import loadmat
+    warnings.simplefilter("ignore")
+    held = {}
+    for name, value in loadmat(sys.stdin.buffer, squeeze_me=True, struct_as_record=False).items():
+        fields = getattr(value, "_fieldnames", None)
+        if not name.startswith("__"):
+            held |= {name: value} if fields is None else {field: getattr(value, field) for field in fields}
+    kinds = dict.fromkeys("biuf", "f8") | {"c": "c16", "U": str}
+    arrays = [np.asarray(value) for value in held.values()]
+    arrays = [
+        each.astype(kinds[each.dtype.kind]) if each.dtype.kind in kinds else np.array("no numbers") for each in arrays
+    ]
+    if sum(each.nbytes for each in arrays) > 200 * 2**20:
+        raise ValueError("its variables take more than 200 MB: save the frequency response alone")
+    stream = io.BytesIO()
+    np.savez(stream, *arrays, names=np.array(list(held), dtype=str))
+    sys.stdout.buffer.write(stream.getbuffer())
+except MemoryError:
+    sys.exit("its variables need too much memory")
+except Exception as error:  # SciPy raises what its parts do
+    sys.exit(str(error) or type(error).__name__)
+"""
 
 
 def is_mat(path: Path, head: bytes) -> bool:
-    """Whether it is a MATLAB file.
-
-    Args:
-        path: of the file.
-        head: its first bytes.
-
-    Returns:
-        True by its first bytes, or by its name.
-    """
+    """Whether it is a MATLAB file."""
     return head[:6] == b"MATLAB" or path.suffix.lower() == ".mat"
 
 
 def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read a frequency response from a MATLAB file: a vector of frequencies, a complex one of the response.
-
-    Args:
-        path: of the file.
-        options: what the file does not say; `response_columns` names the variable, ``H`` or ``H:2`` for its 2nd column.
-
-    Returns:
-        One frequency response.
-
-    Raises:
-        RecordError: what was found and what is needed.
-        OSError: the file cannot be read.
-    """
+    """Read a frequency response from a MATLAB file: a vector of frequencies, a complex one of the response."""
     held = _variables(path)
     listed = ", ".join(f"{name} {_shape(value)}" for name, value in held.items()) or "nothing"
     name = next((each for each in held if each.lower() in (*_FREQUENCIES, *_ANGULAR)), None)
@@ -75,28 +95,29 @@ def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
 
 def _variables(path: Path) -> dict[str, Any]:
     """The variables of the file; those of a structure by the names of their fields."""
-    with path.open("rb") as file:
+    with open_file(path) as file:
         head = file.read(1024)
-    if b"MATLAB 7.3" in head[:128] or b"\x89HDF" in head:
-        raise RecordError(
-            f"{path}: a MATLAB file of version 7.3 (HDF5), which is not read: in MATLAB save it again with "
-            "save('file.mat', 'f', 'H', '-v7'), or export frequency, real and imaginary part as text"
+        if b"MATLAB 7.3" in head[:128] or b"\x89HDF" in head:
+            raise RecordError(
+                f"{path}: a MATLAB file of version 7.3 (HDF5), which is not read: in MATLAB save it again with "
+                "save('file.mat', 'f', 'H', '-v7'), or export frequency, real and imaginary part as text"
+            )
+        file.seek(0)
+        # -P: no module of the folder in which the command happens to run.
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", _READER], stdin=file, capture_output=True, check=False, env=environment
         )
-    from scipy.io import loadmat
-
-    try:
-        found = loadmat(path, squeeze_me=True, struct_as_record=False)
-    except OSError:
-        raise
-    except Exception as error:  # SciPy raises what its parts do
-        raise RecordError(f"{path}: the MATLAB file cannot be read: {error}") from error
-    held: dict[str, Any] = {}
-    for name, value in found.items():
-        if name.startswith("__"):
-            continue
-        fields = getattr(value, "_fieldnames", None)
-        held |= {name: value} if fields is None else {field: getattr(value, field) for field in fields}
-    return held
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip()[-200:] if done.returncode > 0 else "it is damaged"
+        raise RecordError(f"{path}: the MATLAB file cannot be read: {said}")
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as held:
+        values = [held[f"arr_{rank}"] for rank in range(len(held.files) - 1)]
+        names = [str(name) for name in held["names"]]
+    return {
+        name: str(value[()]) if value.dtype.kind == "U" and value.ndim == 0 else value
+        for name, value in zip(names, values, strict=True)
+    }
 
 
 def _shape(value: Any) -> str:

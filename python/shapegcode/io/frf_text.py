@@ -32,14 +32,7 @@ _BARE_COLUMNS = (3, 4)
 
 
 def part_of(text: str) -> str | None:
-    """Which part of a frequency response a column holds, by its header.
-
-    Args:
-        text: of the header.
-
-    Returns:
-        "frequency", "real", "imaginary", "magnitude", "phase", "coherence", or None.
-    """
+    """Which part of a frequency response a column holds, by its header."""
     if re.search(r"\|[^|]+\|", text):
         return "magnitude"
     words = re.findall(r"[^\W\d_]+", text.lower())
@@ -47,15 +40,7 @@ def part_of(text: str) -> str | None:
 
 
 def is_frf_text(path: Path, options: ReadOptions) -> bool:
-    """Whether a text file holds a frequency response: its header names a frequency and its parts, and no time.
-
-    Args:
-        path: of the file.
-        options: a column of time that they name makes it a time record.
-
-    Returns:
-        True for a frequency response.
-    """
+    """Whether a text file holds a frequency response: its header names a frequency and its parts, and no time."""
     if options.time_column is not None or options.period_s is not None:
         return False
     if path.suffix.lower() == ".frf":
@@ -73,19 +58,7 @@ def is_frf_text(path: Path, options: ReadOptions) -> bool:
 
 
 def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read a frequency response from text with columns.
-
-    Args:
-        path: of the file.
-        options: what the file does not say.
-
-    Returns:
-        One frequency response.
-
-    Raises:
-        RecordError: what was found and what is needed, with line and text of the cell.
-        OSError: the file cannot be read.
-    """
+    """Read a frequency response from text with columns."""
     table = TextTable(path, by_number=True)
     header = [label.text for label in table.labels(lambda text, _unit: Label(text, None, None))]
     if table.layout.delimiter == " " and table.layout.header:

@@ -27,33 +27,13 @@ def _functions(file: UffFile) -> list[tuple[int, dict[str, Any]]]:
 
 
 def is_frf_uff(path: Path, options: ReadOptions) -> bool:
-    """Whether a universal file holds frequency responses and no time record.
-
-    Args:
-        path: of the file.
-        options: for the reader.
-
-    Returns:
-        True for frequency responses.
-    """
+    """Whether a universal file holds frequency responses and no time record."""
     kinds = {int(data["func_type"]) for _, data in _functions(UffFile(path, options))}
     return _FRF in kinds and _TIME_RESPONSE not in kinds
 
 
 def read_frf_uff(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read the frequency responses of a universal file: that of the driving point, if it is among several.
-
-    Args:
-        path: of the file.
-        options: what the file does not say; `response_columns` names datasets by number.
-
-    Returns:
-        One or several frequency responses of one point and axis.
-
-    Raises:
-        RecordError: what was found and what is needed.
-        OSError: the file cannot be read.
-    """
+    """Read the frequency responses of a universal file: that of the driving point, if it is among several."""
     file = UffFile(path, options)
     functions = _functions(file)
     units = next((file.dataset(k) for k, kind in enumerate(file.types) if kind == 164), None)

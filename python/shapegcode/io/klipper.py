@@ -17,26 +17,12 @@ _OF_NAME = re.compile(r"raw_data_([xyz])(?:[_.]|$)|axis=([-0-9.]+),([-0-9.]+)", 
 
 
 def is_klipper(head: bytes) -> bool:
-    """Whether a file begins as Klipper's raw data do: ``#time,accel_x,accel_y,accel_z``.
-
-    Args:
-        head: its first bytes.
-
-    Returns:
-        True for raw data.
-    """
+    """Whether a file begins as Klipper's raw data do: ``#time,accel_x,accel_y,accel_z``."""
     return _HEADER.search(head[:400]) is not None
 
 
 def klipper_options(options: ReadOptions) -> ReadOptions:
-    """Options with the units that Klipper writes without saying them: s and mm/s².
-
-    Args:
-        options: what the user says.
-
-    Returns:
-        The same, with units where none are stated.
-    """
+    """Options with the units that Klipper writes without saying them: s and mm/s²."""
     scaled = options.response_scale is not None or options.response_unit is not None
     return replace(
         options,
@@ -47,19 +33,7 @@ def klipper_options(options: ReadOptions) -> ReadOptions:
 
 
 def read_sweep(path: Path, options: ReadOptions) -> Record:
-    """The record along the axis that was shaken.
-
-    Args:
-        path: of the file.
-        options: `axis` says which; else the name of the file (``raw_data_x_...``), else the axis that moved most.
-
-    Returns:
-        One record without force.
-
-    Raises:
-        RecordError: what is wrong in the file, with line and cell.
-        OSError: the file cannot be read.
-    """
+    """The record along the axis that was shaken."""
     told = options.axis or _axis_of_name(path.name)
     records = read_csv(path, replace(klipper_options(options), axis=told))
     record = max(records, key=lambda each: float(each.response.std()))

@@ -146,19 +146,7 @@ def _labels_known(cells: list[str]) -> int:
 
 
 def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
-    """Find out how a text file is written.
-
-    Args:
-        path: for messages.
-        head: its beginning, or all of it.
-        by_number: columns are named by number, so that no header is needed.
-
-    Returns:
-        Separator, decimal sign, header and first line of numbers.
-
-    Raises:
-        RecordError: no numbers, no header, or lines between header and numbers that are neither.
-    """
+    """Find out how a text file is written."""
     lines = _head_lines(head)
     rows = _find_rows(lines)
     if rows is None:

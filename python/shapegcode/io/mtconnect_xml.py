@@ -8,9 +8,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NoReturn
 from xml.parsers import expat
 
 from shapegcode.errors import RecordError
+from shapegcode.io.data_file import MAX_DEPTH, MAX_TEXT_BYTES
 from shapegcode.io.run_items import Item, ItemTable
 from shapegcode.io.run_notes import Event, FileNotes
 from shapegcode.io.stamps import Stamps
@@ -19,7 +21,8 @@ from shapegcode.io.text_lines import chunks
 __all__ = ["mtconnect_events"]
 
 #: An agent sends no more at once: its largest buffers hold a million.
-_MAX_OBSERVATIONS = 4_000_000
+_MAX_OBSERVATIONS = 1_000_000
+_MAX_ITEMS = 100_000
 #: Sub-types of which the value is not what the machine does, by kind of item.
 _LEFT_OUT = {"COMMANDED", "PROGRAMMED", "JOG", "TARGET", "PROBE", "INCREMENTAL", "SCHEDULE", "OVERRIDE"}
 _AXES = ("X", "Y", "Z")
@@ -27,25 +30,13 @@ _BEGIN = re.compile(rb"<\?xml\s|<(?:\w+:)?MTConnect(?:Streams|Devices|Error|Asse
 #: Bytes that the declaration of a document, or the beginning of its root, may need.
 _OVERLAP = 80
 _FEED_UNIT = "mm/s"
+_SEQUENCE = re.compile(r"\d{1,20}", re.ASCII)
 
 _Observation = tuple[int, int, float, bytes, Item, bytes]  # sequence, line, time, time stamp, item, text
 
 
 def mtconnect_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
-    """The values of the items that are used.
-
-    Args:
-        path: of the file: documents one behind the other, also with the headers of a multipart answer between them.
-        table: what the items are.
-        notes: takes what is left out.
-
-    Returns:
-        Events; within a document in the order of their sequence numbers, since it is sorted by component there.
-
-    Raises:
-        RecordError: no XML, cut off, or no streams.
-        OSError: the file cannot be read.
-    """
+    """The values of the items that are used."""
     reader = _Documents(path, table, notes)
     notes.feed_unit = _FEED_UNIT  # of PathFeedrate by the standard, whatever the control counts in
     for piece in chunks(path):
@@ -129,13 +120,14 @@ class _Document:
         self._axis = ""
         self._now: tuple[Item, dict[str, str], int] | None = None
         self._text: list[str] = []
+        self._text_length = 0
         self._fed = 0
         # A file in UTF-16 was turned into UTF-8 before it comes here, its declaration was not.
         self._parser = expat.ParserCreate("UTF-8" if transcoded else None, namespace_separator="}")
         self._parser.buffer_text = True
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
-        self._parser.CharacterDataHandler = self._text.append
+        self._parser.CharacterDataHandler = self._characters
         self._parser.EntityDeclHandler = self._refuse_entity
 
     @property
@@ -157,7 +149,24 @@ class _Document:
                 ) from error
             return max(0, self._parser.ErrorByteIndex - self._fed)
         self._fed += len(data)
+        if self._fed - self._parser.CurrentByteIndex > MAX_TEXT_BYTES + len(data):
+            self._refuse_long("a tag")
         return len(data)
+
+    def _characters(self, text: str) -> None:
+        self._text_length += len(text)
+        if self._text_length > MAX_TEXT_BYTES:
+            self._refuse_long("a text")
+        self._text.append(text)
+
+    def _refuse_long(self, what: str) -> NoReturn:
+        raise RecordError(
+            f"{self._path}:{self._here}: {what} of more than {MAX_TEXT_BYTES} bytes within <{self.open_element}>"
+        )
+
+    def _forget_text(self) -> None:
+        self._text.clear()
+        self._text_length = 0
 
     def _refuse_entity(self, *_: object) -> None:
         raise RecordError(f"{self._path}:{self._here}: an entity is declared: no MTConnectStreams document has one")
@@ -175,8 +184,10 @@ class _Document:
                 "MTConnectStreams, the answer to `sample`"
             )
         depth = len(self._open)
+        if depth == MAX_DEPTH:
+            raise RecordError(f"{self._path}:{self._here}: <{name}> is nested too deeply: at most {MAX_DEPTH} elements")
         self._open.append(name)
-        self._text.clear()
+        self._forget_text()
         if name == "Header" and depth == 1:
             self.instance = attributes.get("instanceId", "")
         elif name == "ComponentStream":
@@ -188,6 +199,8 @@ class _Document:
         kind = attributes.get("subType", ""), attributes.get("name", ""), attributes.get("dataItemId", "")
         key = (name + self._axis, *kind)
         if key not in self._known:
+            if len(self._known) == _MAX_ITEMS:
+                raise RecordError(f"{self._path}:{self._here}: more than {_MAX_ITEMS} different data items")
             self._known[key] = self._item(name, *kind)
         item = self._known[key]
         self._now = None if item is None else (item, attributes, self._here)
@@ -220,12 +233,12 @@ class _Document:
                 self._notes.add("stamp", line, f"{attributes['timestamp'][:40]!r} is no time stamp, left out")
             else:
                 sequence = attributes.get("sequence", "")
-                number = int(sequence) if sequence.isdigit() else -1
+                number = int(sequence) if _SEQUENCE.fullmatch(sequence) else -1
                 self.observations.append((number, line, time, stamp, item, text.encode()))
                 if len(self.observations) > _MAX_OBSERVATIONS:
                     raise RecordError(
                         f"{self._path}:{line}: more than {_MAX_OBSERVATIONS} observations in one document: ask the "
                         "agent for fewer at once (count)"
                     )
-        self._text.clear()
+        self._forget_text()
         self.ended = not self._open

@@ -81,32 +81,13 @@ _VOLTS = {"v": 1.0, "mv": 1e-3, "µv": 1e-6, "uv": 1e-6}
 
 
 def volts_of(unit_text: str) -> float | None:
-    """What a value in V, mV or µV is multiplied with to give volts.
-
-    Args:
-        unit_text: of a label; empty: volts.
-
-    Returns:
-        The factor; None: no unit of voltage.
-    """
+    """What a value in V, mV or µV is multiplied with to give volts."""
     plain = unit_text.strip().lower().replace("μ", "µ")
     return 1.0 if plain in {"", "volt", "volts"} else _VOLTS.get(plain)
 
 
 def per_volt(option: str, text: str, allowed: tuple[Measured, ...]) -> tuple[Unit, float]:
-    """What one volt means by a sensitivity.
-
-    Args:
-        option: its name, for messages.
-        text: such as "2.25 mV/N" or "100mV/g".
-        allowed: kinds of quantity.
-
-    Returns:
-        The unit of the quantity, and its SI value per volt.
-
-    Raises:
-        RecordError: it is not a number of V, mV or µV over a known unit.
-    """
+    """What one volt means by a sensitivity."""
     match = re.fullmatch(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([mµuμ]?V)\s*/\s*\(?(.+?)\)?\s*", text)
     unit = find_unit(match[3]) if match else None
     volts = volts_of(match[2]) if match else None
@@ -119,14 +100,6 @@ def per_volt(option: str, text: str, allowed: tuple[Measured, ...]) -> tuple[Uni
 
 
 def stated_unit(text: str | None, allowed: tuple[Measured, ...]) -> Unit | None:
-    """The unit of an option, if it is one of the quantities allowed.
-
-    Args:
-        text: of the option; None: not given.
-        allowed: kinds of quantity.
-
-    Returns:
-        The unit; None where the text is none of an allowed quantity.
-    """
+    """The unit of an option, if it is one of the quantities allowed."""
     unit = find_unit(text) if text else None
     return unit if unit is not None and unit.measures in allowed else None

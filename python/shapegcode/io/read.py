@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from shapegcode.errors import RecordError
+from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.options import ReadOptions
 from shapegcode.io.record import Record
@@ -17,19 +18,7 @@ _NO_TEXT = (".uff", ".unv", ".uf", ".uf58", ".wav", ".wave")
 
 
 def read_records(path: str | Path, options: ReadOptions | None = None) -> list[Record]:
-    """Read a file: CSV or other text columns, UFF (dataset 58, text or binary) or WAV, told apart by its content.
-
-    Args:
-        path: of the file.
-        options: what the file does not say.
-
-    Returns:
-        One record per response and measurement; recordings with several hits are not divided (`checks.split_hits`).
-
-    Raises:
-        RecordError: what was found and what is needed, with line and text of the cell where it is a text file.
-        OSError: the file cannot be read.
-    """
+    """Read a file: CSV or other text columns, UFF (dataset 58, text or binary) or WAV, told apart by its content."""
     path = Path(path)
     options = options or ReadOptions()
     head = _head(path)
@@ -61,19 +50,7 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
 
 
 def read_measurement(path: str | Path, options: ReadOptions | None = None) -> list[Record] | list[FrequencyResponse]:
-    """Read a file, whether it holds records over time or a frequency response without them.
-
-    Args:
-        path: of the file: CSV or other text columns, UFF, WAV, MATLAB.
-        options: what the file does not say.
-
-    Returns:
-        Records, or frequency responses (UFF of function type 4, .frf, .mat, text with frequency, Re and Im).
-
-    Raises:
-        RecordError: what was found and what is needed.
-        OSError: the file cannot be read.
-    """
+    """Read a file, whether it holds records over time or a frequency response without them."""
     path = Path(path)
     options = options or ReadOptions()
     head = _head(path)
@@ -95,9 +72,7 @@ def read_measurement(path: str | Path, options: ReadOptions | None = None) -> li
 
 def _head(path: Path) -> bytes:
     """The first bytes of a file that is one."""
-    if path.exists() and not path.is_file():
-        raise RecordError(f"{path}: not a regular file")
-    with path.open("rb") as file:
+    with open_file(path) as file:
         head = file.read(_BYTES_TO_KNOW)
     if not head.strip():
         raise RecordError(f"{path}: the file is empty; a record of time, force and acceleration is needed")

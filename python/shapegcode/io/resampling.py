@@ -45,15 +45,6 @@ class EvenGrid:
 def even_grid(times_s: FloatArray) -> EvenGrid:
     """The grid that uneven instants are dense enough for.
 
-    Args:
-        times_s: (n,) ascending instants.
-
-    Returns:
-        The grid: .8 of the mean rate, or as coarse as the longest step.
-
-    Raises:
-        UnevenTimeError: a step of more than three mean ones.
-
     Source: H. Landau, Acta Mathematica 117, 1967: samples denser than a band's Nyquist rate determine a signal in it;
     with no gap longer than the grid's period the solution is stable (K. Groechenig, 1992).
     """
@@ -78,16 +69,7 @@ def even_grid(times_s: FloatArray) -> EvenGrid:
 
 
 def resample(values: FloatArray, times_s: FloatArray, grid: EvenGrid) -> FloatArray:
-    """The band-limited signal that goes through the samples best, on a grid: least squares over sinc functions.
-
-    Args:
-        values: (n,) samples.
-        times_s: (n,) their instants.
-        grid: see `even_grid`.
-
-    Returns:
-        (m,) samples on the grid.
-    """
+    """The band-limited signal that goes through the samples best, on a grid: least squares over sinc functions."""
     offset = float(np.mean(values))
     place = (times_s - grid.times_s[0]) / grid.period_s
     first = np.floor(place).astype(int) - _REACH + 1

@@ -46,14 +46,7 @@ class RunCutter:
     """Takes events, gives runs; holds the values of one run at a time."""
 
     def __init__(self, source: str, table: ItemTable, feed_unit: str | None, max_values: int) -> None:
-        """Nothing was read yet.
-
-        Args:
-            source: file, for messages.
-            table: what the items are.
-            feed_unit: of the feed, where the user says it.
-            max_values: that a run may have.
-        """
+        """Nothing was read yet."""
         self.notes = FileNotes()
         self.feed_unit = feed_unit
         self._source = source
@@ -68,17 +61,7 @@ class RunCutter:
         self._given = False
 
     def runs(self, events: Iterator[Event]) -> Iterator[RunLog]:
-        """The runs of a log.
-
-        Args:
-            events: of the file, in its order.
-
-        Returns:
-            The runs, in their order.
-
-        Raises:
-            RecordError: no run, no block numbers, two controls in one file, or too many values.
-        """
+        """The runs of a log."""
         tracks, last, room, line = self._tracks, -math.inf, self._limit, 0
         for line, time, stamp, item, text in events:
             if not 0.0 <= time - last <= _QUIET_S:

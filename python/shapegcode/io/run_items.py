@@ -64,14 +64,7 @@ STATES: dict[str, State] = {word.replace("_", ""): state for state, words in _ST
 
 
 def plain_name(name: str) -> str:
-    """Letters and digits of a name in lower case: Block_Number and "block number" are the same.
-
-    Args:
-        name: of an item.
-
-    Returns:
-        What names are compared by.
-    """
+    """Letters and digits of a name in lower case: Block_Number and "block number" are the same."""
     return re.sub(r"[\W_]", "", name.lower())
 
 
@@ -82,17 +75,7 @@ for _role, _words in _NAMES.items():
 
 
 def stated_feed_unit(text: str) -> str:
-    """The name of a unit of feed, however it is spelt.
-
-    Args:
-        text: such as "in/min".
-
-    Returns:
-        Its name in `shapegcode.io.units`.
-
-    Raises:
-        RecordError: not known.
-    """
+    """The name of a unit of feed, however it is spelt."""
     unit = find_unit(text)
     if unit is None or unit.measures != "velocity":
         raise RecordError(f"unit {text!r} of the feed: must be one of {units_of('velocity')}")
@@ -141,14 +124,7 @@ class ItemTable:
         self._roles = frozenset(self.chosen or {})
 
     def find(self, *names: str) -> Item | None:
-        """What an item is.
-
-        Args:
-            names: under which it goes, the one for messages first: of a data item its name, its id, its kind.
-
-        Returns:
-            The item; None: of no use here.
-        """
+        """What an item is."""
         found = self._find(names)
         if found is not None:
             # The same item again, in another document, is one object: values are kept by it.
@@ -169,12 +145,5 @@ class ItemTable:
         return None
 
     def sought(self, role: Role) -> str:
-        """The names that are looked for, for messages.
-
-        Args:
-            role: of the item.
-
-        Returns:
-            Names between commas.
-        """
+        """The names that are looked for, for messages."""
         return (self.chosen or {}).get(role) or ", ".join(_NAMES[role].split()[:6])

@@ -27,24 +27,14 @@ class FileNotes:
         self._kinds: dict[str, tuple[list[str], int, int]] = {}
 
     def add(self, kind: str, line: int, text: str) -> None:
-        """Note something.
-
-        Args:
-            kind: what is alike is counted from the fourth one on.
-            line: of the file; 0: it has none.
-            text: what it is.
-        """
+        """Note something."""
         shown, count, _ = self._kinds.get(kind, ([], 0, 0))
         if len(shown) < _SHOWN:
             shown.append(f"line {line}: {text}" if line else text)
         self._kinds[kind] = shown, count + 1, line
 
     def taken(self) -> tuple[str, ...]:
-        """The notes, which are forgotten then.
-
-        Returns:
-            One text each.
-        """
+        """The notes, which are forgotten then."""
         found: list[str] = []
         for shown, count, line in self._kinds.values():
             found += shown

@@ -48,20 +48,7 @@ class _Header:
 
 
 def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
-    """The values of the columns that are used.
-
-    Args:
-        path: of the file: columns divided by comma, semicolon, tab or bar below a header; lines above it do not count.
-        table: what the columns are.
-        notes: takes what is left out, and the unit of the feed.
-
-    Returns:
-        Events in the order of the rows.
-
-    Raises:
-        RecordError: no header with a time and line numbers, or a row that is none.
-        OSError: the file cannot be read.
-    """
+    """The values of the columns that are used."""
     header = _header(path, table)
     notes.feed_unit = header.feed_unit
     stamps = Stamps()

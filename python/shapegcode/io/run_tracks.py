@@ -55,11 +55,7 @@ class Track:
     """The values of one item, as they come."""
 
     def __init__(self, item: Item) -> None:
-        """No value yet.
-
-        Args:
-            item: what it is.
-        """
+        """No value yet."""
         self.item = item
         self.counts = item.role in _COUNTS
         self.times = array("d")
@@ -73,22 +69,13 @@ class Track:
         return self.times[-1] if self.times else -math.inf
 
     def add_text(self, time: float, text: bytes) -> None:
-        """Take a value of text.
-
-        Args:
-            time: of it in s.
-            text: the value.
-        """
+        """Take a value of text."""
         assert self.texts is not None
         self.times.append(time)
         self.texts.append(text.decode("utf-8", errors="replace").strip())
 
     def drop_until(self, end: float) -> None:
-        """Drop values up to a time; the last of them stays, since it may hold on.
-
-        Args:
-            end: the time in s.
-        """
+        """Drop values up to a time; the last of them stays, since it may hold on."""
         if not self.times:
             return
         self.ever = True
@@ -108,15 +95,7 @@ class Track:
             self.times[0] = -math.inf
 
     def signal(self, start: float, end: float) -> Signal:
-        """The values of a run.
-
-        Args:
-            start: of the run in s.
-            end: of it.
-
-        Returns:
-            They and the last one before, where that still holds.
-        """
+        """The values of a run."""
         times, values = np.array(self.times), np.array(self.values)
         inside = (times >= start - _LEAD_IN_S) & (times <= end)
         before = np.flatnonzero(times < start - _LEAD_IN_S)
@@ -149,14 +128,7 @@ class RunPart:
     has_status: bool = True
 
     def restarted(self, tracks: Sequence[Track]) -> Iterator[RunPart]:
-        """Divide it where the program began anew after a stop, without a word of its end.
-
-        Args:
-            tracks: of all items.
-
-        Returns:
-            The runs, in their order.
-        """
+        """Divide it where the program began anew after a stop, without a word of its end."""
         rest = self
         for hold in self.holds:
             if hold.end is None or not hold.resumed[0] or not _began_anew(hold, rest, tracks):
@@ -188,17 +160,7 @@ def _began_anew(hold: Hold, part: RunPart, tracks: Sequence[Track]) -> bool:
 
 
 def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes: FileNotes) -> RunLog:
-    """Make the run.
-
-    Args:
-        part: from when to when.
-        tracks: of all items.
-        feed_unit: as the user or the file says it.
-        notes: to be taken into the run; what is said of its signals comes to them.
-
-    Returns:
-        The run.
-    """
+    """Make the run."""
     signals = {role: _best(part, tracks, role, notes) for role in _SIGNALS}
     block, counts = signals["block"], "line"
     texts = _texts(part, tracks, "block_text")

@@ -41,20 +41,7 @@ class UnevenTimeError(ValueError):
 def even_period(
     times_s: FloatArray, stated_s: float | None = None, *, even_clock: bool = True
 ) -> tuple[float, list[str]]:
-    """Mean period of evenly spaced instants, and warnings.
-
-    Args:
-        times_s: (n,) instants, n at least 3.
-        stated_s: a period stated elsewhere, which the instants must agree with; rounding of the instants to whole
-            digits longer than a period is then accepted.
-        even_clock: the clock itself is even, whatever digits it was written with; False: it need not be.
-
-    Returns:
-        The period in s, and warnings.
-
-    Raises:
-        UnevenTimeError: a gap, a repeated or a descending instant, a changing rate, or not the stated period.
-    """
+    """Mean period of evenly spaced instants, and warnings."""
     count = len(times_s)
     steps = np.diff(times_s)
     backwards = np.flatnonzero(steps < 0.0)

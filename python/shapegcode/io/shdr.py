@@ -22,20 +22,7 @@ _MARK = b"--multiline--"
 
 
 def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
-    """The values of the items that are used.
-
-    Args:
-        path: of the file.
-        table: what the items are.
-        notes: takes what is left out.
-
-    Returns:
-        Events in the order of the lines.
-
-    Raises:
-        RecordError: no line with a time stamp.
-        OSError: the file cannot be read.
-    """
+    """The values of the items that are used."""
     known: dict[bytes, Item | None] = {}
     seconds = Stamps().seconds
     number, readable = 0, False

@@ -30,18 +30,7 @@ class Stamps:
         self._base = 0.0
 
     def seconds(self, stamp: bytes) -> float:
-        """A time stamp as seconds.
-
-        Args:
-            stamp: date and time of ISO 8601, with or without zone; or day.month.year and time; or a time of the day; or
-                a number of seconds, or of milliseconds since 1970. What stands behind a @, a duration, does not count.
-
-        Returns:
-            Seconds; of stamps with a date since 1970-01-01 UTC, one without zone taken as UTC.
-
-        Raises:
-            ValueError: it is none of these.
-        """
+        """A time stamp as seconds."""
         if stamp[:_MINUTE] == self._minute and stamp[-1:] == b"Z":
             try:
                 second = float(stamp[_MINUTE:-1])

@@ -41,16 +41,7 @@ class TextTable:
     """
 
     def __init__(self, path: Path, *, by_number: bool = False) -> None:
-        """Read the file, and find out how it is written.
-
-        Args:
-            path: of the file.
-            by_number: columns are named by number, so that no header is needed.
-
-        Raises:
-            RecordError: no text, no numbers, no header, or lines between header and numbers that are neither.
-            OSError: the file cannot be read.
-        """
+        """Read the file, and find out how it is written."""
         self.path = path
         data = utf8_text(path)
         self.layout = find_layout(path, data, by_number)
@@ -62,32 +53,14 @@ class TextTable:
         self.data = data[offset:]
 
     def labels(self, read: Callable[[str, str], Label]) -> list[Label]:
-        """What the header says of each column.
-
-        Args:
-            read: a label and what the row of units says below it (empty: nothing) to what they mean.
-
-        Returns:
-            A label per column.
-        """
+        """What the header says of each column."""
         count = self.layout.columns
         units = [*self.layout.units, *[""] * count][:count]
         header = [*self.layout.header, *[""] * count][:count]
         return [read(text, unit) for text, unit in zip(header, units, strict=True)]
 
     def numbers(self, used: list[int], fewest: int) -> FloatArray:
-        """Some columns, shape (rows, columns used).
-
-        Args:
-            used: their indices.
-            fewest: rows that there must be.
-
-        Returns:
-            The values, float64, in the units of the file.
-
-        Raises:
-            RecordError: a cell is not a finite number, with line, column and text; or too few rows.
-        """
+        """Some columns, shape (rows, columns used)."""
         self.used = used
         try:
             table = self._table(self.data)
@@ -133,27 +106,13 @@ class TextTable:
                 yield number, text
 
     def first_cell(self, index: int) -> str:
-        """The cell of a column in the first row; empty where there is none.
-
-        Args:
-            index: of the column, from 0.
-
-        Returns:
-            Its text.
-        """
+        """The cell of a column in the first row; empty where there is none."""
         _, text = next((line for piece in self._pieces() for line in self._lines(*piece)), (0, ""))
         cells = cells_of(text, self.layout.delimiter)
         return cells[index] if index < len(cells) else ""
 
     def line_of(self, row: int) -> int:
-        """Line number of a row.
-
-        Args:
-            row: of numbers, from 0.
-
-        Returns:
-            The line, from 1.
-        """
+        """Line number of a row."""
         lines = (number for piece in self._pieces() for number, _ in self._lines(*piece))
         return next(islice(lines, row, None))
 

@@ -204,19 +204,7 @@ class _Chooser:
 
 
 def read_csv(path: Path, options: ReadOptions) -> list[Record]:
-    """Read a text file with columns.
-
-    Args:
-        path: of the file.
-        options: what the file does not say.
-
-    Returns:
-        One record per response column.
-
-    Raises:
-        RecordError: what was found and what is needed, with line and text of the cell.
-        OSError: the file cannot be read.
-    """
+    """Read a text file with columns."""
     named = (options.time_column, *options.response_columns)
     by_number = bool(options.response_columns) and all(name is None or name.strip().isdigit() for name in named)
     table = TextTable(path, by_number=by_number)

@@ -3,53 +3,25 @@
 from __future__ import annotations
 
 import codecs
-import gzip
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO, cast
 
 from shapegcode.errors import RecordError
 from shapegcode.io.cells import refuse_binary
+from shapegcode.io.data_file import MAX_TEXT_BYTES, DataFile
 
 __all__ = ["chunks", "head_of", "line_chunks"]
 
-_CHUNK_BYTES = 1 << 20
 _HEAD_BYTES = 65_536
-_GZIP = b"\x1f\x8b"
-
-
-def _opened(path: Path) -> BinaryIO:
-    if path.exists() and not path.is_file():
-        raise RecordError(f"{path}: not a regular file")
-    with path.open("rb") as file:
-        packed = file.read(2) == _GZIP
-    return cast(BinaryIO, gzip.open(path)) if packed else path.open("rb")
 
 
 def chunks(path: Path) -> Iterator[bytes]:
-    """Pieces of a file as UTF-8, without a byte order mark.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        The pieces, in order.
-
-    Raises:
-        RecordError: a packed file is cut off or damaged.
-        OSError: the file cannot be read.
-    """
+    """Pieces of a file as UTF-8, without a byte order mark."""
     decoder: codecs.IncrementalDecoder | None = None
     first = True
-    with _opened(path) as file:
-        while True:
-            try:
-                piece = file.read(_CHUNK_BYTES)
-            except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-                raise RecordError(f"{path}: the packed file is cut off or damaged: {error}") from error
-            if not piece:
-                return
+    with DataFile(path) as file:
+        for raw in file.pieces():
+            piece = raw
             if first and piece[:2] in {codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE}:
                 decoder = codecs.getincrementaldecoder("utf-16")(errors="replace")
             if decoder is not None:
@@ -61,42 +33,20 @@ def chunks(path: Path) -> Iterator[bytes]:
 
 
 def line_chunks(path: Path) -> Iterator[list[bytes]]:
-    """The lines of a file, many at a time, without their ends.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        Lists of lines, in order; the last line too where it has no end.
-
-    Raises:
-        RecordError: a packed file is cut off or damaged.
-        OSError: the file cannot be read.
-    """
+    """The lines of a file, many at a time, without their ends."""
     rest = b""
     for piece in chunks(path):
         lines = (rest + piece).split(b"\n")
         rest = lines.pop()
-        if len(rest) > _CHUNK_BYTES:
-            raise RecordError(f"{path}: a line of more than {_CHUNK_BYTES} bytes: no text with lines")
+        if len(rest) > MAX_TEXT_BYTES:
+            raise RecordError(f"{path}: a line of more than {MAX_TEXT_BYTES} bytes: no text with lines")
         yield lines
     if rest:
         yield [rest]
 
 
 def head_of(path: Path) -> bytes:
-    """The beginning of a file.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        Its first 64 kB, unpacked.
-
-    Raises:
-        RecordError: the file is empty or binary.
-        OSError: the file cannot be read.
-    """
+    """The beginning of a file."""
     head = next(chunks(path), b"")[:_HEAD_BYTES]
     if not head.strip():
         raise RecordError(f"{path}: the file is empty; needed is the log of a run")

@@ -66,15 +66,7 @@ class UffFile:
     """
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
-        """Read which datasets there are.
-
-        Args:
-            path: of the file.
-            options: what the file does not say.
-
-        Raises:
-            RecordError: the file cannot be read.
-        """
+        """Read which datasets there are."""
         import pyuff
 
         self.path, self.options = path, options
@@ -87,17 +79,7 @@ class UffFile:
             raise RecordError(f"{path}: the universal file cannot be read: {error}") from error
 
     def dataset(self, index: int) -> dict[str, Any]:
-        """One dataset as pyuff gives it.
-
-        Args:
-            index: of the dataset, from 0.
-
-        Returns:
-            Its fields.
-
-        Raises:
-            RecordError: it cannot be read.
-        """
+        """One dataset as pyuff gives it."""
         try:
             found: dict[str, Any] = self.uff.read_sets(index)
         except Exception as error:  # pyuff raises nothing narrower
@@ -107,11 +89,7 @@ class UffFile:
         return found
 
     def channels(self) -> list[_Channel]:
-        """The time records.
-
-        Raises:
-            RecordError: there is none, or one cannot be used.
-        """
+        """The time records."""
         units: dict[str, Any] = {}
         others: dict[str, int] = {}
         found: list[_Channel] = []
@@ -291,19 +269,7 @@ def _force_of(path: Path, response: _Channel, forces: list[_Channel], responses:
 
 
 def read_uff(path: Path, options: ReadOptions) -> list[Record]:
-    """Read the time records of a universal file.
-
-    Args:
-        path: of the file.
-        options: what the file does not say.
-
-    Returns:
-        One record per response; several measurements at one place are several records.
-
-    Raises:
-        RecordError: what was found and what is needed.
-        OSError: the file cannot be read.
-    """
+    """Read the time records of a universal file."""
     file = UffFile(path, options)
     channels = file.channels()
     forces = [each for each in channels if each.measures == "force"]

@@ -84,26 +84,12 @@ _UNITS = {
 
 
 def units_of(*measures: Measured) -> str:
-    """The units known for quantities, for messages.
-
-    Args:
-        measures: one or several quantities.
-
-    Returns:
-        Names of units, between commas; quantities between semicolons.
-    """
+    """The units known for quantities, for messages."""
     return "; ".join(", ".join(name for name in _FACTORS[each] if name[0] != "u") for each in measures)
 
 
 def find_unit(text: str) -> Unit | None:
-    """The unit that a text means, upper or lower case; None: not known.
-
-    Args:
-        text: such as "m/s^2", "kgf" or "[ms]".
-
-    Returns:
-        The unit with its factor to SI.
-    """
+    """The unit that a text means, upper or lower case; None: not known."""
     plain = text.strip().lower().replace("μ", "µ").replace("_per_", "/")
     plain = re.sub(r"[\s*·⋅()\[\]]", "", plain.replace("**", "^"))
     plain = plain.replace("⁻", "-").replace("¹", "1").replace("²", "2").replace("^", "")
@@ -114,18 +100,7 @@ def find_unit(text: str) -> Unit | None:
 
 
 def factor_between(unit: Unit, wanted: str) -> float:
-    """What a value in a unit is multiplied with to give it in another of the same quantity.
-
-    Args:
-        unit: of the value.
-        wanted: name of the other, for example "mm".
-
-    Returns:
-        The factor.
-
-    Raises:
-        ValueError: they measure different quantities.
-    """
+    """What a value in a unit is multiplied with to give it in another of the same quantity."""
     other = find_unit(wanted)
     if other is None or other.measures != unit.measures:
         raise ValueError(f"{unit.name} of {unit.measures} is not converted to {wanted}")
@@ -133,14 +108,6 @@ def factor_between(unit: Unit, wanted: str) -> float:
 
 
 def is_foreign_unit(text: str, measures: str | None) -> bool:
-    """Whether a text is a unit that is not converted, such as V, where a quantity of this kind is measured.
-
-    Args:
-        text: behind a name.
-        measures: kind of the quantity; None: not known.
-
-    Returns:
-        True for V, counts, lb and the like.
-    """
+    """Whether a text is a unit that is not converted, such as V, where a quantity of this kind is measured."""
     plain = re.sub(r"[\s^]", "", text.lower()).replace("²", "2").replace("μ", "µ")
     return plain in _FOREIGN or (measures == "time" and plain in _FOREIGN_TIMES)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import struct
+import io
 import warnings
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 from scipy.io import wavfile
 
 from shapegcode.errors import RecordError
+from shapegcode.io.data_file import read_file
 from shapegcode.io.options import ReadOptions
 from shapegcode.io.record import FloatArray, Record
 from shapegcode.io.sampling import STATED_RATE_TOLERANCE
@@ -23,15 +24,19 @@ def _channels(path: Path) -> tuple[int, FloatArray, bool]:
         with warnings.catch_warnings():
             # Chunks with titles and the like, which measuring programs add, are of no interest.
             warnings.simplefilter("ignore", wavfile.WavFileWarning)
-            rate, data = wavfile.read(path)
-    except (ValueError, EOFError, KeyError, TypeError, struct.error) as error:
+            # From memory: of a file SciPy takes the memory for as many samples as its header states.
+            rate, data = wavfile.read(io.BytesIO(read_file(path)))
+    except OSError:
+        raise
+    except Exception as error:  # SciPy raises what its parts do
         raise RecordError(
             f"{path}: the WAV file cannot be read ({error}); needed is PCM of 16, 24 or 32 bits, or float of 32 or 64"
         ) from error
     if data.ndim == 1:
         data = data[:, np.newaxis]
     if data.dtype.kind == "f":
-        return rate, data.astype(np.float64), False
+        with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one, and is told of as such
+            return rate, data.astype(np.float64), False
     if data.dtype == np.uint8:
         raise RecordError(
             f"{path}: 8 bits per sample resolve 1/128 of full scale, too coarse for a decay; needed are 16, 24 or 32 "
@@ -46,17 +51,6 @@ def read_wav(path: Path, options: ReadOptions) -> list[Record]:
 
     Float samples are in N and m/s² (or times the scales); integers are shares of full scale, which mean N and m/s² by
     the scales only.
-
-    Args:
-        path: of the file.
-        options: scales, and which channel is the force.
-
-    Returns:
-        One record.
-
-    Raises:
-        RecordError: what was found and what is needed.
-        OSError: the file cannot be read.
     """
     rate, data, shares = _channels(path)
     count, channels = data.shape

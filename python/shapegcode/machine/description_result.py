@@ -38,7 +38,7 @@ class OpenValue:
     share: float | None = None
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class MachineDescription(Result):
     """Every value of a machine with its unit, origin and meaning.
 

@@ -40,7 +40,7 @@ class DifferentValue:
     meaning: str
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class MachineDifference(Result):
     """What differs between two machines; where values come from does not count.
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode.errors import MachineError, Problem
+from shapegcode.io.data_file import read_file
 from shapegcode.machine import fanuc_motion, fanuc_program
 from shapegcode.machine.fanuc_draft import Draft
 from shapegcode.machine.fanuc_dump import read_dump
@@ -28,6 +29,7 @@ __all__ = ["import_parameters"]
 
 _EXPECTED = (20, 1013, 1401, 1420, 1430, 1604, 1610, 1620, 1622, 1660, 1735, 1783, 1820, 1825, 1826, 3401, 3402, 3410)
 _LONGEST_NAME = 60
+_MAX_DUMP_BYTES = 16 << 20
 _CLAMP = "read, but not the smallest of the clamps 1422, 1430, 1432 for any axis"
 _NO_KEY = {
     1020: "read: it says which of A1, A2, ... is X, Y, Z; no key holds it",
@@ -68,7 +70,7 @@ def import_parameters(
         ArgumentError: modes to keep of an axis for which the base has none, or that shall be rigid.
         OSError: a file cannot be read.
     """
-    data, file = (dump, source) if isinstance(dump, bytes) else (Path(dump).read_bytes(), str(dump))
+    data, file = (dump, source) if isinstance(dump, bytes) else (read_file(dump, _MAX_DUMP_BYTES), str(dump))
     draft = Draft(read_dump(data, file, fanuc_motion.NUMBERS | fanuc_program.NUMBERS), _started(base, name, file))
     take_program(draft)
     take_motion(draft)
@@ -113,7 +115,7 @@ def _started(base: Machine | None, name: str | None, file: str) -> dict[str, Any
 def _read_tables(files: Sequence[str | Path]) -> ControlTables:
     tables = ControlTables()
     for path in files:
-        data = Path(path).read_bytes()
+        data = read_file(path, _MAX_DUMP_BYTES)
         if not is_table(data):
             said = "no table of offsets or variables (G10L10P1R..., G10L2P1X..., G10L85P500(...), #500=...)"
             raise MachineError(str(path), (Problem("", "", said),))

@@ -101,7 +101,7 @@ class MissingParameter:
     why: str
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class ParameterImport(Result):
     """A control's parameter dump as a machine.
 

@@ -99,16 +99,7 @@ class FittedCircle:
 
     @classmethod
     def of(cls, arc: _core.ArcFigures | None, nominal_mm: float, centre_mm: FloatArray) -> FittedCircle | None:
-        """From the core; None where there is none.
-
-        Args:
-            arc: what was fitted.
-            nominal_mm: radius.
-            centre_mm: the programmed one, (2,).
-
-        Returns:
-            The circle in mm, or None.
-        """
+        """From the core; None where there is none."""
         if arc is None:
             return None
         x, y = (float(value) for value in (arc.fit.centre_mm - centre_mm) * 1e3)

@@ -34,20 +34,7 @@ class Job:
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
-    """Pairs of regions that are measured, those without a section left out.
-
-    Args:
-        program: what is measured.
-        nominal: whose path it is measured against.
-        machine: whose modes say what a short section is.
-        lines: sections by lines of the nominal program, first and last; None: by direction and centre.
-
-    Returns:
-        The pairs, in the order of the program.
-
-    Raises:
-        ArgumentError: no cut in the given lines.
-    """
+    """Pairs of regions that are measured, those without a section left out."""
     pairs = [pair for pair in paired_regions(program, nominal) if pair[1].path.length_mm > 0.0]
     own_blocks = program.shaped_regions > 0 and nominal is program
     joined = 1.0 if lines is not None else _joined(pairs, machine, own_blocks=own_blocks)

@@ -77,19 +77,7 @@ class MeasuredProgram:
         limit_um: float | None,
         warnings: Iterable[str] = (),
     ) -> MeasuredProgram:
-        """The figures of its regions together.
-
-        Args:
-            regions: in order.
-            program: its name.
-            shaped: how it was played.
-            measured_against: name of the nominal program.
-            limit_um: contour error that is allowed; None: it is not judged.
-            warnings: about the program and the machine.
-
-        Returns:
-            The program with the worst of its figures.
-        """
+        """The figures of its regions together."""
         kept = tuple(regions)
         figures = [region.figures for region in kept]
         contour = Tracks(
@@ -127,14 +115,7 @@ class MeasuredProgram:
         return f"{self.program}: played {played}, measured against {path}{judged}"
 
     def verdict(self, limit_um: float) -> str:
-        """By how much it keeps the tolerance or does not, and where.
-
-        Args:
-            limit_um: contour error that is allowed.
-
-        Returns:
-            The sentence.
-        """
+        """By how much it keeps the tolerance or does not, and where."""
         largest = self.contour_error_um.response.max
         within = f"leaves the path by {largest:.2f} µm at most"
         if self.ok is None:

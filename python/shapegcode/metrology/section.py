@@ -110,14 +110,7 @@ class MeasuredSection:
         )
 
     def name(self, number: int) -> str:
-        """Number, kind and lines in words.
-
-        Args:
-            number: of the section in its program, from 1.
-
-        Returns:
-            The words.
-        """
+        """Number, kind and lines in words."""
         kind = self.kind if self.arc is None else f"arc R{self.arc.nominal_radius_mm:g}"
         return f"{number} {kind}, {self.place}"
 

@@ -64,17 +64,7 @@ def _style(rank: int, row: _Row) -> str:
 def summary_table(
     title: str, programs: Mapping[str, Sections], whole: Mapping[str, tuple[float, float]], band_um: float
 ) -> Table:
-    """The largest of each figure with section and line, one column per program.
-
-    Args:
-        title: of the table.
-        programs: the sections of each by its name, all along the same path.
-        whole: time in s and contour error in µm of each.
-        band_um: settled is what stays within it.
-
-    Returns:
-        The table.
-    """
+    """The largest of each figure with section and line, one column per program."""
     rows = [
         _Row("cutting time s", tuple(f"{time_s:.2f}" for time_s, _ in whole.values())),
         _Row("contour error µm, corners included", tuple(f"{largest:.2f}" for _, largest in whole.values())),
@@ -150,18 +140,7 @@ def _width_off_um(section: MeasuredSection) -> list[float | None]:
 def section_table(
     title: str, programs: Mapping[str, Sections], limit_um: float | None, band_um: float, *, every: bool
 ) -> Table:
-    """The figures of each section, one column per program.
-
-    Args:
-        title: of the table.
-        programs: the sections of each by its name, all along the same path.
-        limit_um: contour error that is allowed; None: nothing is judged.
-        band_um: settled is what stays within it.
-        every: show all sections; False: of many those with the largest contour error.
-
-    Returns:
-        The table.
-    """
+    """The figures of each section, one column per program."""
     count = min(len(sections) for sections in programs.values())
     worst = [max(each[index].contour_error_um.response.max for each in programs.values()) for index in range(count)]
     shown = sorted(range(count), key=lambda index: -worst[index])[: None if every else _MOST_SECTIONS]

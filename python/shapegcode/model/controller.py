@@ -11,17 +11,7 @@ from shapegcode.machine import Machine
 def controller_model(
     machine: Machine, *, feed_override: float = 1.0, rapid_override: float = 1.0, shaped: bool | None = None
 ) -> _core.ControllerModel:
-    """The controller of a machine as the core times and plays it.
-
-    Args:
-        machine: the machine.
-        feed_override: scales every programmed feed, 1 = as programmed.
-        rapid_override: scales the rapid rates, 1 = full.
-        shaped: whether cuts are played as shaped blocks; None: those of which the program says so.
-
-    Returns:
-        The model, times in s, speeds in mm/s.
-    """
+    """The controller of a machine as the core times and plays it."""
     controller = machine.controller
     model = _core.ControllerModel()
     model.period_s = controller.interpolation_period_s
@@ -61,15 +51,7 @@ def controller_model(
 
 
 def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
-    """Look-ahead limits of a machine.
-
-    Args:
-        machine: whose limits.
-        arc_feed_ratio: feed on arcs relative to the programmed one.
-
-    Returns:
-        The limits, in mm and s.
-    """
+    """Look-ahead limits of a machine."""
     limits = _core.MotionLimits()
     controller = machine.controller
     axes = machine.axes.as_tuple()

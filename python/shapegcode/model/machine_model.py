@@ -98,17 +98,7 @@ class PlayingController:
         against: _core.Path | None = None,
         block_end: _core.BlockEnd | None = None,
     ) -> _core.PlaybackFigures:
-        """A path played from rest to rest and measured against itself or another one.
-
-        Args:
-            path: the blocks.
-            options: plant and what is measured; the filters become the controller's.
-            against: what it is measured against; None: itself.
-            block_end: rule of block timing, where there is no look-ahead; None: the controller's own.
-
-        Returns:
-            The figures, positions in mm.
-        """
+        """A path played from rest to rest and measured against itself or another one."""
         options.axis_filters = self.filters
         profile = self._planned(path)
         if profile is not None:
@@ -117,16 +107,7 @@ class PlayingController:
         return _core.play_blocks(path, against or path, block_end or self.model.block_end, self._override, options)
 
     def stream(self, path: _core.Path, options: _core.PlaybackOptions, rest_s: float) -> _core.PlayedStream:
-        """The same motion piece by piece, and what the plant does for a while behind its end.
-
-        Args:
-            path: the blocks.
-            options: plant; the filters become the controller's.
-            rest_s: how long the set-points rest behind the end, s.
-
-        Returns:
-            The motion, to be asked for piece by piece.
-        """
+        """The same motion piece by piece, and what the plant does for a while behind its end."""
         options.axis_filters = self.filters
         profile = self._planned(path)
         if profile is not None:
@@ -134,17 +115,7 @@ class PlayingController:
         return _core.PlayedStream.of_blocks(path, self.model.block_end, 1.0, options, rest_s)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: FloatArray, window_s: float) -> _core.Travel:
-        """How fast a path is travelled.
-
-        Args:
-            path: the blocks.
-            along: the path to whose length the stations ascend.
-            stations_mm: where the travel is asked for, (n,).
-            window_s: over which a feed is a mean.
-
-        Returns:
-            Time in s and speed in mm/s along the path.
-        """
+        """How fast a path is travelled."""
         period_s, profile = self.model.period_s, self._planned(path)
         if profile is not None:
             return _core.travel_path(path, profile, along, stations_mm, period_s, self.filters, window_s)
@@ -175,6 +146,18 @@ class MachineModel:
         ]
         self.slowest_decay_per_s = min(rates, default=math.inf)
         """Decay rate of the mode that rings longest: damping ratio times angular frequency; infinite without modes."""
+
+    def __reduce__(self) -> tuple[type[MachineModel], tuple[Machine]]:
+        """Built again from the machine: what the core holds does not travel."""
+        return MachineModel, (self.machine,)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same machine."""
+        return self.machine == other.machine if isinstance(other, MachineModel) else NotImplemented
+
+    def __hash__(self) -> int:
+        """That of the machine."""
+        return hash(self.machine)
 
     @cached_property
     def ordinary(self) -> PlayingController:
@@ -220,14 +203,7 @@ class MachineModel:
         return plain and machine.input.material_side is None
 
     def limits(self, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
-        """Look-ahead limits, a copy of one's own.
-
-        Args:
-            arc_feed_ratio: feed on arcs relative to the programmed one.
-
-        Returns:
-            The limits, in mm and s.
-        """
+        """Look-ahead limits, a copy of one's own."""
         return motion_limits(self.machine, arc_feed_ratio=arc_feed_ratio)
 
     def offset(self, region: _core.Region) -> Offset:
@@ -243,22 +219,7 @@ class MachineModel:
         only: str | None = None,
         offset: Offset = NO_OFFSET,
     ) -> _core.PlaybackOptions:
-        """Interpolation period and plant, with acceleration filters after interpolation.
-
-        Args:
-            plant: "modal" for the modes behind an ideal servo, "feed-drive" for `axes.*.drive`.
-            filters: behind the interpolation, such as those of `shaped` or `ordinary`.
-            shift: share of each mode's stated uncertainty by which it is off; see `axis_modes`.
-            only: the one mode that is off, such as "x.1"; None: all of them.
-            offset: from the command's positions to the machine's, for modes that vary with them.
-
-        Returns:
-            The options of the core.
-
-        Raises:
-            ArgumentError: there is no such plant.
-            MachineError: the machine has no feed drives.
-        """
+        """Interpolation period and plant, with acceleration filters after interpolation."""
         if plant not in PLANTS:
             raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
         options = _core.PlaybackOptions()
@@ -283,15 +244,6 @@ class MachineModel:
 
         Behind feed drives the residual is the swing of the table against its motor once that has arrived: the lag that
         runs out at a stop is no vibration.
-
-        Args:
-            filters: see `options`, and so the others.
-            shift: likewise.
-            only: likewise.
-            offset: likewise.
-
-        Returns:
-            The options of the core.
         """
         plant = self.machine.verdict.plant
         options = self.options(plant=plant, filters=filters, shift=shift, only=only, offset=offset)
@@ -311,20 +263,7 @@ class MachineModel:
         record_samples: int = 0,
         offset: Offset = NO_OFFSET,
     ) -> _core.PlaybackFigures:
-        """A cut as the controller executes an ordinary program.
-
-        Args:
-            path: of the cut.
-            against: the path that it is measured against; None: its own.
-            override: feed override, 1 = 100 %.
-            shift: see `options`.
-            only: likewise.
-            record_samples: samples kept for pictures.
-            offset: see `options`.
-
-        Returns:
-            The figures, positions in mm.
-        """
+        """A cut as the controller executes an ordinary program."""
         options = self.verdict_options(shift=shift, only=only, offset=offset)
         options.record_samples = record_samples
         controller = self.ordinary
@@ -335,16 +274,7 @@ class MachineModel:
     def play_rapid(
         self, start_mm: FloatArray, end_mm: FloatArray, options: _core.PlaybackOptions
     ) -> _core.PlaybackFigures:
-        """A rapid as the control makes it, from rest to rest, without its contour.
-
-        Args:
-            start_mm: where it starts, (3,).
-            end_mm: where it ends, (3,).
-            options: the plant.
-
-        Returns:
-            The figures, positions in mm.
-        """
+        """A rapid as the control makes it, from rest to rest, without its contour."""
         options.measure_contour = False
         samples = _core.rapid_samples(start_mm, end_mm, self.ordinary.model)
         still = _core.Path([_core.Segment.line(start_mm, start_mm, 1.0)])
@@ -371,31 +301,7 @@ class MachineModel:
         tracker: _core.ContourTracker | None = None,
         increment_mm: float | None = None,
     ) -> _core.PlaybackFigures:
-        """Emitted blocks as the controller plays them, measured against the programmed path.
-
-        Args:
-            blocks: what was emitted.
-            path: what was programmed.
-            block_end: rule of block timing; None: the controller's own.
-            override: feed override, 1 = 100 %.
-            contour: measure the deviations too.
-            command_contour: that of the command among them.
-            response_contour: that of the response.
-            last_seconds: play no more than the end; 0: all.
-            shift: see `options`.
-            only: likewise.
-            record_samples: samples kept for pictures.
-            offset: see `options`.
-            starved_blocks: behind each of these, tried one by one, the buffer is empty for `verdict.starved_s`.
-            memory_s: how long after that its vibration is looked at; 0: to the end.
-            other_overrides: feed overrides at which the largest deviations are measured beside this run.
-            tracker: of the programmed path, shared by several runs; None: one of its own.
-            increment_mm: least increment of the text: the speed is held against the programmed feed, less the two
-                increments by which rounding may lengthen a way; None: it is not.
-
-        Returns:
-            The figures, positions in mm.
-        """
+        """Emitted blocks as the controller plays them, measured against the programmed path."""
         options = self.verdict_options(filters=self.shaped.filters, shift=shift, only=only, offset=offset)
         options.measure_contour = contour
         if tracker is not None:
@@ -422,17 +328,7 @@ class MachineModel:
         offset: Offset = NO_OFFSET,
         tracker: _core.ContourTracker | None = None,
     ) -> _core.PlaybackFigures:
-        """Emitted blocks as the look-ahead plans them anew if it is left on, against the programmed path.
-
-        Args:
-            blocks: what was emitted.
-            path: what was programmed.
-            offset: see `options`.
-            tracker: of the programmed path, shared by several runs; None: one of its own.
-
-        Returns:
-            The figures, positions in mm.
-        """
+        """Emitted blocks as the look-ahead plans them anew if it is left on, against the programmed path."""
         ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
         filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
         options = self.verdict_options(filters=filters, offset=offset)

@@ -38,15 +38,7 @@ _AXES = "xyz"
 
 
 def still_mode(mode: AxisMode, part_mass_kg: float | None) -> _core.Mode:
-    """The mode that holds where no axis position counts: nominal, or as a stated mass of the part makes it.
-
-    Args:
-        mode: of the machine file.
-        part_mass_kg: mass of the part; None: not known.
-
-    Returns:
-        The mode as the core takes it.
-    """
+    """The mode that holds where no axis position counts: nominal, or as a stated mass of the part makes it."""
     nominal = _core.Mode(mode.frequency_hz, mode.damping_ratio, mode.participation)
     over = mode.frequency_over
     if over is None or over.mass_kg is None or part_mass_kg is None:
@@ -59,14 +51,6 @@ def axis_modes(machine: Machine, shift: float = 0.0, only: str | None = None) ->
     """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty, its damping at its low end.
 
     A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
-
-    Args:
-        machine: whose modes.
-        shift: share of each mode's stated uncertainty by which its frequency is moved; see `damping_scale`.
-        only: the one mode that is moved, "x.1" for the first of the X axis; None: all of them.
-
-    Returns:
-        Three lists, of X, Y, Z.
     """
     return [
         [
@@ -114,27 +98,12 @@ def damping_scale(mode: AxisMode, shift: float) -> float:
 def mode_tables(
     machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET, only: str | None = None
 ) -> list[list[_core.ModeTable]]:
-    """How the modes of X, Y, Z vary with the position of the command: `PlaybackOptions.mode_tables`.
-
-    Args:
-        machine: whose modes.
-        shift: see `axis_modes`.
-        offset: from the command's positions to the machine's; where it is None for the axis of a table, the mode
-            stays nominal.
-        only: see `axis_modes`.
-
-    Returns:
-        Three lists, of X, Y, Z.
-    """
+    """How the modes of X, Y, Z vary with the position of the command: `PlaybackOptions.mode_tables`."""
     return [[_table(mode, moved, offset) for mode, moved in modes] for modes in _moved(machine, shift, only)]
 
 
 def moving_axis(machine: Machine) -> int | None:
-    """The axis over whose position modes vary: 0, 1, 2 for X, Y, Z; None: there is none.
-
-    Raises:
-        ArgumentError: modes vary over the positions of several axes; shapers can follow one.
-    """
+    """The axis over whose position modes vary: 0, 1, 2 for X, Y, Z; None: there is none."""
     named = {mode.frequency_over.axis for _, _, mode in numbered_modes(machine) if mode.frequency_over is not None}
     axes = sorted(axis for axis in named if axis is not None)
     if len(axes) > 1:

@@ -32,18 +32,7 @@ class PlayedPrograms:
     plant: str = "modal"
 
     def scene(self, on_progress: Callable[[float], None] = lambda _done: None) -> Scene | None:
-        """Play them.
-
-        Args:
-            on_progress: called with the share that is done.
-
-        Returns:
-            Both motions; None: nothing moves.
-
-        Raises:
-            MachineError: the machine has no feed drives.
-            NumericError: the integrator of a feed drive fails.
-        """
+        """Play them."""
         return scene_of(
             self.original,
             self.machine,

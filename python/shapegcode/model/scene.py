@@ -85,25 +85,7 @@ def scene_of(
     most_points: int = MOST_POINTS,
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Scene:
-    """Play a program, and the one that was made of it, for a page.
-
-    Args:
-        original: what is played.
-        machine: controller and plant.
-        emitted: made of it; its table is measured against the original's path. None: none.
-        labels: of both, for people.
-        plant: "modal" or "feed-drive".
-        most_points: samples of each that are kept, at most.
-        on_progress: called with the share that is done.
-
-    Returns:
-        Both motions, their spectra, and the machine's modes.
-
-    Raises:
-        ArgumentError: `emitted` has no cut that the original has, or a plant that does not exist.
-        MachineError: the machine has no feed drives.
-        NumericError: the integrator of a feed drive fails.
-    """
+    """Play a program, and the one that was made of it, for a page."""
     programs = [original, *([emitted] if emitted is not None else [])]
     period_s = MachineModel(machine).period_s
     variants, spectra, said = [], [], []

@@ -13,15 +13,7 @@ _WHOLE = 1e-6
 
 
 def stamp_of_machine(machine: Machine, *, version: str = "") -> Stamp:
-    """The part of a header that the machine alone decides.
-
-    Args:
-        machine: whose modes and filter stand in it.
-        version: of shapegcode.
-
-    Returns:
-        The header without block period and shaper.
-    """
+    """The part of a header that the machine alone decides."""
     modes = [
         f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
         for axis, modes in zip("XYZ", axis_modes(machine), strict=True)
@@ -39,15 +31,7 @@ def _own_filter(machine: Machine) -> str:
 
 
 def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]:
-    """Why the verdict in the header of an emitted program does not hold here.
-
-    Args:
-        program: any; one without the converter's header has nothing to warn of.
-        machine: that shall run it.
-
-    Returns:
-        Pairs of a short stable name and a sentence: "edited", "other_machine", "other_period", "unmarked".
-    """
+    """Why the verdict in the header of an emitted program does not hold here."""
     stamp = program.stamp
     if stamp is None:
         return []
@@ -96,14 +80,7 @@ def _other_period(stamp: Stamp, machine: Machine) -> str:
 
 
 def shaped_note(program: Program) -> str:
-    """How a program is played, in one sentence; empty for one without shaped regions.
-
-    Args:
-        program: any.
-
-    Returns:
-        The sentence.
-    """
+    """How a program is played, in one sentence; empty for one without shaped regions."""
     shaped, whole = program.shaped_regions, len(program.regions)
     if not shaped:
         return ""

@@ -20,15 +20,7 @@ _NUMBERS = (("SupportsFloat | SupportsIndex", "float"), ("SupportsInt | Supports
 
 
 def with_signature(value: T) -> T:
-    """A function or class of the core, with the signature that stands in its docstring.
-
-    Args:
-        value: what the core exports.
-
-    Returns:
-        The class itself; in place of a function one of Python that calls it; everything else as it is, errors and
-        classes without a constructor too.
-    """
+    """A function or class of the core, with the signature that stands in its docstring."""
     if isinstance(value, type):
         if not issubclass(value, BaseException) and (found := _signature(value.__init__.__doc__)):
             taken = list(found.parameters.values())[1:]  # without self

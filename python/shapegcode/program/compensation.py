@@ -27,12 +27,7 @@ _SLACK_MM = 0.0005  # a radius that differs by more is another one
 
 
 def read_for_conversion(path: str | Path, machine: Machine, *, program_number: int | str | None = None) -> Program:
-    """Read a program file or text as `convert` wants it: compensation expanded only if `input.compensation` says so.
-
-    Raises:
-        ProgramError: see :meth:`Program.read`; compensation is refused; the memory would not hold what is written.
-        OSError: the file cannot be read.
-    """
+    """Read a program file or text as `convert` wants it: compensation expanded only if `input.compensation` says so."""
     expand = machine.input.compensation == "expand"
     program = Program.read(path, machine, program_number=program_number, expand_compensation=expand)
     require_decision(program, machine)
@@ -45,12 +40,7 @@ def read_for_conversion(path: str | Path, machine: Machine, *, program_number: i
 
 
 def program_for_conversion(program: Program | str | Path, machine: Machine) -> Program:
-    """A program as it is, or read from its file as `convert` wants it.
-
-    Raises:
-        ArgumentError: it was read with other settings than the machine has.
-        ProgramError, OSError: see `read_for_conversion`.
-    """
+    """A program as it is, or read from its file as `convert` wants it."""
     if not isinstance(program, Program):
         return read_for_conversion(program, machine)
     program.require_machine(machine)
@@ -59,11 +49,7 @@ def program_for_conversion(program: Program | str | Path, machine: Machine) -> P
 
 
 def require_decision(program: Program, machine: Machine) -> None:
-    """Refuse a program with G41 or G42 unless the machine file says what becomes of it.
-
-    Raises:
-        ProgramError: compensation is refused, its radius is not known, or the program was read otherwise.
-    """
+    """Refuse a program with G41 or G42 unless the machine file says what becomes of it."""
     core, policy = program.core, machine.input.compensation
     if policy == "expand":
         for line, _, _, message, file in core.warnings:
@@ -87,11 +73,7 @@ def require_decision(program: Program, machine: Machine) -> None:
 
 
 def refuse_zero_radius(program: Program) -> None:
-    """Refuse a program whose compensation was expanded with a radius of 0: the tool would cut on its contour.
-
-    Raises:
-        ProgramError: with the line, the offset, and what to set.
-    """
+    """Refuse a program whose compensation was expanded with a radius of 0: the tool would cut on its contour."""
     for line, _, _, message, file in program.core.warnings:
         if found := _ZERO_RADIUS.match(message):
             number = found[1]

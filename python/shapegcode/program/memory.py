@@ -16,27 +16,14 @@ _SMALL_BYTES = 2**20
 
 
 def available_bytes() -> int | None:
-    """Memory that this process may still take: of the machine, of its control group, and of its own limits.
-
-    Returns:
-        Bytes; None: the system does not say.
-    """
+    """Memory that this process may still take: of the machine, of its control group, and of its own limits."""
     found = [_of_meminfo("MemAvailable"), *_of_groups(), *_of_own_limits()]
     known = [value for value in found if value is not None]
     return max(0, min(known)) if known else None
 
 
 def require_memory(source: str, needed: int, what: str) -> None:
-    """Refuse what the memory would not hold.
-
-    Args:
-        source: names the program in the message.
-        needed: bytes, as measured on programs like it.
-        what: needs them, in words.
-
-    Raises:
-        ProgramError: more than what is available; the message has both.
-    """
+    """Refuse what the memory would not hold."""
     available = available_bytes()
     if available is not None and needed > available:
         raise ProgramError(
@@ -46,16 +33,7 @@ def require_memory(source: str, needed: int, what: str) -> None:
 
 
 def require_memory_for_lines(text: bytes, source: str, per_line: int = _PER_LINE) -> None:
-    """Refuse a program text whose lines the memory would not hold; one of less than a megabyte is not counted.
-
-    Args:
-        text: of the program.
-        source: names it in the message.
-        per_line: bytes for each line.
-
-    Raises:
-        ProgramError: more than what is available.
-    """
+    """Refuse a program text whose lines the memory would not hold; one of less than a megabyte is not counted."""
     if len(text) > _SMALL_BYTES:
         lines = text.count(b"\n")
         require_memory(source, lines * per_line, f"{lines} lines are to be read")

@@ -80,12 +80,5 @@ FIRST_RUN = Habit(
 
 
 def no_room(room_bytes: int) -> str:
-    """What to do with a shaped program that the memory of the control does not hold.
-
-    Args:
-        room_bytes: of the memory.
-
-    Returns:
-        The ways in words, the best one first.
-    """
+    """What to do with a shaped program that the memory of the control does not hold."""
     return f"convert the original with --max-bytes {room_bytes}; or memory card, data server or drip feed (DNC)"

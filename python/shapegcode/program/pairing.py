@@ -17,20 +17,7 @@ _SAME_PLACE_MM = 0.005
 
 
 def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.Region, _core.Region]]:
-    """Regions of a program beside those of the nominal one, found by where they start and end.
-
-    Args:
-        program: what is played.
-        nominal: whose path it shall follow; may be the same.
-
-    Returns:
-        Pairs in the order of the nominal program. Regions of `program` that it does not have (a rapid that was shaped)
-        are left out.
-
-    Raises:
-        ArgumentError: a region of the nominal program has no partner, or its path is not known: it has G41 or G42 with
-            a radius that nothing gives.
-    """
+    """Regions of a program beside those of the nominal one, found by where they start and end."""
     if program is nominal:
         yield from ((region, region) for region in program.regions)
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -26,7 +26,7 @@ _KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
 ARC_OFF_RADIUS = "off its radius"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Program:
     """A program that was read.
 
@@ -150,20 +150,7 @@ class Program:
             expand_compensation=expand_compensation,
             collect_alarms=collect_alarms,
         )
-        options = reading.options([folder] if folder is not None else [])
-        if program_number is not None:
-            index = index_of(data, program_number, source)
-            options.program_index = -1 if index is None else index
-            options.program = program_number if isinstance(program_number, int) and index is None else -1
-        try:
-            core = _core.read_program(data, options)
-        except ProgramError as error:
-            hint = _absolute_centre_hint(data, options) if ARC_OFF_RADIUS in str(error) else ""
-            raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
-
-        # The core leaves the mark out too.
-        whole = data.removeprefix(codecs.BOM_UTF8) if core.expanded else None
-        return cls(core, source, reading, whole, folder, program_number)
+        return _read(data, source, reading, folder, program_number)
 
     @classmethod
     def from_parts(
@@ -189,6 +176,21 @@ class Program:
         except ProgramError as error:
             raise located_error(error.file or source, error.line, error.column, str(error), error.alarm) from None
         return cls(core, source, reading, core.unexpanded if core.expanded else None)
+
+    def __reduce__(self) -> tuple[Callable[..., Program], tuple[object, ...]]:
+        """Read again from its text, and from those of the programs that it called."""
+        return _read, (self.text, self.source, self.reading, self.folder, self.number)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same text, read in the same way."""
+        if not isinstance(other, Program):
+            return NotImplemented
+        mine, others = ((each.source, each.number, each.reading, each.size) for each in (self, other))
+        return mine == others and self.view() == other.view()
+
+    def __hash__(self) -> int:
+        """By name and size: equal programs have the same ones."""
+        return hash((self.source, self.size))
 
     def require_machine(self, machine: Machine) -> None:
         """Refuse a machine that would read this program otherwise than the one that read it.
@@ -337,6 +339,22 @@ class Program:
         return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
 
 
+def _read(data: bytes, source: str, reading: Reading, folder: Path | None, number: int | str | None) -> Program:
+    options = reading.options([folder] if folder is not None else [])
+    if number is not None:
+        index = index_of(data, number, source)
+        options.program_index = -1 if index is None else index
+        options.program = number if isinstance(number, int) and index is None else -1
+    try:
+        core = _core.read_program(data, options)
+    except ProgramError as error:
+        hint = _absolute_centre_hint(data, options) if ARC_OFF_RADIUS in str(error) else ""
+        raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
+    # The core leaves the byte-order mark out too.
+    whole = data.removeprefix(codecs.BOM_UTF8) if core.expanded else None
+    return Program(core, source, reading, whole, folder, number)
+
+
 def least_increment_mm(machine: Machine, units: int) -> float:
     """Least increment of the words of a program in G20 or G21, mm."""
     controller = machine.controller
@@ -350,28 +368,13 @@ def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
     """How far the end of a region lies from the nearest position that its words can name.
 
     A program that changes between G20 and G21, or that has more digits than the control resolves, may end elsewhere.
-
-    Args:
-        region: of a program.
-        increment_mm: least increment of its words.
-
-    Returns:
-        Of X, Y and Z, mm; 0 where only the rounding of floating-point numbers is left.
     """
     off = [abs(each / increment_mm - round(each / increment_mm)) for each in map(float, region.path.end_mm)]
     return [each * increment_mm if each > _ON_INCREMENT else 0.0 for each in off]
 
 
 def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
-    """Which axes rest through a whole region where none of its words leads: nothing may be written of them.
-
-    Args:
-        region: of a program.
-        increment_mm: least increment of its words.
-
-    Returns:
-        Of X, Y and Z.
-    """
+    """Which axes rest through a whole region where none of its words leads: nothing may be written of them."""
     off_mm = end_off_grid_mm(region, increment_mm)
     return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 
@@ -395,12 +398,7 @@ def _absolute_centre_hint(text: bytes, options: _core.ReaderOptions) -> str:
 
 
 def given_program(program: Program | str | Path, machine: Machine) -> Program:
-    """A program as it is, or read from its file as the controller of `machine` would.
-
-    Raises:
-        ArgumentError: it was read with other settings than the machine has.
-        ProgramError, OSError: see :meth:`Program.read`.
-    """
+    """A program as it is, or read from its file as the controller of `machine` would."""
     if not isinstance(program, Program):
         return Program.read(program, machine)
     program.require_machine(machine)

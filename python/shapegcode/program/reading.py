@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
+from shapegcode.io.data_file import open_file
 from shapegcode.program.memory import require_memory
 from shapegcode.settings.keys import toml
 
@@ -48,6 +51,7 @@ class Reading:
         probe_lines: ascending line numbers behind which the modal state is kept.
         expand_compensation: G41/G42 became plain moves.
         collect_alarms: the reader went on behind an alarm.
+        called: name and text of programs in other files that it calls, by O number; found when it was read.
     """
 
     machine: Machine
@@ -56,16 +60,10 @@ class Reading:
     probe_lines: tuple[int, ...] = ()
     expand_compensation: bool = True
     collect_alarms: bool = False
+    called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
     def options(self, folders: Sequence[Path]) -> _core.ReaderOptions:
-        """Settings with which the core reads a text so.
-
-        Args:
-            folders: where called programs are looked for, before `input.program_folders`.
-
-        Returns:
-            The options of the core.
-        """
+        """Settings with which the core reads a text so."""
         options = reader_options(
             self.machine,
             emitted=self.emitted,
@@ -77,18 +75,12 @@ class Reading:
             options.opaque_programs = list(_ANY_PROGRAM)
         folders = [*folders, *(Path(name).expanduser() for name in self.machine.input.program_folders)]
         if folders:
-            options.load_program = program_loader(folders, self.machine.controller.max_program_bytes)
+            load = program_loader(folders, self.machine.controller.max_program_bytes)
+            options.load_program = partial(_called, self.called, load)
         return options
 
     def differences(self, machine: Machine) -> list[str]:
-        """Settings with which another machine would read the text otherwise.
-
-        Args:
-            machine: the other one.
-
-        Returns:
-            Each with both values; none where both machines read alike.
-        """
+        """Settings with which another machine would read the text otherwise."""
         if machine is self.machine:
             return []
         unused = {"input.arc_centre"} if self.emitted else set()
@@ -99,6 +91,15 @@ class Reading:
             for key, value in mine.items()
             if value != other[key] and key not in unused
         ]
+
+
+def _called(
+    known: dict[int, tuple[str, bytes]], load: Callable[[int], tuple[str, bytes] | None], number: int
+) -> tuple[str, bytes] | None:
+    """A program of another file, kept with the reading: it is read again where these files are not."""
+    if number not in known and (found := load(number)) is not None:
+        known[number] = found
+    return known.get(number)
 
 
 def _settings_of_reading(machine: Machine) -> dict[str, object]:
@@ -128,18 +129,7 @@ def reader_options(
     expand_compensation: bool = True,
     collect_alarms: bool = False,
 ) -> _core.ReaderOptions:
-    """Settings with which the core reads a program of this machine.
-
-    Args:
-        machine: whose controller reads the text.
-        emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
-        probe_lines: ascending line numbers behind which the modal state is kept.
-        expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
-        collect_alarms: go on behind an alarm.
-
-    Returns:
-        The options of the core.
-    """
+    """Settings with which the core reads a program of this machine."""
     options = _core.ReaderOptions()
     options.calculator_decimal_point = machine.controller.calculator_decimal_point
     options.absolute_arc_centres = machine.input.arc_centre == "absolute" and not emitted
@@ -227,22 +217,10 @@ PROGRAM_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".
 
 
 def program_bytes(path: str | Path, most: int) -> bytes:
-    """Content of a program file.
-
-    Args:
-        path: the file.
-        most: bytes that are of use to the caller.
-
-    Returns:
-        Its bytes, no more than one beyond `most`: of a file without an end neither.
-
-    Raises:
-        ProgramError: the memory would not hold what is read of it.
-        OSError: the file cannot be read; it names the file, which a failed read() alone does not.
-    """
+    """Content of a program file."""
     try:
-        with Path(path).open("rb") as file:
-            size = min(os.fstat(file.fileno()).st_size, most + 1)  # 0 of what is no file
+        with open_file(path) as file:
+            size = min(os.fstat(file.fileno()).st_size, most + 1)
             require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
             return file.read(most + 1)
     except OSError as error:
@@ -250,15 +228,7 @@ def program_bytes(path: str | Path, most: int) -> bytes:
 
 
 def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[str, bytes] | None]:
-    """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix.
-
-    Args:
-        folders: where to look, in this order.
-        most: bytes of it that are of use, see `program_bytes`.
-
-    Returns:
-        A function of the O number: name and content of the file, None where there is none.
-    """
+    """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix."""
 
     def load(number: int) -> tuple[str, bytes] | None:
         for folder in folders:

@@ -11,7 +11,7 @@ from shapegcode.results.result import Result
 __all__ = ["Expansion"]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Expansion(Result):
     """The plain program that calls, macros and coordinate modes come to.
 

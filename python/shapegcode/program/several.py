@@ -40,30 +40,13 @@ class ProgramPlace:
 
 
 def is_subprogram(text: bytes) -> bool:
-    """Whether a program only returns to who called it: M99, and neither M02 nor M30.
-
-    Args:
-        text: of the program.
-
-    Returns:
-        True for a subprogram.
-    """
+    """Whether a program only returns to who called it: M99, and neither M02 nor M30."""
     plain = _COMMENT.sub(b"", text).upper()
     return _RETURNS.search(plain) is not None and _ENDS.search(plain) is None
 
 
 def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
-    """The programs of a text, in the order in which they stand.
-
-    Args:
-        text: of the file.
-
-    Returns:
-        One place for each; at least one.
-
-    Raises:
-        ProgramError: the text is cut off, or two programs of one folder have the same number.
-    """
+    """The programs of a text, in the order in which they stand."""
     entries = _core.list_programs(text)
     short = [_own_name(entry) for entry in entries]
     long = [_with_folder(entry) for entry in entries]
@@ -79,19 +62,7 @@ def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
 
 
 def place_of(text: bytes, wanted: str, source: str) -> int:
-    """Which program of a text is meant.
-
-    Args:
-        text: of the file.
-        wanted: ``O1234``, ``<NAME>``, either behind its folder, or ``#3`` for the third one.
-        source: names the text in messages.
-
-    Returns:
-        How many programs stand before it.
-
-    Raises:
-        ProgramError: there is none of that name, or more than one: the message lists what to ask for.
-    """
+    """Which program of a text is meant."""
     entries, places = _core.list_programs(text), programs_of(text)
     if match := _PLACE.fullmatch(wanted):
         found = [index for index in range(len(places)) if index == int(match[1]) - 1]
@@ -113,19 +84,7 @@ def place_of(text: bytes, wanted: str, source: str) -> int:
 
 
 def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
-    """Place of a program among several of a text, so that it is read alone.
-
-    Args:
-        text: of the file.
-        wanted: its O number, or an address as `place_of` takes it.
-        source: names the text in messages.
-
-    Returns:
-        How many programs stand before it; None: the text is one program, or has none of this O number.
-
-    Raises:
-        ProgramError: there is none of this address, or more than one.
-    """
+    """Place of a program among several of a text, so that it is read alone."""
     try:
         entries = _core.list_programs(text)
     except _core.ProgramError:
@@ -139,16 +98,7 @@ def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
 
 
 def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPlace, ...]:
-    """Programs of a text that one of them needs on the control, because calls of them were kept.
-
-    Args:
-        text: of the file.
-        index: how many programs stand before the one that calls.
-        kept: O numbers whose calls were kept in it.
-
-    Returns:
-        Their places, with those that they call in turn by a number that stands in the call, in the order of the text.
-    """
+    """Programs of a text that one of them needs on the control, because calls of them were kept."""
     entries, places = _core.list_programs(text), programs_of(text)
     found: set[int] = set()
     waiting = [(index, number) for number in kept]
@@ -168,16 +118,7 @@ def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPl
 
 
 def alone_with(program: bytes | memoryview, text: bytes, needed: Sequence[ProgramPlace]) -> bytes | memoryview:
-    """A program that stands alone, and behind it others as they are in the file that it comes from.
-
-    Args:
-        program: with its own lines "%" where the file has them.
-        text: of the file.
-        needed: which of its programs.
-
-    Returns:
-        The text; the program itself where nothing is needed.
-    """
+    """A program that stands alone, and behind it others as they are in the file that it comes from."""
     if not needed:
         return program
     whole = bytes(program)

@@ -99,14 +99,7 @@ class Stamp:
         return [first, _PENDING.decode(), *rest]
 
     def difference(self, other: Stamp) -> str:
-        """In what the machine of another header differs, in words; empty: in nothing that counts.
-
-        Args:
-            other: as a machine would have it.
-
-        Returns:
-            The first difference.
-        """
+        """In what the machine of another header differs, in words; empty: in nothing that counts."""
         pairs = (
             ("machine", self.machine, other.machine),
             ("modes", ", ".join(self.modes) or "none", ", ".join(other.modes) or "none"),
@@ -124,26 +117,12 @@ def _shown(text: str) -> str:
 
 
 def plain_comment(text: str) -> str:
-    """Only what a FANUC comment may hold: capitals, digits and plain signs.
-
-    Args:
-        text: any.
-
-    Returns:
-        The same with blanks in place of everything else.
-    """
+    """Only what a FANUC comment may hold: capitals, digits and plain signs."""
     return "".join(c if c.isalnum() or c in " .-" else " " for c in text.upper())
 
 
 def stamp_of(text: bytes) -> Stamp | None:
-    """The header of a program that the converter wrote.
-
-    Args:
-        text: of any program.
-
-    Returns:
-        What it says; None: the converter did not write this program.
-    """
+    """The header of a program that the converter wrote."""
     begin = text.find(STAMP_BEGIN)
     if begin < 0:
         return None
@@ -177,12 +156,6 @@ def text_mark(text: bytes) -> str:
 
     Comments, blanks, kinds of line end, N words, the program's number and `%` do not count: what a control or an
     editor changes in passing.
-
-    Args:
-        text: of the program.
-
-    Returns:
-        The CRC-32 of the rest.
     """
 
     def chunks() -> Iterator[bytes]:
@@ -229,16 +202,7 @@ def _one_end(text: bytes) -> bytes:
 
 
 def judged(text: bytes, *, good: bool, better: bool = False) -> bytes:
-    """An emitted program with verdict and mark in its header.
-
-    Args:
-        text: with an open verdict, or one that was good before.
-        good: False: nobody should run it.
-        better: it misses a tolerance, as the original does, and is better.
-
-    Returns:
-        The text, as long as it was.
-    """
+    """An emitted program with verdict and mark in its header."""
     changes = _changes(text.find, text_mark(text), good=good, better=better)
     if not changes:
         return text
@@ -249,26 +213,12 @@ def judged(text: bytes, *, good: bool, better: bool = False) -> bytes:
 
 
 def mark_of(program: _core.ProgramText) -> str:
-    """The mark of a program that was read; see `text_mark`.
-
-    Args:
-        program: any.
-
-    Returns:
-        Eight hexadecimal digits.
-    """
+    """The mark of a program that was read; see `text_mark`."""
     return _mark_of(_lines_of(program))
 
 
 def judge(program: _core.ProgramText, mark: str, *, good: bool, better: bool = False) -> None:
-    """The same in the text of a program that was read; it holds what it held in the same places.
-
-    Args:
-        program: whose header has an open verdict, or one that was good before.
-        mark: of its text.
-        good: as `judged` takes them.
-        better: likewise.
-    """
+    """The same in the text of a program that was read; it holds what it held in the same places."""
     for begin, after in _changes(program.find, mark, good=good, better=better):
         program.overwrite(begin, after)
 

@@ -23,14 +23,7 @@ _LIKELY = (
 
 
 def signs_of_turning(text: bytes) -> tuple[int, str] | None:
-    """What shows that a program is one of a lathe; a program with Y words or a tool change M06 is none.
-
-    Args:
-        text: the program; its first 64 kB are looked at.
-
-    Returns:
-        Line of the first sign and the signs in words; None: it is taken as a milling program.
-    """
+    """What shows that a program is one of a lathe; a program with Y words or a tool change M06 is none."""
     code = _COMMENT.sub(b"", text[:_LOOKED_AT_BYTES].upper())
     sure = [(found, meaning) for sign, meaning in _SURE if (found := sign.search(code))]
     likely = [(found, meaning) for sign, meaning in _LIKELY if (found := sign.search(code))]

@@ -64,14 +64,7 @@ class Deviation:
         )
 
     def gouge_and_excess_um(self, material_side: str) -> dict[str, float]:
-        """What is cut away too much and what is left standing.
-
-        Args:
-            material_side: "left" or "right" of the travel, where the workpiece is; a tool that strays there gouges.
-
-        Returns:
-            Both in µm, 0 or more, by name.
-        """
+        """What is cut away too much and what is left standing."""
         gouge, excess = (self.left_mm, self.right_mm) if material_side == "left" else (self.right_mm, self.left_mm)
         return {"gouge": gouge * 1e3, "excess": excess * 1e3}
 
@@ -98,15 +91,7 @@ class ContourError:
 
     @classmethod
     def of(cls, stats: Iterable[_core.DeviationStats], material_side: str | None = None) -> ContourError:
-        """Of one or several runs together; all zero without any.
-
-        Args:
-            stats: of the runs, in mm.
-            material_side: "left" or "right" of the travel, where the workpiece is; None: not known.
-
-        Returns:
-            The figures in µm.
-        """
+        """Of one or several runs together; all zero without any."""
         rows = list(stats)
         count = sum(row.count for row in rows)
         squares = sum(row.sum_of_squares_mm2 for row in rows)
@@ -122,14 +107,7 @@ class ContourError:
 
 
 def largest_xyz_um(vectors: Iterable[Vector]) -> Xyz[float]:
-    """Largest of each axis, mm to µm.
-
-    Args:
-        vectors: each of shape (3,); none: all zero.
-
-    Returns:
-        The largest in µm.
-    """
+    """Largest of each axis, mm to µm."""
     rows = list(vectors)
     x, y, z = np.max(rows, axis=0) * 1e3 if rows else np.zeros(3)
     return Xyz(float(x), float(y), float(z))

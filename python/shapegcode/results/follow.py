@@ -31,15 +31,6 @@ def follow(
     """Where on a polyline are samples that follow it?
 
     Where the polyline passes a place twice, the distance that the command has gone decides.
-
-    Args:
-        command_mm: set-points, shape (n, 3).
-        points_mm: the samples asked for at the same instants, shape (n, 3).
-        polyline_mm: shape (m, 3).
-        complete: the command ends where the polyline ends; where it begins, it begins in any case.
-
-    Returns:
-        Distance of each foot along the polyline, shape (n,), and the foot itself, shape (n, 3).
     """
     vertices = _refine(polyline_mm)
     lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
@@ -92,16 +83,7 @@ def _refine(polyline: FloatArray) -> FloatArray:
 
 
 def piece_of(polyline: FloatArray, begin_mm: float, end_mm: float) -> FloatArray:
-    """What lies between two distances along a polyline.
-
-    Args:
-        polyline: shape (m, 3), mm.
-        begin_mm: distance from its start.
-        end_mm: likewise, not before the other.
-
-    Returns:
-        The polyline between them, shape (k, 3), both ends among its points.
-    """
+    """What lies between two distances along a polyline."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
     inside = (along > begin_mm) & (along < end_mm)
     ends = [[np.interp(s, along, polyline[:, axis]) for axis in range(3)] for s in (begin_mm, end_mm)]

@@ -68,17 +68,7 @@ class Streamed(list[Any]):
 
 
 def plain(value: object) -> Any:
-    """A value as what JSON knows: objects, lists, texts, numbers, true, false, null.
-
-    Args:
-        value: dataclass, mapping, sequence, array, enumeration, path, number or text.
-
-    Returns:
-        The value in dictionaries, lists, texts, numbers, booleans and None.
-
-    Raises:
-        TypeError: something that has no form in JSON.
-    """
+    """A value as what JSON knows: objects, lists, texts, numbers, true, false, null."""
     return _plain(value, coarse=False, every_digit=False)
 
 
@@ -126,11 +116,7 @@ def _number(value: float, *, coarse: bool, every_digit: bool) -> float | None:
 
 
 def to_text(value: object) -> str:
-    """A plain value as stable JSON: sorted keys, two spaces, one newline at the end.
-
-    Raises:
-        ValueError: a number in it is NaN or infinite: it did not come from `plain`.
-    """
+    """A plain value as stable JSON: sorted keys, two spaces, one newline at the end."""
     return json.dumps(value, sort_keys=True, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from shapegcode.io.data_file import open_file
+
 __all__ = ["FORMAT", "Made", "MadeFile", "file_hash", "this_version"]
 
 FORMAT = 1
@@ -32,16 +34,7 @@ class MadeFile:
 
     @classmethod
     def of(cls, role: str, name: str | Path, content: bytes | memoryview | None = None) -> MadeFile:
-        """Of a file, or of what is about to be written into it.
-
-        Args:
-            role: what it is for.
-            name: of the file.
-            content: of it; None: it is read.
-
-        Returns:
-            Its name, size and hash; the hash is empty where it cannot be read.
-        """
+        """Of a file, or of what is about to be written into it."""
         if content is not None:
             import hashlib
 
@@ -72,33 +65,16 @@ class Made:
     files: tuple[MadeFile, ...]
 
     def file(self, role: str) -> MadeFile | None:
-        """The file with a role.
-
-        Args:
-            role: what it is for.
-
-        Returns:
-            The first one with it; None: there is none.
-        """
+        """The file with a role."""
         return next((each for each in self.files if each.role == role), None)
 
 
 def file_hash(name: str | Path) -> tuple[str, int]:
-    """SHA-256 of a file, and its size.
-
-    Args:
-        name: of the file.
-
-    Returns:
-        The hash in hexadecimal digits, and how many bytes there are.
-
-    Raises:
-        OSError: it cannot be read.
-    """
+    """SHA-256 of a file, and its size."""
     import hashlib
 
     digest, size = hashlib.sha256(), 0
-    with Path(name).open("rb") as stream:
+    with open_file(name) as stream:
         while piece := stream.read(_PIECE_BYTES):
             digest.update(piece)
             size += len(piece)

@@ -63,21 +63,7 @@ class PlayedRegion:
         lines: tuple[int, int],
         regions: int,
     ) -> PlayedRegion:
-        """The region that vibrates most, as the core played it.
-
-        Args:
-            runs: by what their legends say; they hold recorded samples.
-            path: as programmed.
-            period_s: time between two samples.
-            lines: first and last of the region.
-            regions: how many the program has.
-
-        Returns:
-            The region and its motion.
-
-        Raises:
-            ValueError: a run without recorded samples.
-        """
+        """The region that vibrates most, as the core played it."""
         traces = tuple(_trace(label, run, period_s) for label, run in runs.items())
         said = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
         if not traces[0].stops:
@@ -99,14 +85,7 @@ def _trace(label: str, run: _core.PlaybackFigures, period_s: float) -> Trace:
 
 
 def motion_pictures(played: Callable[[], PlayedRegion]) -> dict[str, Plot]:
-    """Path, feed and vibration of a region, by name.
-
-    Args:
-        played: gives what is drawn; called once, when the first of them is drawn.
-
-    Returns:
-        What draws each: `plot(ax=None) -> Axes`.
-    """
+    """Path, feed and vibration of a region, by name."""
     once = functools.cache(lambda: _Scene.of(played()))
     return {"path": partial(_path, once), "feed": partial(_feed, once), "vibration": partial(_vibration, once)}
 

@@ -35,19 +35,7 @@ _FLAT = 0.06  # of an axis in µm or mm/min
 def thin_min_max(
     times: npt.ArrayLike, values: npt.ArrayLike, max_points: int = _MAX_POINTS
 ) -> tuple[FloatArray, FloatArray]:
-    """Fewer points of a curve that look the same: of each stretch only its smallest and largest value.
-
-    Args:
-        times: shape (n,), rising.
-        values: shape (n,).
-        max_points: about how many points may remain; shorter curves come back as they are.
-
-    Returns:
-        The times and values that remain, in order; first and last point always among them.
-
-    Raises:
-        ValueError: shapes differ, or max_points is below 4.
-    """
+    """Fewer points of a curve that look the same: of each stretch only its smallest and largest value."""
     t, v = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.shape != v.shape or t.ndim != 1:
         raise ValueError(f"times have shape {t.shape}, values {v.shape}: must be equal and one-dimensional")
@@ -194,15 +182,7 @@ def _vibration_label(trace: Trace, axis: int) -> str:
 
 
 def line_style(number: int, *, fine: bool = False) -> dict[str, Any]:
-    """Colour and width of the curve of a trace.
-
-    Args:
-        number: of the trace, from 0.
-        fine: half as wide, for pictures of several columns.
-
-    Returns:
-        Arguments of matplotlib's `plot`.
-    """
+    """Colour and width of the curve of a trace."""
     width = _WIDTHS[number % len(_WIDTHS)] / (2 if fine else 1)
     return {"color": plot.COLOURS[number % len(plot.COLOURS)], "linewidth": width}
 

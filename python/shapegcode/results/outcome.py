@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
-from shapegcode._core import ArgumentError
 from shapegcode.results.json import plain
+from shapegcode.results.values import NotKeptError, same_fields
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,10 +26,6 @@ T = TypeVar("T")
 
 Plot = Callable[..., "Axes"]
 """Draws one picture: ``plot(ax=None) -> Axes``, into the caller's axes or into a new figure."""
-
-
-class NotKeptError(ArgumentError):
-    """Something was asked of a result that was read back from its JSON, which does not hold it."""
 
 
 @dataclass(frozen=True)
@@ -100,14 +96,7 @@ class Outcome:
         raise NotImplementedError
 
     def next_step_after(self, file: str) -> str:
-        """The one thing to do next once a file was written with it.
-
-        Args:
-            file: name of it.
-
-        Returns:
-            One sentence; that of `next_step` unless it would ask for the file.
-        """
+        """The one thing to do next once a file was written with it."""
         del file
         return self.next_step
 
@@ -134,20 +123,18 @@ class Outcome:
         return {}
 
     def save_plots(self, folder: str | Path) -> list[str]:
-        """Write every picture as PNG and SVG into a folder, which is made where it is missing.
-
-        Args:
-            folder: where to; made where it is missing.
-
-        Returns:
-            The files written.
-
-        Raises:
-            OSError: the folder cannot be made or a file not be written.
-        """
+        """Write every picture as PNG and SVG into a folder, which is made where it is missing."""
         from shapegcode.results.plot import save_all
 
         return save_all(self.plots(), folder)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both hold the same data; programs count, what there is to simulate and draw again does not."""
+        return same_fields(self, other) if type(self) is type(other) else NotImplemented
+
+    def __hash__(self) -> int:
+        """By class and answer: equal results have the same ones."""
+        return hash(repr(self))
 
     def __repr__(self) -> str:
         """Class and answer: a result may hold millions of samples."""
@@ -155,9 +142,25 @@ class Outcome:
 
     def _drawn_beside(self) -> Mapping[str, Plot]:
         """The pictures that the module `plots` of the result's folder offers for it: its `plots_of(result)`."""
-        found: Mapping[str, Plot] = self._beside("plots").plots_of(self)
-        return found
+        return self._drawable(lambda: self._beside("plots").plots_of(self))
+
+    def _drawable(self, plots_of: Callable[[], Mapping[str, Plot]]) -> Mapping[str, Plot]:
+        """Pictures, without those that need what is missing in a result that was read back from its JSON."""
+        if not self.from_json:
+            return plots_of()
+        try:
+            return {name: plot for name, plot in plots_of().items() if _draws(plot)}
+        except NotKeptError:
+            return {}
 
     def _beside(self, name: str) -> Any:
         """A module of the result's folder, which imports the result and is loaded when somebody asks for it."""
         return importlib.import_module(f"{type(self).__module__.rpartition('.')[0]}.{name}")
+
+
+def _draws(plot: Plot) -> bool:
+    try:
+        plot()
+    except NotKeptError:
+        return False
+    return True

@@ -10,11 +10,14 @@ apart.
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from shapegcode.io.atomic import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,16 +56,7 @@ def figure(width_inch: float, height_inch: float) -> Figure:
 
 
 def axes(ax: Axes | None = None, *, size_inch: tuple[float, float] = (8.0, 4.5), title: str = "") -> Axes:
-    """One panel in the house's style.
-
-    Args:
-        ax: where to draw; None: into a new figure.
-        size_inch: width and height of a new figure.
-        title: of the panel.
-
-    Returns:
-        The caller's axes, or those of a new figure.
-    """
+    """One panel in the house's style."""
     panel: Axes = figure(*size_inch).subplots() if ax is None else ax
     _style(panel)
     if title:
@@ -80,23 +74,7 @@ def grid(
     part: str = "",
     **subplots: Any,
 ) -> list[list[Axes]]:
-    """Panels of one picture, row by row: of a new figure, or in the place of the caller's axes.
-
-    Args:
-        ax: whose place is divided (it shows no axis of its own then); None: a new figure.
-        rows: of panels.
-        columns: of panels.
-        size_inch: width and height of a new figure.
-        title: of the whole picture.
-        part: which part of the program it shows.
-        subplots: what matplotlib's `subplots` knows beside them: sharex, sharey, height_ratios, width_ratios.
-
-    Returns:
-        The panels, row by row.
-
-    Raises:
-        ValueError: the caller's axes have no place in a grid that could be divided.
-    """
+    """Panels of one picture, row by row: of a new figure, or in the place of the caller's axes."""
     whole: Any
     if ax is None:
         whole = figure(*size_inch)
@@ -134,15 +112,7 @@ def aligned(panels: Sequence[Axes]) -> Axes:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number for a title: so many significant digits at most, never as a power of ten.
-
-    Args:
-        value: what is said.
-        digits: significant ones behind the point; whole numbers keep theirs.
-
-    Returns:
-        1113.6 as "1114", 0.0936 as "0.0936", 2.200 as "2.2".
-    """
+    """A number for a title: so many significant digits at most, never as a power of ten."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
     places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
@@ -158,13 +128,7 @@ def legend_above(panel: Axes, *, columns: int = 4) -> None:
 
 
 def legend_below(panel: Axes, *, of: Axes | None = None, columns: int = 4) -> None:
-    """Legend below the panel, and below the name of its axis.
-
-    Args:
-        panel: the lowest of a picture.
-        of: whose curves it names; None: its own.
-        columns: of the legend.
-    """
+    """Legend below the panel, and below the name of its axis."""
     handles, labels = (of or panel).get_legend_handles_labels()
     panel.legend(
         handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=columns, frameon=False, fontsize=9,
@@ -173,18 +137,7 @@ def legend_below(panel: Axes, *, of: Axes | None = None, columns: int = 4) -> No
 
 
 def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> list[str]:
-    """Draw pictures and write each in every format into a folder, which is made where it is missing.
-
-    Args:
-        plots: what draws each picture, by the name of its file without ending.
-        folder: into which.
-
-    Returns:
-        The files written.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
+    """Draw pictures and write each in every format into a folder, which is made where it is missing."""
     if not plots:
         return []
     place = Path(folder)
@@ -208,12 +161,7 @@ def _lay_out(drawn: Axes | Figure) -> None:
 
 
 def save(drawn: Axes | Figure, file: str | Path) -> None:
-    """Write the picture to which the axes belong as PNG or SVG, by the file's ending; same data, same bytes.
-
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
-    """
+    """Write the picture to which the axes belong as PNG or SVG, by the file's ending; same data, same bytes."""
     import matplotlib
 
     figure: Any = drawn.figure.figure  # of axes in a part of a figure: the whole
@@ -221,11 +169,13 @@ def save(drawn: Axes | Figure, file: str | Path) -> None:
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         raise ValueError(f"{path}: the ending of a picture must be one of {', '.join(FORMATS)}")
+    stream = io.BytesIO()
     if suffix == ".svg":
         with matplotlib.rc_context({"svg.hashsalt": "shapegcode", "svg.fonttype": "none"}):
-            figure.savefig(path, format="svg", metadata={"Date": None})
+            figure.savefig(stream, format="svg", metadata={"Date": None})
     else:
-        figure.savefig(path, format="png", dpi=150, metadata={"Software": None})
+        figure.savefig(stream, format="png", dpi=150, metadata={"Software": None})
+    write_bytes(path, stream.getvalue())
 
 
 _MANY_POINTS = 6000
@@ -236,14 +186,6 @@ def svg_text(drawn: Axes | Figure, key: str, *, label: str) -> str:
     """The picture to which the axes belong as an `svg` element for a page that holds several; same data, same text.
 
     What has very many points is drawn as pixels inside of it, so that a page stays small.
-
-    Args:
-        drawn: axes or figure.
-        key: stands before each of its ids, unique on the page.
-        label: what it shows, for those who cannot see it.
-
-    Returns:
-        The element, as wide as its place.
     """
     import io
     from html import escape

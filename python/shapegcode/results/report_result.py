@@ -29,7 +29,7 @@ class ReportPage:
     problems: tuple[str, ...]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Reports(Result):
     """Pages made of results that were written earlier.
 

@@ -33,14 +33,7 @@ class Playable(Protocol):
     """What can be played again for a page: a program, or two of them, on a machine."""
 
     def scene(self, on_progress: Callable[[float], None] = ...) -> Scene | None:
-        """Play it.
-
-        Args:
-            on_progress: called with the share that is done.
-
-        Returns:
-            The motion; None: nothing moves.
-        """
+        """Play it."""
 
 
 class Result(Outcome):

@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from shapegcode._core import ArgumentError
+from shapegcode.io.data_file import DataFile
 from shapegcode.results.made import FORMAT, Made
-from shapegcode.results.outcome import NotKeptError
+from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.result import Result
 
 __all__ = ["MODULES", "NotKept", "load_result", "made_of", "revived", "written_reports"]
@@ -36,13 +37,9 @@ MODULES: Mapping[str, str] = {
     "Check": "checking.result",
     "Conversion": "conversion.result",
     "Comparison": "comparison.result",
-    "CornerDemo": "demos.corner",
     "CornerResult": "testcut.result",
     "CutDesign": "testcut.result",
     "CycleTime": "timing.result",
-    "CycleTimeDemo": "demos.cycle_time",
-    "Demonstration": "demos.result",
-    "EvidenceDemo": "demos.evidence",
     "Expansion": "program.result",
     "FeedSchedule": "feed.result",
     "Identification": "identification.result",
@@ -53,7 +50,6 @@ MODULES: Mapping[str, str] = {
     "MachineDescription": "machine.description_result",
     "MachineStudy": "studies.result",
     "Measurement": "metrology.result",
-    "MetrologyDemo": "demos.metrology",
     "Optimum": "studies.optimum_result",
     "ParameterImport": "machine.result",
     "PathDemo": "demos.path",
@@ -61,9 +57,7 @@ MODULES: Mapping[str, str] = {
     "Reports": "results.report_result",
     "ScheduledConversion": "conversion.scheduled_result",
     "ServoFit": "identification.servo.result",
-    "ShaperDemo": "demos.shaper",
     "Simulation": "simulation.result",
-    "TapDemo": "demos.tap",
     "TapPlan": "identification.plan_result",
     "TaperResult": "testcut.result",
 }
@@ -94,30 +88,16 @@ class NotKept:
 
 
 def written_reports(path: str | Path) -> list[dict[str, Any]]:
-    """The JSON of the results in a file: one, or those of ``--program all``.
-
-    Args:
-        path: of the file that ``--json`` wrote.
-
-    Returns:
-        The objects.
-
-    Raises:
-        ArgumentError: it is cut off, or is no JSON of results; with line and column.
-        OSError: it cannot be read.
-    """
-    data = Path(path).read_bytes()
+    """The JSON of the results in a file: one, or those of ``--program all``."""
     try:
-        text = data.decode()
-        found = json.loads(text, parse_constant=partial(_no_number, path))
+        with DataFile(path, ArgumentError) as file:
+            found = file.json(str(path), file.read(), partial(_no_number, path))
     except UnicodeDecodeError as error:
         raise ArgumentError(f"{path}: byte {error.start} is not UTF-8: this is no JSON of shapegcode") from None
     except json.JSONDecodeError as error:
-        cut = error.pos >= len(text.rstrip()) or "Unterminated" in error.msg
-        why = f"the file ends in the middle ({len(data)} bytes): it was cut off" if cut else error.msg
+        cut = error.pos >= len(error.doc.rstrip()) or "Unterminated" in error.msg
+        why = f"the file ends in the middle ({len(error.doc)} characters): it was cut off" if cut else error.msg
         raise ArgumentError(f"{path}: line {error.lineno}, column {error.colno}: {why}") from None
-    except RecursionError:
-        raise ArgumentError(f"{path}: nested too deeply: this is no JSON of shapegcode") from None
     found = found if isinstance(found, list) else [found]
     for rank, each in enumerate(found, 1):
         if not isinstance(each, dict):
@@ -155,17 +135,7 @@ def load_result(path: str | Path) -> Result:
 
 
 def made_of(report: Mapping[str, Any]) -> Made:
-    """Of what a result was made.
-
-    Args:
-        report: JSON of a result.
-
-    Returns:
-        What stands under `made`.
-
-    Raises:
-        ArgumentError: nothing stands there, or not what this version writes.
-    """
+    """Of what a result was made."""
     if "error" in report and "made" not in report:
         raise ArgumentError(f"the command failed for this program: {report['error']}")
     if "made" not in report:
@@ -180,18 +150,7 @@ def made_of(report: Mapping[str, Any]) -> Made:
 
 
 def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingProxyType({})) -> Result:
-    """A result from its JSON.
-
-    Args:
-        report: as ``--json`` wrote it.
-        kept: values of fields that no JSON holds, where the class has them.
-
-    Returns:
-        The result; its `from_json` is true.
-
-    Raises:
-        ArgumentError: an unknown class, a key too many or too few, or a value of another kind; names the key.
-    """
+    """A result from its JSON."""
     made = made_of(report)
     if made.result not in MODULES:
         raise ArgumentError(f"made.result = {made.result}: not a result that this version knows")
@@ -203,8 +162,7 @@ def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingPr
         raise ArgumentError(f"key {unknown[0]} is not one of a {made.result}: written by {made.by}")
     hidden = {name: value for name, value in kept.items() if name in known and value is not None}
     own = {key: value for key, value in report.items() if key in names}
-    result = cls(**(dict(_fields(cls, own, "", {})) | hidden))
-    object.__setattr__(result, "from_json", True)
+    result: Result = _from_json(cls(**(dict(_fields(cls, own, "", {})) | hidden)))
     return result
 
 
@@ -279,7 +237,13 @@ def _object(cls: Any, arguments: Sequence[Any], data: Any, where: str, bound: Ma
     if not isinstance(data, dict):
         _wrong(where, data, "an object")
     own = dict(zip(getattr(cls, "__parameters__", ()), (bound.get(each, each) for each in arguments), strict=False))
-    return cls(**dict(_fields(cls, data, where, own)))
+    return _from_json(cls(**dict(_fields(cls, data, where, own))))
+
+
+def _from_json(made: Any) -> Any:
+    if isinstance(made, Outcome):
+        object.__setattr__(made, "from_json", True)
+    return made
 
 
 def _fields(cls: Any, data: Mapping[str, Any], where: str, bound: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:

@@ -26,19 +26,7 @@ _AXES = ("x", "y", "z")
 
 
 def data_frame(result: Outcome, what: str = "") -> pd.DataFrame:
-    """A list of a result as a table: a row for each entry, a column for each value, dots in names of nested ones.
-
-    Args:
-        result: of any class.
-        what: name of the attribute; empty: the first that is such a list.
-
-    Returns:
-        The table; its `attrs` have the name and the units of the columns whose names say them.
-
-    Raises:
-        ArgumentError: no such list.
-        ModuleNotFoundError: pandas is not installed.
-    """
+    """A list of a result as a table: a row for each entry, a column for each value, dots in names of nested ones."""
     import pandas as pd
 
     lists = {field.name: getattr(result, field.name) for field in _fields(result)}
@@ -54,17 +42,6 @@ def data_set(result: Outcome, what: str = "") -> xr.Dataset:
 
     The arrays of a part share the dimension that is as long as its times or frequencies; one of length three is the
     axis.
-
-    Args:
-        result: of any class.
-        what: name of the attribute that holds arrays; empty: the first one that does.
-
-    Returns:
-        The arrays, with `units` where their names say them.
-
-    Raises:
-        ArgumentError: no arrays.
-        ModuleNotFoundError: xarray is not installed.
     """
     import xarray as xr
 

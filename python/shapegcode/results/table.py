@@ -235,15 +235,7 @@ def _whole(column: Column, cell: str) -> str:
 
 
 def xyz_columns(cell: Callable[[str, Any], object], *, digits: int | None = None) -> tuple[Column, ...]:
-    """Columns of the three axes.
-
-    Args:
-        cell: what a row shows in the column of the axis "x", "y" or "z".
-        digits: see `Column`.
-
-    Returns:
-        Three columns.
-    """
+    """Columns of the three axes."""
     return tuple(Column(axis.upper(), value=partial(cell, axis), digits=digits) for axis in "xyz")
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from shapegcode.errors import FileError, Problem
+from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file, toml_tables
 from shapegcode.settings.keys import TomlTable
 from shapegcode.settings.problems import problems_of, syntax_problem
 
@@ -23,7 +23,7 @@ def read_text(path: Path, error: type[FileError]) -> str:
         OSError: the file cannot be read.
     """
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return read_file(path, MAX_SETTINGS_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as bad:
         line = bad.object[: bad.start].count(b"\n") + 1
         problem = Problem("", "", f"not UTF-8 text (byte 0x{bad.object[bad.start]:02x})", line)
@@ -34,11 +34,11 @@ def parsed(text: str, source: str, error: type[FileError]) -> dict[str, Any]:
     """The tables of a TOML text; *source* names it in messages.
 
     Raises:
-        FileError: the given kind of it: not TOML.
+        FileError: the given kind of it: not TOML, or beyond the limits of `toml_tables`.
     """
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as bad:
+        return toml_tables(text)
+    except ValueError as bad:
         raise error(source, (syntax_problem(str(bad), text),)) from bad
 
 

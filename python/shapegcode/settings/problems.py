@@ -14,6 +14,9 @@ from shapegcode.errors import Problem
 from shapegcode.settings.keys import TomlTable, facts, table_type, toml, toml_key
 from shapegcode.settings.remarks import open_brackets
 
+_MAX_PROBLEMS = 100
+_LONGEST_NAME = 200  # that is compared with known ones
+
 
 class KeyProblem(ValueError):
     """What a validator raises of a key that does not fit another one: found again in the file by its name."""
@@ -48,7 +51,8 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
         The problems, each once, in pydantic's order.
     """
     problems: list[Problem] = []
-    for detail in error.errors(include_url=False):
+    details = error.errors(include_url=False)
+    for detail in details[:_MAX_PROBLEMS]:
         location, value = _locate(detail["loc"], data, detail["type"])
         if detail["type"] == "too_short" and isinstance(value, list) and len(value) >= detail["ctx"]["min_length"]:
             continue  # short only of its bad items, which are listed themselves
@@ -73,6 +77,8 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
         problem = Problem(problem.key, problem.value, problem.limit, line_of(problem.key, text))
         if problem not in problems:
             problems.append(problem)
+    if len(details) > _MAX_PROBLEMS:
+        problems.append(Problem("", "", f"{len(details) - _MAX_PROBLEMS} further problems are not listed"))
     return tuple(problems)
 
 
@@ -168,7 +174,7 @@ def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
         model = table_type(field) if field is not None else None
     if model is None:
         return ""
-    name = str(location[-1])
+    name = str(location[-1])[:_LONGEST_NAME]
     close = difflib.get_close_matches(name, model.model_fields, n=1, cutoff=0.5)
     if close:
         return f"; did you mean {close[0]}?"

@@ -20,6 +20,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, Strict, field_validator, model_validator
 
 from shapegcode.errors import FileError, Problem
+from shapegcode.io.data_file import DataFile
 from shapegcode.settings.keys import InlineTable, Positive, PositiveAxisValues, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem, line_of
@@ -130,26 +131,12 @@ class Answers(TomlTable):
 
 
 def is_mode(said: str) -> bool:
-    """Whether an answer on vibration is a frequency in Hz, with or without a damping ratio.
-
-    Args:
-        said: the answer.
-
-    Returns:
-        True for "46" and "46:0.02".
-    """
+    """Whether an answer on vibration is a frequency in Hz, with or without a damping ratio."""
     return _MODE.fullmatch(said) is not None
 
 
 def mode_of(said: str) -> tuple[float, float]:
-    """An answer that `is_mode` as frequency in Hz and damping ratio, 0.02 where none is said.
-
-    Args:
-        said: the answer.
-
-    Returns:
-        Both.
-    """
+    """An answer that `is_mode` as frequency in Hz and damping ratio, 0.02 where none is said."""
     frequency, _, damping = said.partition(":")
     return float(frequency), float(damping) if damping.strip() else _USUAL_DAMPING
 
@@ -179,7 +166,8 @@ def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
         data = parsed(text, str(path), AnswersError)
     else:
         try:
-            data = json.loads(text)
+            with DataFile(path, lambda said: AnswersError(str(path), (Problem("", "", said),))) as file:
+                data = file.json("the answers", file.read())
         except json.JSONDecodeError as error:
             raise AnswersError(str(path), (Problem("", "", f"not JSON: {error.msg}", error.lineno),)) from None
         if not isinstance(data, dict):
@@ -189,11 +177,7 @@ def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
 
 
 def _with_files(answers: Answers, source: str, text: str) -> Answers:
-    """The same, if its files are there.
-
-    Raises:
-        AnswersError: one is not.
-    """
+    """The same, if its files are there."""
     named = {"dump": answers.dump} if answers.dump is not None else {}
     for axis, said in answers.modes.model_dump().items():
         if said not in ("rigid", "unknown") and not is_mode(said):

@@ -82,11 +82,7 @@ def _started(answers: Answers) -> tuple[Machine, list[str]]:
 
 
 def _imported(answers: Answers, rigid: str) -> ParameterImport:
-    """The machine of the dump; limits that it does not hold are as they are said, or assumed and marked so.
-
-    Raises:
-        MachineError: no dump, or a value that is not plausible.
-    """
+    """The machine of the dump; limits that it does not hold are as they are said, or assumed and marked so."""
     dump = answers.dump
     assert dump is not None
     try:
@@ -109,14 +105,7 @@ def _read(found: ParameterImport) -> set[str]:
 
 
 def dump_problem(file: str) -> str:
-    """What is wrong with a parameter file, before the other questions are asked.
-
-    Args:
-        file: of the control.
-
-    Returns:
-        In words; empty: it can be read, and what it lacks can be said.
-    """
+    """What is wrong with a parameter file, before the other questions are asked."""
     try:
         _started(Answers.model_validate({"dump": file}))
     except (FileError, ArgumentError, OSError) as error:
@@ -125,14 +114,7 @@ def dump_problem(file: str) -> str:
 
 
 def dump_lacks_rapids(file: str) -> bool:
-    """Whether the rapid rates are a question though there is a parameter file.
-
-    Args:
-        file: of the control, one that can be read.
-
-    Returns:
-        True where it does not hold them.
-    """
+    """Whether the rapid rates are a question though there is a parameter file."""
     try:
         import_parameters(file)
     except MachineError as error:
@@ -141,14 +123,7 @@ def dump_lacks_rapids(file: str) -> bool:
 
 
 def tap_problem(file: str) -> str:
-    """What is wrong with the record of a tap test, before the other questions are asked.
-
-    Args:
-        file: CSV, UFF or WAV.
-
-    Returns:
-        In words; empty: it holds a mode.
-    """
+    """What is wrong with the record of a tap test, before the other questions are asked."""
     try:
         found = identify(file)
     except (ShapegcodeError, OSError) as error:

@@ -29,7 +29,7 @@ class OpenQuestion:
     command: str
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class MachineSetup(Result):
     """A machine file made from answers.
 

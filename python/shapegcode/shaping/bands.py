@@ -70,11 +70,7 @@ class ModeBand:
         return {"mode": Mode(data["frequency_hz"], data["damping_ratio"])}
 
     def __post_init__(self) -> None:
-        """Check the range.
-
-        Raises:
-            ArgumentError: the uncertainty is not at least 0 and below 1.
-        """
+        """Check the range."""
         if not 0.0 <= self.uncertainty < 1.0:
             raise ArgumentError(
                 f"uncertainty of the mode at {self.mode.frequency_hz:g} Hz is {self.uncertainty:.4g}: "
@@ -103,17 +99,6 @@ def parse_mode_band(text: str, uncertainty: float = 0.0) -> ModeBand:
     """A mode such as ``46``, ``46:0.02``, ``46:0.02±5%`` or ``46:0.02+-2.3Hz``: Hz, damping ratio, band.
 
     A band that reaches further to one side, ``30:0.1-13%+19%``, is that of its middle: ``30.9:0.1±15.534%``.
-
-    Args:
-        text: the mode.
-        uncertainty: half width of the band, relative, where the text states none.
-
-    Returns:
-        The mode with its band.
-
-    Raises:
-        ArgumentError: not of that form, or a value outside its range; a frequency below 0.1 Hz or above 10 kHz is
-            taken for a slip.
     """
     match = _TEXT.fullmatch(text.strip())
     if match is None:
@@ -145,16 +130,6 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
 
     A band as narrow as a tap test gives is none: a shaper that is exact at the nominal frequency leaves less there than
     one that spends `shaping.vibration_limit` all over it. The verdict plays its ends all the same.
-
-    Args:
-        machine: its axes' modes; one shaper serves all axes, because different ones would distort the path.
-        uncertainty: half width of the band, relative, of modes that state none.
-
-    Returns:
-        The bands, one for each mode that differs from the others.
-
-    Raises:
-        ArgumentError: the machine has no mode, or an uncertainty outside its range.
     """
     from shapegcode.model.modes import still_mode
 

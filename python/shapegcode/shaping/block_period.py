@@ -144,19 +144,6 @@ def robust_candidate(
 ) -> BlockPeriodCandidate:
     """What :func:`choose_block_period` would take on one given period.
 
-    Args:
-        bands: Modes with their bands, at least one.
-        period_s: Block period in s, above 0.
-        max_duration_s: Longest duration in s of the shaper.
-        vibration_limit: Largest residual ratio over the bands, above 0 and below 1.
-
-    Returns:
-        The shortest design below the limit; failing that, the least worst one of the longest duration, and a note.
-
-    Raises:
-        ArgumentError: No mode, or a value outside its range.
-        DesignError: Neither exists; the message tells why.
-
     Source: this project.
     """
     check_modes_and_times(bands, period_s=period_s, max_duration_s=max_duration_s)

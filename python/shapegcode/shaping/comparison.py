@@ -41,22 +41,6 @@ def choose(
 ) -> Recommendation:
     """Design every family on every kind of times, compare, and recommend.
 
-    Args:
-        bands: at least one mode with its band, no two modes equal.
-        periods_s: grids on which the taps may lie, s; None among them: continuous times too.
-        options: limits, and taps to compare with the rest; `period_s` plays no part; None: the defaults.
-        families: names of the families to compare; None: all.
-        objective: a name of `OBJECTIVES`: what is least in the design to take.
-        allow_negative: whether a design with negative taps may be taken.
-        on_progress: called with the share of the work done, 0 to 1.
-
-    Returns:
-        The comparison and the design to take.
-
-    Raises:
-        ArgumentError: no mode, equal modes, no period, or a limit, a name or a period that cannot be.
-        DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
-
     Source: this project.
     """
     options = options or DesignOptions()
@@ -131,11 +115,7 @@ def _check(
 
 
 def _usable(bands: Sequence[ModeBand], periods_s: Sequence[float | None]) -> list[float | None]:
-    """The kinds of times on which every mode can be cancelled.
-
-    Raises:
-        DesignError: none is left.
-    """
+    """The kinds of times on which every mode can be cancelled."""
     wanted = list(dict.fromkeys(periods_s))
     usable = [period_s for period_s in wanted if period_s is None or not _aliases(bands, period_s)]
     if not usable:

@@ -79,14 +79,7 @@ class Design:
 
     @staticmethod
     def hidden_from_json(data: Mapping[str, Sequence[float]]) -> dict[str, Shaper]:
-        """The shaper, from what the JSON says of it.
-
-        Args:
-            data: JSON of such an object.
-
-        Returns:
-            The hidden field.
-        """
+        """The shaper, from what the JSON says of it."""
         return {"shaper": Shaper(data["times_s"], data["amplitudes"])}
 
     def radial_error_um(self, speed_mm_per_s: float, radius_mm: float) -> float:

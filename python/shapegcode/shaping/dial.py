@@ -23,17 +23,7 @@ _STROKES_S = (0.25, 0.4, 0.7)  # at the feed: how a ripple meets a mode's own mo
 
 
 def dial_vibration_um(block_period_s: float, shaper: _core.Shaper, model: MachineModel, feed_mm_per_s: float) -> float:
-    """Largest residual vibration of straight strokes in equal blocks, over the positions of the dial.
-
-    Args:
-        block_period_s: of the blocks, s.
-        shaper: its times are whole block periods.
-        model: of the machine, whose `dial_positions` are tried.
-        feed_mm_per_s: of each axis that has a mode.
-
-    Returns:
-        The largest of all axes, strokes and positions, µm.
-    """
+    """Largest residual vibration of straight strokes in equal blocks, over the positions of the dial."""
     moves = np.array([float(bool(axis.modes)) for axis in model.machine.axes.as_tuple()])
     speed = feed_mm_per_s * math.sqrt(moves.sum())
     fir = _core.Fir([round(t / block_period_s) for t in shaper.times_s], list(shaper.amplitudes))
@@ -62,14 +52,6 @@ def best_for_dial(
 
     What stays below `tolerance.residual_floor_um` counts as that. Above it twice the vibration weighs as much as a
     shaper of twice the duration.
-
-    Args:
-        designs: block periods, s, and the shapers on them; at least one.
-        machine: modes, controller, positions of the dial.
-        feed_mm_per_s: the fastest that is programmed.
-
-    Returns:
-        One of the designs.
     """
     model = MachineModel(machine)
     floor_um = max(machine.tolerance.residual_floor_um, 1e-3)

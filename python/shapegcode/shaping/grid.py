@@ -65,18 +65,7 @@ class Grid:
 def make_grid(
     block_period_s: float, shaper: _core.Shaper, track: ShaperTrack | None = None, *, family: str = "", note: str = ""
 ) -> Grid:
-    """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis.
-
-    Args:
-        block_period_s: T_B.
-        shaper: its times are rounded to whole block periods.
-        track: shapers that follow an axis; None: none.
-        family: name of the design's row in the registry of families.
-        note: what a user should know of the choice.
-
-    Returns:
-        The grid.
-    """
+    """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis."""
     delays = [round(t / block_period_s) for t in shaper.times_s]
     return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)), track, family, note)
 
@@ -140,12 +129,7 @@ def choose_grid(
 
 
 def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
-    """The grid with a shaper for each axis where the machine file asks for it, or with a word of how long it would be.
-
-    Raises:
-        ArgumentError: they are asked for where the contour is not brought back or modes vary.
-        DesignError: they are asked for, and there are none.
-    """
+    """The grid with a shaper for each axis where the machine file asks for it, or with a note of its duration."""
     wanted = machine.shaping.per_axis
     possible = exact and grid.track is None and machine.shaping.contour != "off"
     if not possible:
@@ -210,21 +194,7 @@ def _track(machine: Machine, period_s: float) -> ShaperTrack | None:
 def shaper_track(
     machine: Machine, period_s: float, max_duration_s: float | None = None, *, residual_limit: float = 0.01
 ) -> ShaperTrack:
-    """Shapers for all modes of a machine along the axis over which some of them vary.
-
-    Args:
-        machine: whose modes; the whole span of their tables is covered.
-        period_s: grid of the shapers (block period), s.
-        max_duration_s: longest shaper, s; None: `shaping.max_duration_s`.
-        residual_limit: largest residual ratio of a mode anywhere along the axis.
-
-    Returns:
-        The shapers by position of the axis.
-
-    Raises:
-        ArgumentError: no mode varies with position, or modes vary over several axes.
-        DesignError: somewhere there is no shaper within the duration and the limit.
-    """
+    """Shapers for all modes of a machine along the axis over which some of them vary."""
     axis = moving_axis(machine)
     if axis is None:
         raise _core.ArgumentError("no mode of the machine file varies with the position of an axis (frequency_over)")

@@ -73,11 +73,7 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
 
 
 def check_modes_and_times(modes: Sequence[Mode | ModeBand], **times_s: float) -> None:
-    """Refuse no mode, and times that are not finite and positive.
-
-    Raises:
-        ArgumentError: with name and value.
-    """
+    """Refuse no mode, and times that are not finite and positive."""
     if not modes:
         raise ArgumentError("a shaper needs at least one mode: 0 given")
     for name, value in times_s.items():
@@ -185,14 +181,6 @@ def lower_hull(
     The second central moment is concave in the taps, so no convex program minimises it; but it is least at one of
     these corners, and each of them has the least of a linear cost. Stretches of the edge where the supporting lines
     of their ends prove that nothing better lies are left out.
-
-    Args:
-        cheapest: the taps at 0, 1 ... `last` periods of least cost, or None if there are none.
-        last: number of periods, at least 1.
-        tolerance: share by which a left-out corner may be better than the best one found.
-
-    Returns:
-        The corners, each as taps that add up to 1.
     """
     time = np.arange(last + 1) / last
     moments = np.vstack([time, time**2])

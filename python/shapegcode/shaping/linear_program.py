@@ -37,6 +37,13 @@ _FREE: list[_Quiet] = []
 """Solvers whose program is no longer needed: a new one takes a third of the time of a small program."""
 
 
+def _solver() -> _Quiet:
+    try:
+        return _FREE.pop()  # in one step: another thread may take the last one
+    except IndexError:
+        return _Quiet()
+
+
 def _give_back(solver: _Quiet) -> None:
     solver.clearModel()
     _FREE.append(solver)
@@ -53,7 +60,7 @@ class LinearProgram:
 
     def __init__(self, lower: FloatArray, upper: FloatArray, equal: tuple[FloatArray, FloatArray]) -> None:
         self._columns = np.arange(len(lower), dtype=np.int32)
-        self._solver = _FREE.pop() if _FREE else _Quiet()
+        self._solver = _solver()
         weakref.finalize(self, _give_back, self._solver).atexit = False
         self._set(threads=1, solver="simplex", presolve="off")
         nothing = np.zeros(0)
@@ -64,41 +71,19 @@ class LinearProgram:
         self._add(equal[0], equal[1], equal[1])
 
     def add_below(self, matrix: FloatArray, above: FloatArray) -> None:
-        """Add ``matrix @ x <= above``.
-
-        Args:
-            matrix: (k, n).
-            above: (k,).
-        """
+        """Add ``matrix @ x <= above``."""
         self._add(matrix, np.full(len(above), -math.inf), above)
 
     def set_cost(self, cost: FloatArray) -> None:
-        """Take another cost.
-
-        Args:
-            cost: (n,).
-        """
+        """Take another cost."""
         self._solver.changeColsCost(len(cost), self._columns, cost)
 
     def bound(self, column: int, lower: float, upper: float) -> None:
-        """Bound one unknown anew.
-
-        Args:
-            column: which.
-            lower: its least value.
-            upper: its largest value.
-        """
+        """Bound one unknown anew."""
         self._solver.changeColBounds(column, lower, upper)
 
     def solve(self) -> FloatArray | None:
-        """The least cost.
-
-        Returns:
-            (n,) unknowns; None: nothing meets the conditions.
-
-        Raises:
-            DesignError: the solver does not know, whichever way it is asked.
-        """
+        """The least cost."""
         pivots = _MOST_PIVOTS * (len(self._columns) + self._rows)
         for attempt, (tolerance, presolve) in enumerate(_WAYS):
             if attempt:  # from the beginning
@@ -144,13 +129,6 @@ def non_negative_least_squares(matrix: FloatArray, right: FloatArray) -> FloatAr
     """The x >= 0 for which ``matrix @ x`` comes nearest to a right-hand side, to rounding.
 
     Written out here because SciPy's is behind an import that takes longer than all the designs of a conversion.
-
-    Args:
-        matrix: (m, n).
-        right: (m,).
-
-    Returns:
-        (n,) unknowns; None if the search does not end within three rounds per unknown.
 
     Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """

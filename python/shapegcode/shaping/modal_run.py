@@ -35,19 +35,7 @@ class ModalRun:
 
 
 def respond(modes: Sequence[_core.Mode], command: FloatArray, period_s: float) -> ModalRun:
-    """Base-excited modes, each alone, under a command that is linear between its samples (first-order hold).
-
-    Args:
-        modes: at least one; the participation scales the deflection.
-        command: (n,), n >= 2, at rest before; the last value is held.
-        period_s: time between its samples, s.
-
-    Returns:
-        Command and response of each mode.
-
-    Raises:
-        ArgumentError: no mode, a command that is too short, or a period that is not above 0.
-    """
+    """Base-excited modes, each alone, under a command that is linear between its samples (first-order hold)."""
     command = np.asarray(command, dtype=np.float64)
     if not modes or command.ndim != 1 or len(command) < 2:
         raise _core.ArgumentError(

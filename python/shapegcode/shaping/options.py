@@ -29,11 +29,7 @@ class DesignOptions:
 
     @property
     def grid_period_s(self) -> float:
-        """The period of the grid, s.
-
-        Raises:
-            ArgumentError: there is none.
-        """
+        """The period of the grid, s."""
         if self.period_s is None:
             raise ArgumentError("this family is designed on a grid: give its period")
         return self.period_s

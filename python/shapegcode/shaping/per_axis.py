@@ -28,17 +28,6 @@ def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_d
     The longest of them is as short as the grid permits; among the mean delays that all axes can have, the one with
     the least sum of second central moments is taken. An axis without modes is only delayed.
 
-    Args:
-        axis_modes: the modes of each axis.
-        period_s: grid, s, above 0.
-        max_duration_s: longest filter, s.
-
-    Returns:
-        One filter per axis, delays in periods; None: there is none within the duration.
-
-    Raises:
-        ArgumentError: no axis has a mode, or a period that is not above 0.
-
     Source: this project.
     """
     if not any(axis_modes):

@@ -25,11 +25,7 @@ _ROUNDING = 1e-9  # relative
 
 
 def check_block_period(period_s: float, machine: Machine) -> None:
-    """Refuse a block period that the machine's controller cannot play.
-
-    Raises:
-        ArgumentError: not finite and above 0, no whole multiple of the interpolation period, or below the block time.
-    """
+    """Refuse a block period that the machine's controller cannot play."""
     if not (math.isfinite(period_s) and period_s > 0.0):
         raise ArgumentError(f"block period is {period_s} s, must be finite and above 0")
     tick_s, block_time_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
@@ -48,22 +44,7 @@ def check_block_period(period_s: float, machine: Machine) -> None:
 def candidate_periods(
     bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float, vibration_limit: float = 0.05
 ) -> list[float]:
-    """The block periods worth comparing, ascending, s: those on which a non-negative shaper is shortest.
-
-    Args:
-        bands: the modes.
-        machine: a stated block period is the only candidate; else its interpolation period and block time say which
-            there are. None: multiples of 1 ms.
-        max_duration_s: longest shaper.
-        vibration_limit: largest worst residual ratio of the shapers that are compared.
-
-    Returns:
-        The best three of those up to 20 ms, among them the longest whose shaper lasts at most 2 % longer than the
-        shortest one, which is what a conversion takes; the shortest three if none has such a shaper.
-
-    Raises:
-        ArgumentError: a value outside its range.
-    """
+    """The block periods worth comparing, ascending, s: those on which a non-negative shaper is shortest."""
     if machine is not None and machine.emission.block_period_s is not None:
         return [machine.emission.block_period_s]
     if machine is not None:

@@ -94,18 +94,6 @@ def recommend(
     modes that state no band; if there is none within the limit, the one that leaves least is taken. Of equally short
     ones on grids, to 2 %, the one with the longest period is taken, because it writes the fewest blocks; of equal ones
     the family that a conversion takes by itself, then one that is made for grids.
-
-    Args:
-        designs: at least one.
-        vibration_limit: largest worst residual ratio.
-        objective: a name of `OBJECTIVES`.
-        allow_negative: whether a design with negative taps may be taken.
-
-    Returns:
-        Index into the designs.
-
-    Raises:
-        ArgumentError: no design.
     """
     if not designs:
         raise ArgumentError("there is no design to choose from: 0 given")

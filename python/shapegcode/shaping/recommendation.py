@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.machine import Machine
 from shapegcode.shaping.bands import ModeBand, machine_bands, mode_band
@@ -68,16 +70,18 @@ def choose_shaper(
         DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
     """
     machine = None if machine is None else Machine.of(machine)
-    if isinstance(modes, int | float | str | Mode | ModeBand):
-        modes = [modes]
-    if len(modes) > 0:
-        bands = [mode_band(each, uncertainty) for each in modes]
+    # Arrays are lists, too, and their numbers Python's.
+    several: list[float | str | Mode | ModeBand] = np.atleast_1d(np.asarray(modes, dtype=object)).tolist()
+    periods = None if periods_s is None else np.asarray(periods_s, dtype=object).tolist()
+    families = None if families is None else np.asarray(families, dtype=object).tolist()
+    if several:
+        bands = [mode_band(each, uncertainty) for each in several]
     elif machine is not None:
         bands = machine_bands(machine, uncertainty)
     else:
         raise ArgumentError("a comparison of shapers needs modes or a machine: neither is given")
-    if periods_s is not None and machine is not None:
-        for period_s in periods_s:
+    if periods is not None and machine is not None:
+        for period_s in periods:
             if period_s is not None:
                 check_block_period(period_s, machine)
     own = parse_taps(taps) if isinstance(taps, str) else taps
@@ -87,7 +91,7 @@ def choose_shaper(
 
     def compared(longest_s: float) -> Recommendation:
         options = DesignOptions(None, longest_s, max_abs_sum, limit, own)
-        kinds = periods_s
+        kinds: Sequence[float | None] | None = periods
         if kinds is None:
             best = candidate_periods(bands, machine, longest_s, limit)
             kinds = best if machine is not None else [None, *best]
@@ -95,7 +99,7 @@ def choose_shaper(
             bands, kinds, options, families=families, objective=objective, allow_negative=allow_negative,
             on_progress=on_progress,
         )  # fmt: skip
-        return result if len(modes) > 0 or machine is None else replace(result, machine=machine.name)
+        return result if several or machine is None else replace(result, machine=machine.name)
 
     if max_duration_s is not None:
         return compared(max_duration_s)

@@ -183,11 +183,7 @@ FAMILIES: tuple[Family, ...] = (
 
 
 def family_named(name: str) -> Family:
-    """The row of that name.
-
-    Raises:
-        ArgumentError: there is none; the message lists the names.
-    """
+    """The row of that name."""
     for row in FAMILIES:
         if row.name == name:
             return row
@@ -216,18 +212,6 @@ def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None =
     """All shapers of a family for some modes, judged, the preferred one first.
 
     Modes that are given twice are designed for once (:func:`distinct`).
-
-    Args:
-        name: of a row of `FAMILIES`.
-        bands: at least one mode with its band.
-        options: grid, longest duration and other limits; None: the defaults.
-
-    Returns:
-        The designs; none where the family has none for these modes.
-
-    Raises:
-        ArgumentError: no mode, no such family, or one that is not designed on the asked kind of times.
-        DesignError: the family has no shaper for these modes within the limits; the message tells what is nearest.
     """
     options = options or DesignOptions()
     row = family_named(name)

@@ -36,7 +36,7 @@ class Refusal:
     reason: str
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Recommendation(Result):
     """A comparison of shapers and the one to take.
 

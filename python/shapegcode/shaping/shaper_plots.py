@@ -25,16 +25,7 @@ _SWINGS_SHOWN = 3.0  # of the slowest mode, behind the longest shaper
 
 
 def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: Sequence[Mode]) -> NDArray[np.float64]:
-    """Residual ratio over frequency, with the damping ratios of the modes and between them what lies between.
-
-    Args:
-        shaper: whose zeros are looked for.
-        frequencies_hz: (n,), above 0.
-        modes: whose damping ratios count; none: no damping.
-
-    Returns:
-        (n,), share of the unshaped vibration that is left.
-    """
+    """Residual ratio over frequency, with the damping ratios of the modes and between them what lies between."""
     known = sorted((mode.frequency_hz, mode.damping_ratio) for mode in modes) or [(0.0, 0.0)]
     damping = np.interp(frequencies_hz, [frequency for frequency, _ in known], [ratio for _, ratio in known])
     return np.asarray(shaper.residual(frequencies_hz, damping))
@@ -46,17 +37,7 @@ def draw_sensitivity(
     vibration_limit: float | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """What is left if the frequency is another one? Residual ratio over frequency, the bands of the modes shaded.
-
-    Args:
-        shapers: by their names in the legend.
-        bands: the modes and how far they may be off; none: up to two and a half periods in the duration.
-        vibration_limit: residual ratio drawn as a dashed line; None: none.
-        ax: where to draw; None: a new figure.
-
-    Returns:
-        The axes that were drawn into.
-    """
+    """What is left if the frequency is another one? Residual ratio over frequency, the bands of the modes shaded."""
     panel = plot.axes(ax, size_inch=(9.0, 5.4), title="What is left if the frequency is another one")
     panel.text(
         1.0, 1.01, "a curve that comes down to 0 turns there: an amplitude has no sign", ha="right", fontsize=8,
@@ -96,15 +77,7 @@ def draw_sensitivity(
 
 
 def draw_impulses(shapers: Mapping[str, Shaper], ax: Axes | None = None) -> Axes:
-    """The taps of each shaper, one panel each.
-
-    Args:
-        shapers: by name, at least one.
-        ax: whose place is divided; None: a new figure.
-
-    Returns:
-        The upper panel.
-    """
+    """The taps of each shaper, one panel each."""
     rows = plot.grid(
         ax, len(shapers), 1, size_inch=(9.0, 1.2 + 1.35 * len(shapers)), title="Taps", sharex="col"
     )  # fmt: skip
@@ -124,17 +97,7 @@ def draw_impulses(shapers: Mapping[str, Shaper], ax: Axes | None = None) -> Axes
 def draw_steps(
     shapers: Mapping[str, Shaper], modes: Sequence[Mode], ax: Axes | None = None, *, unshaped: bool = True
 ) -> Axes:
-    """A shaped unit step (the staircase), and how each mode follows it; grey: unshaped.
-
-    Args:
-        shapers: by their names in the legend, at least one.
-        modes: that follow, one panel each, at least one.
-        ax: whose place is divided; None: a new figure.
-        unshaped: draw how they follow the step itself too.
-
-    Returns:
-        The upper panel.
-    """
+    """A shaped unit step (the staircase), and how each mode follows it; grey: unshaped."""
     slowest_s = 1.0 / min(mode.frequency_hz for mode in modes)
     until_s = max(shaper.duration_s for shaper in shapers.values()) + _SWINGS_SHOWN * slowest_s
     period_s = until_s / _SAMPLES_OF_A_STEP
@@ -163,16 +126,7 @@ def draw_steps(
 
 
 def draw_branches(branches: MinimalBranches, modes: Sequence[Mode], ax: Axes | None = None) -> Axes:
-    """Durations of all minimal shapers of two modes over the frequency of the faster one, which a line marks.
-
-    Args:
-        branches: over the ratio to the slower mode.
-        modes: the two.
-        ax: where to draw; None: a new figure.
-
-    Returns:
-        The axes that were drawn into.
-    """
+    """Durations of all minimal shapers of two modes over the frequency of the faster one, which a line marks."""
     slow, fast = sorted(mode.frequency_hz for mode in modes)
     panel = plot.axes(ax, size_inch=(9.0, 5.0), title=f"Minimal shapers of two modes, the slower one at {slow:g} Hz")
     negative = (branches.amplitudes < 0.0).any(axis=2)

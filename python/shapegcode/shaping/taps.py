@@ -18,19 +18,7 @@ _FORM = "TIME:AMPLITUDE,TIME:AMPLITUDE with times in s or with ms behind them, f
 
 
 def parse_taps(given: str | Sequence[Any] | dict[str, Any]) -> Shaper:
-    """A shaper from text, or from what a JSON or TOML file holds.
-
-    Args:
-        given: ``"0:0.5,0.01087:0.5"`` or ``"0:0.5,10.87ms:0.5"`` (time in s, unless ms is said, and amplitude); a list
-            of pairs ``[[0, 0.5], [0.01087, 0.5]]``; a table ``{"times_s": [...], "amplitudes": [...]}``; or the JSON
-            text of one of the latter two.
-
-    Returns:
-        The shaper, its times in s.
-
-    Raises:
-        ArgumentError: not of these forms, times that do not ascend from 0, or amplitudes that do not add up to 1.
-    """
+    """A shaper from text, or from what a JSON or TOML file holds."""
     if isinstance(given, str):
         text = given.strip()
         if not text.startswith(("[", "{")):
@@ -50,11 +38,7 @@ def parse_taps(given: str | Sequence[Any] | dict[str, Any]) -> Shaper:
 
 
 def on_grid(shaper: Shaper, period_s: float) -> Shaper:
-    """The shaper, if its times are multiples of a period (s).
-
-    Raises:
-        DesignError: a time is not; the message names the tap and the nearest multiple.
-    """
+    """The shaper, if its times are multiples of a period (s)."""
     for time_s in shaper.times_s.tolist():
         steps = time_s / period_s
         if abs(steps - round(steps)) > ON_GRID * max(1.0, steps):
@@ -77,11 +61,7 @@ def _from_text(text: str) -> Shaper:
 
 
 def _numbers(values: Any) -> list[float]:
-    """The numbers of a list; a text or a truth value is none.
-
-    Raises:
-        ArgumentError: something else is in it.
-    """
+    """The numbers of a list; a text or a truth value is none."""
     if isinstance(values, str | bytes) or not isinstance(values, Sequence):
         raise ArgumentError(f"a list of numbers is wanted among the taps: given {values!r}")
     for value in values:

@@ -116,14 +116,7 @@ class ShaperTrack:
         )
 
     def following(self, offset_mm: float = 0.0) -> FollowingFir:
-        """The filter that follows the axis.
-
-        Args:
-            offset_mm: what must be added to a position of the command to get one of the tables (work offset).
-
-        Returns:
-            The filter.
-        """
+        """The filter that follows the axis."""
         return FollowingFir(self.filters, self.axis, [node.position_mm - offset_mm for node in self.nodes])
 
 
@@ -142,23 +135,6 @@ def design_track(
 
     Nodes are added in the middle of every interval in which a mode keeps more than the limit, at first where the
     tables have their rows.
-
-    Args:
-        modes: all modes of the machine, at least one; one shaper serves all axes.
-        axis: whose position counts: 0, 1, 2 for X, Y, Z.
-        span_mm: positions between which the axis moves, ascending or equal.
-        period_s: grid, s, above 0.
-        max_duration_s: longest shaper, s.
-        residual_limit: largest residual ratio, above 0.
-        most_nodes: more are not tried.
-        design: shaper for the modes at a node; None: non-negative, least second central moment, equal means.
-
-    Returns:
-        The shapers by position of the axis.
-
-    Raises:
-        ArgumentError: no mode, a span or limit outside its range, or a table over another axis.
-        DesignError: a node has no shaper within `max_duration_s`, or the limit needs more than `most_nodes`.
     """
     low, high = span_mm
     if not modes:
@@ -198,15 +174,6 @@ def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s:
     """Non-negative shaper of a mean delay, of least second central moment, that cancels every mode exactly.
 
     With the mean delay given, the second central moment is linear in the taps: one linear program finds its least.
-
-    Args:
-        modes: to cancel, at least one.
-        period_s: grid, s.
-        periods: longest delay in periods.
-        mean_s: mean delay in s; None: the shaper of least mean delay.
-
-    Returns:
-        The shaper, residual ratio of every mode at most 1e-10, or None if there is none.
     """
     found = taps_of_mean(modes, period_s, periods, mean_s)
     if found is None or found[0][0] != 0:

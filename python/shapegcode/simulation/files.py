@@ -94,9 +94,6 @@ def csv_file(path: str | Path) -> Iterator[PlayedFile]:
     """A CSV file with the names of its columns in the first line; ``-`` is standard output.
 
     Columns: `kind` in words, then those of `Chunk.columns`; numbers as the shortest text that reads back the same.
-
-    Raises:
-        OSError: the file cannot be written; what was there before stays.
     """
     if path == "-":
         yield _Csv(sys.stdout.buffer)
@@ -111,9 +108,6 @@ def npz_file(path: str | Path) -> Iterator[PlayedFile]:
     """A NumPy archive with one array per column: those of `Chunk.columns`, `kind` and what its numbers mean.
 
     Until it is complete its columns take as much room again in the same folder.
-
-    Raises:
-        OSError: the file cannot be written; what was there before stays.
     """
     target = Path(path).resolve()
     with named_errors(path), contextlib.ExitStack() as files, replaced_file(path) as stream:

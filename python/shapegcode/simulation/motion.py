@@ -61,9 +61,6 @@ class MotionEnvelope:
         """Middle of each stretch in samples since the first, (n,); least and largest values, (n, curves).
 
         The two are the same where every sample has a stretch of its own.
-
-        Raises:
-            ValueError: no sample has passed.
         """
         if self._low is None or self._high is None or self._rest is None:
             raise ValueError("no sample: an envelope needs one or more")
@@ -129,21 +126,7 @@ class MotionRecorder:
         csv: str | None = None,
         npz: str | None = None,
     ) -> Motion:
-        """What has passed.
-
-        Args:
-            program: its name.
-            lines: first and last that have passed; None: all.
-            every: of how many samples one is in the files.
-            csv: file that was written.
-            npz: likewise.
-
-        Returns:
-            The motion, in mm over s.
-
-        Raises:
-            ValueError: no sample has passed.
-        """
+        """What has passed."""
         middles, low, high = self._envelope.result()
         return Motion(
             lines=lines,

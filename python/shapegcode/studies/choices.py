@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
+from shapegcode.studies.distributions import listed
 from shapegcode.studies.varied import check_keys
 
 __all__ = ["Choices", "checked_choices", "search", "usual_choices"]
@@ -28,14 +29,7 @@ _WHOLE = 1e-6
 
 
 def usual_choices(machine: Machine) -> dict[str, tuple[object, ...]]:
-    """Block period, family, tolerance that is aimed at, and feed on arcs.
-
-    Args:
-        machine: whose block time, interpolation period and tolerance count.
-
-    Returns:
-        Values by key.
-    """
+    """Block period, family, tolerance that is aimed at, and feed on arcs."""
     controller = machine.controller
     least = max(1, math.ceil(controller.block_time_s / controller.interpolation_period_s - _WHOLE))
     ticks = sorted({least, least + 1, least + 2, math.ceil(1.5 * least), 2 * least})
@@ -48,41 +42,23 @@ def usual_choices(machine: Machine) -> dict[str, tuple[object, ...]]:
 
 
 def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
-    """The choices, if they are such.
-
-    Args:
-        choices: values by key.
-        varied: keys that are drawn.
-
-    Returns:
-        The choices.
-
-    Raises:
-        ArgumentError: nothing to choose, no list of values, or a key that is drawn.
-    """
+    """The choices, if they are such."""
     if not choices:
         raise ArgumentError("choose: nothing to choose: give a list of values for one key or more")
     check_keys("choose", choices)
+    checked = {}
     for key, values in choices.items():
-        if isinstance(values, str) or not isinstance(values, Sequence) or not values:
-            raise ArgumentError(f"choose: {key} = {values!r}: must be a list of one value or more")
+        try:
+            checked[key] = listed(values).values
+        except ArgumentError:
+            raise ArgumentError(f"choose: {key} = {values!r}: must be a list of one value or more") from None
         if key in varied:
             raise ArgumentError(f"choose: {key}: it is drawn (vary): a value is either drawn or chosen")
-    return choices
+    return checked
 
 
 def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float]) -> Iterator[Ranks]:
-    """Combinations worth a conversion: all of them, or as many as differential evolution gets to.
-
-    Args:
-        choices: values by key; the first ones begin.
-        most: how many at most.
-        seed: of the evolution.
-        cost: of a combination, by the rank of each value; asked for only where not all can be tried.
-
-    Yields:
-        Ranks of the values of each key, each combination once.
-    """
+    """Combinations worth a conversion: all of them, or as many as differential evolution gets to."""
     sizes = [len(values) for values in choices.values()]
     if math.prod(sizes) <= most:
         yield from itertools.product(*(range(size) for size in sizes))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -29,25 +30,11 @@ class Distribution:
     known: bool | None = None
 
     def at(self, shares: Unit) -> list[object]:
-        """The values below which these shares of all lie.
-
-        Args:
-            shares: 0 to 1, (n,).
-
-        Returns:
-            A value for each.
-        """
+        """The values below which these shares of all lie."""
         raise NotImplementedError
 
     def levels(self, most: int) -> list[object]:
-        """A few values that stand for all, for a grid.
-
-        Args:
-            most: how many at most.
-
-        Returns:
-            Values in the middle of equal shares.
-        """
+        """A few values that stand for all, for a grid."""
         return self.at((np.arange(most) + 0.5) / most)
 
     @property
@@ -197,7 +184,7 @@ def uniform(low: float, high: float, *, known: bool | None = None) -> Uniform:
     return Uniform(float(low), float(high), known=known)
 
 
-def listed(values: Sequence[object], *, known: bool | None = None) -> Listed:
+def listed(values: Sequence[object] | npt.NDArray[Any], *, known: bool | None = None) -> Listed:
     """One of some values; a plain list says the same.
 
     Args:
@@ -210,11 +197,13 @@ def listed(values: Sequence[object], *, known: bool | None = None) -> Listed:
     Raises:
         ArgumentError: no list, or an empty one.
     """
-    if isinstance(values, str) or not isinstance(values, Sequence):
+    if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or getattr(values, "ndim", 1) == 0:
         raise ArgumentError(f"{values!r}: must be a list of values")
-    if not values:
+    if len(values) == 0:
         raise ArgumentError("a list of values is empty: give two or more")
-    return Listed(tuple(values), known=known)
+    # A machine file has Python's numbers.
+    plain = (each.tolist() if isinstance(each, np.generic | np.ndarray) else each for each in values)
+    return Listed(tuple(plain), known=known)
 
 
 def _number(name: str, value: object) -> float:

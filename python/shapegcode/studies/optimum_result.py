@@ -54,7 +54,7 @@ class Candidate:
         return ", ".join(f"{each.key.rpartition('.')[2]} {each.value}" for each in self.values)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Optimum(Result):
     """The shortest program that stays within tolerance as likely as was asked for.
 

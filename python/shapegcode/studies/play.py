@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-import os
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 
 from shapegcode.studies.replay import PackedText, Replay
 from shapegcode.studies.varied import drawn_machine
+from shapegcode.verdict.ahead import cores
 
 __all__ = ["DrawsJob", "play_all"]
 
@@ -40,17 +40,7 @@ class DrawsJob:
     times: bool
 
     def play(self, replay: Replay) -> list[list[float]]:
-        """Play them.
-
-        Args:
-            replay: the text.
-
-        Returns:
-            What was measured, in the order of `wanted`, for each draw.
-
-        Raises:
-            MachineError: a draw that no machine file could have.
-        """
+        """Play them."""
         found = []
         for row, draw in zip(self.rows, self.draws, strict=True):
             machine = drawn_machine(replay.machine, row, f"{self.name}, draw {draw}")
@@ -60,14 +50,7 @@ class DrawsJob:
         return found
 
     def parts(self, motion_s: float) -> Iterator[DrawsJob]:
-        """The same in tasks.
-
-        Args:
-            motion_s: how long the program takes.
-
-        Yields:
-            Some draws each.
-        """
+        """The same in tasks."""
         size = max(1, min(_AT_ONCE, int(_PLAYED_S / max(motion_s, 1e-3))))
         for at in range(0, len(self.rows), size):
             rows, draws = self.rows[at : at + size], self.draws[at : at + size]
@@ -77,27 +60,14 @@ class DrawsJob:
 def play_all(
     replay: Replay, job: DrawsJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
 ) -> list[list[float]]:
-    """Play the draws of one text.
-
-    Args:
-        replay: the text.
-        job: the draws.
-        pool: of a cluster, to which the text goes as bytes; None: threads of this process.
-        on_done: called with how many more are done.
-
-    Returns:
-        What was measured, in the order of the draws.
-
-    Raises:
-        MachineError: a draw that no machine file could have.
-    """
+    """Play the draws of one text."""
     parts = list(job.parts(replay.time_s))
     found: list[list[float]] = []
     if pool is not None:
         packed = replay.packed()
         running = [pool.submit(_play_packed, packed, part) for part in parts]
     else:
-        own = ThreadPoolExecutor(os.cpu_count() or 1)
+        own = ThreadPoolExecutor(cores())
         running = [own.submit(part.play, replay) for part in parts]
     try:
         for future, part in zip(running, parts, strict=True):

@@ -47,17 +47,7 @@ _FULL = 1.0
 
 
 def checked_measures(measure: Sequence[str]) -> tuple[str, ...]:
-    """What is measured; the share of the limit is always among it.
-
-    Args:
-        measure: names.
-
-    Returns:
-        Each once.
-
-    Raises:
-        ArgumentError: there is no such measure.
-    """
+    """What is measured; the share of the limit is always among it."""
     for name in measure:
         if name not in MEASURES:
             raise ArgumentError(f"measure = {name!r}: must be one of {', '.join(MEASURES)}")
@@ -128,23 +118,7 @@ class Replay:
         shape_all: bool = False,
         is_whole: bool = False,
     ) -> Replay:
-        """Convert a program.
-
-        Args:
-            program: or its file.
-            machine: for which.
-            judged_by: whose tolerances count; None: those of the same machine.
-            shape_all: see `shapegcode.convert`.
-            is_whole: every cut must keep its limits as converted, those left unchanged too.
-
-        Returns:
-            The text, ready to be played.
-
-        Raises:
-            ArgumentError: nothing of it was shaped.
-            ShapegcodeError: it cannot be converted.
-            OSError: its file cannot be read.
-        """
+        """Convert a program."""
         original = program_for_conversion(program, machine)
         found = convert(original, machine, shape_all=shape_all, tolerance_curve=False)
         if is_whole and (missed := next(found.misses(), "")):
@@ -177,14 +151,7 @@ class Replay:
 
     @classmethod
     def unpacked(cls, packed: PackedText) -> Replay:
-        """A replay that was packed.
-
-        Args:
-            packed: by `packed`.
-
-        Returns:
-            The replay.
-        """
+        """A replay that was packed."""
         machine = Machine.from_toml(packed.machine)
         limits: list[Any] = [
             RegionLimits(np.array(residual), contour, target)  # type: ignore[arg-type]
@@ -209,17 +176,7 @@ class Replay:
     def play(
         self, machine: Machine, wanted: Collection[str], *, override: float = _FULL, times: bool = True
     ) -> dict[str, float]:
-        """Play the text.
-
-        Args:
-            machine: that plays it.
-            wanted: names of `MEASURES`.
-            override: feed override, 1 = 100 %.
-            times: the machine may take another time than the one for which the text was converted.
-
-        Returns:
-            The worst of all regions, times in all.
-        """
+        """Play the text."""
         model = MachineModel(machine)
         found = dict.fromkeys(wanted, 0.0)
         for part in self._parts:

@@ -160,7 +160,7 @@ class Bins:
     numbers: bool
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class MachineStudy(Result):
     """A program played on many machines that are drawn.
 

@@ -27,21 +27,7 @@ Columns = list[list[object]]
 
 
 def drawn(varied: Sequence[Varied], n: int, sampling: str, seed: int, *, indices: bool) -> Columns:
-    """The values of all draws.
-
-    Args:
-        varied: what is varied.
-        n: how many draws; a grid and Saltelli's design take the most that they can below it.
-        sampling: one of `SAMPLINGS`.
-        seed: of the random numbers; the same one gives the same draws.
-        indices: a sample of which Sobol indices can be computed: Saltelli's design on Sobol's sequence.
-
-    Returns:
-        A list of values for each key.
-
-    Raises:
-        ArgumentError: too few draws, another word for the sampling, or indices of one that has none.
-    """
+    """The values of all draws."""
     if sampling not in SAMPLINGS:
         raise ArgumentError(f"sampling = {sampling!r}: must be one of {', '.join(SAMPLINGS)}")
     if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_DRAWS:
@@ -80,14 +66,7 @@ def _grid(varied: Sequence[Varied], n: int) -> Columns:
 
 
 def index_problem(varied: Sequence[Varied]) -> dict[str, Any]:
-    """What SALib calls a problem: the unit cube.
-
-    Args:
-        varied: what is varied.
-
-    Returns:
-        Names and bounds.
-    """
+    """What SALib calls a problem: the unit cube."""
     count = len(varied)
     return {"num_vars": count, "names": [each.key for each in varied], "bounds": [[0.0, 1.0]] * count}
 

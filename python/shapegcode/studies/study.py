@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from shapegcode.studies.result import Bins, MachineStudy, RefusedDraws, VariedKe
 from shapegcode.studies.sampling import Columns, drawn
 from shapegcode.studies.summary import bins_of, check_probability, decides, interval_of, quantity, within
 from shapegcode.studies.varied import Varied, Vary, drawn_machine, varied_values
+from shapegcode.verdict.ahead import cores
 
 __all__ = ["check_ends", "study"]
 
@@ -93,16 +93,7 @@ def study(
 
 
 def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> None:
-    """Make the machines with the lowest and the highest value of each key, before anything is converted.
-
-    Args:
-        machine: as its file has it.
-        varied: what is varied.
-        columns: its values.
-
-    Raises:
-        MachineError: a value that a machine file could not have; it has the key, the value and the limit.
-    """
+    """Make the machines with the lowest and the highest value of each key, before anything is converted."""
     for each, column in zip(varied, columns, strict=True):
         if isinstance(each.distribution, Listed):
             ends = {toml(value): index for index, value in enumerate(column)}.values()
@@ -122,7 +113,7 @@ def _pool(scheduler: Cluster | str | None) -> Iterator[Executor | None]:
     where = Cluster(scheduler) if isinstance(scheduler, str) else scheduler
     with cluster_executor(
         where.scheduler,
-        processes=os.cpu_count() or 1,
+        processes=cores(),
         tls_ca=where.tls_ca,
         tls_cert=where.tls_cert,
         tls_key=where.tls_key,

@@ -96,14 +96,7 @@ class DrawnValue(InlineTable):
         return self
 
     def distribution(self) -> Distribution:
-        """The distribution that it says.
-
-        Returns:
-            One of four kinds.
-
-        Raises:
-            ArgumentError: the keys are not those of one kind.
-        """
+        """The distribution that it says."""
         if self.model_fields_set - {"known"} not in map(set, _KINDS):
             raise ArgumentError(_GIVE)
         if self.one_of is not None:
@@ -213,14 +206,7 @@ class StudyFile(TomlTable):
 
 
 def study_schema(title: str) -> dict[str, Any]:
-    """JSON Schema of the file, for editors: keys of the machine file are looked into, limits of values are not.
-
-    Args:
-        title: of the schema.
-
-    Returns:
-        The schema.
-    """
+    """JSON Schema of the file, for editors: keys of the machine file are looked into, limits of values are not."""
     found = toml_schema(StudyFile, title)
     choices: dict[str, Any] = {"type": "array", "minItems": 1}
     said: dict[str, dict[str, Any]] = {"vary": {"anyOf": [choices, {"$ref": "#/$defs/DrawnValue"}]}, "choose": choices}

@@ -28,30 +28,13 @@ _CONFIDENCE = 0.95
 
 
 def check_probability(name: str, value: object) -> None:
-    """Refuse what is no probability that can be asked for.
-
-    Args:
-        name: of the value.
-        value: of it.
-
-    Raises:
-        ArgumentError: with both.
-    """
+    """Refuse what is no probability that can be asked for."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value <= 1.0:
         raise ArgumentError(f"{name} = {value!r}: must be a probability, above 0 and at most 1")
 
 
 def quantity(name: str, values: FloatArray, nominal: float) -> Quantity:
-    """Quantiles of one measure.
-
-    Args:
-        name: of the measure.
-        values: of the draws that could be played, (n,).
-        nominal: of the machine file.
-
-    Returns:
-        The quantiles.
-    """
+    """Quantiles of one measure."""
     p5, p25, p50, p75, p95, p99 = np.percentile(values, PERCENT).tolist()
     return Quantity(name, nominal, float(values.mean()), p5, p25, p50, p75, p95, p99, float(values.max()))
 
@@ -62,15 +45,7 @@ def within(shares: FloatArray) -> npt.NDArray[np.bool_]:
 
 
 def interval_of(good: int, count: int) -> tuple[float, float]:
-    """Clopper and Pearson's interval of a probability, at 95 %.
-
-    Args:
-        good: draws that are within their limits.
-        count: of all.
-
-    Returns:
-        Its ends.
-    """
+    """Clopper and Pearson's interval of a probability, at 95 %."""
     from scipy.stats import beta
 
     tail = (1.0 - _CONFIDENCE) / 2.0
@@ -80,16 +55,7 @@ def interval_of(good: int, count: int) -> tuple[float, float]:
 
 
 def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[BinQuantiles, ...]:
-    """Quantiles of a measure where a value is low, ..., high: in ten bins of as many draws, or by choice.
-
-    Args:
-        each: what is varied.
-        column: its values.
-        values: of the measure.
-
-    Returns:
-        The bins in the order of the values.
-    """
+    """Quantiles of a measure where a value is low, ..., high: in ten bins of as many draws, or by choice."""
     if isinstance(each.distribution, Listed):
         places = [(str(choice), [index for index, value in enumerate(column) if value == choice])
                   for choice in each.distribution.values]  # fmt: skip
@@ -116,18 +82,7 @@ def decides(
     indices: bool,
     seed: int,
 ) -> tuple[Decides, ...]:
-    """Which value moves the share of the limit most.
-
-    Args:
-        varied: what is varied.
-        columns: its values.
-        measured: by name.
-        indices: Sobol indices too, of a sample in Saltelli's design.
-        seed: of their confidence.
-
-    Returns:
-        One for each value, the one that decides first.
-    """
+    """Which value moves the share of the limit most."""
     shares = measured[SHARE]
     found = _indices(varied, shares, seed) if indices else {}
     rows = []

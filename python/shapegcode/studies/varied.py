@@ -9,6 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine import Machine
@@ -17,7 +21,7 @@ from shapegcode.studies.distributions import Distribution, listed
 
 __all__ = ["Varied", "Vary", "check_keys", "drawn_machine", "varied_values"]
 
-Vary = Mapping[str, Distribution | Sequence[object]]
+Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]
 """What each key is drawn from."""
 
 # A machine may differ from its file in these, and they are read when blocks are played.
@@ -59,42 +63,21 @@ class Varied:
 
 
 def check_keys(name: str, given: object) -> None:
-    """Refuse what does not go by keys of the machine file.
-
-    Args:
-        name: of the argument.
-        given: for it.
-
-    Raises:
-        ArgumentError: with both.
-    """
+    """Refuse what does not go by keys of the machine file."""
     if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
         said = f"{name} = {given!r}: must go by keys of the machine file"
         raise ArgumentError(f'{said}, such as {{"axes.x.modes.1.frequency_hz": ...}}')
 
 
 def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
-    """What is varied, checked against the keys that there are.
-
-    Args:
-        machine: whose values.
-        vary: what each key is drawn from; a list: one of its values.
-
-    Returns:
-        One for each key, in the same order.
-
-    Raises:
-        ArgumentError: nothing is varied; a value that is neither a distribution nor a list; a key that only the
-            converter reads and that it shall not know.
-        MachineError: no such key.
-    """
+    """What is varied, checked against the keys that there are."""
     if not vary:
         raise ArgumentError("vary: nothing is varied: name at least one key of the machine file")
     check_keys("vary", vary)
     held = {value.key: value for value in machine.values()}
     found = []
     for key, given in vary.items():
-        if isinstance(given, str) or not isinstance(given, Distribution | Sequence):
+        if isinstance(given, str) or not isinstance(given, Distribution | Sequence | np.ndarray):
             raise ArgumentError(f"vary: {key} = {given!r}: must be a distribution or a list of values")
         drawn = given if isinstance(given, Distribution) else listed(given)
         # Tables such as controller.in_position_s can be varied axis by axis.
@@ -111,19 +94,7 @@ def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
 
 
 def drawn_machine(machine: Machine, values: Mapping[str, object], source: str) -> Machine:
-    """A machine with drawn values.
-
-    Args:
-        machine: as its file has it.
-        values: by key.
-        source: names it in messages.
-
-    Returns:
-        The machine.
-
-    Raises:
-        MachineError: a value that a machine file could not have; it has the key, the value and the limit.
-    """
+    """A machine with drawn values."""
     if not values:
         return machine
     # A control that ticks otherwise plays the same blocks; whether their period is a multiple is the converter's care.

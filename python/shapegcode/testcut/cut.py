@@ -6,7 +6,6 @@ whose height above that wall is known over X, so the radial depth is known where
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,6 +16,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError
+from shapegcode.io.data_file import DataFile
 
 Array = npt.NDArray[np.float64]
 _FORMAT = "shapegcode test cut 1"
@@ -271,7 +271,8 @@ def read_test_cut(path: str | Path) -> TestCut:
         OSError: the file cannot be read.
     """
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        with DataFile(path, ArgumentError) as file:
+            data = file.json(str(path), file.read())
     except ValueError as error:
         raise ArgumentError(f"{path}: no JSON: {error}") from error
     if not isinstance(data, dict) or data.get("format") != _FORMAT:

@@ -139,7 +139,7 @@ _REMEDIES = {
 }
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class CycleTime(TimeParts, Result):
     """How long a program takes.
 
@@ -168,6 +168,9 @@ class CycleTime(TimeParts, Result):
     shaped_regions: int
     warnings: tuple[str, ...]
     played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
+
+    __eq__ = Result.__eq__
+    __hash__ = Result.__hash__
 
     @property
     def difference_percent(self) -> float | None:

@@ -20,7 +20,7 @@ _WAITING = 2  # parts per core that are under way or done and not yet taken: wha
 
 
 def cores() -> int:
-    """Cores that this process may use; SHAPEGCODE_THREADS says less."""
+    """Processors that this process may use, by its affinity; SHAPEGCODE_THREADS says another number."""
     said = os.environ.get("SHAPEGCODE_THREADS", "")
     if said.isdecimal() and int(said) > 0:
         return int(said)
@@ -64,14 +64,7 @@ class Ahead(Generic[T]):
             self._running[number] = future
 
     def result(self, number: int) -> T:
-        """The result of the next task.
-
-        Args:
-            number: its number.
-
-        Returns:
-            What it returned; what it raised is raised.
-        """
+        """The result of the next task."""
         self.begin()
         future = self._running.pop(number)
         while not future.done():
@@ -80,11 +73,7 @@ class Ahead(Generic[T]):
         return future.result()
 
     def skip(self, number: int) -> None:
-        """Count a part as done.
-
-        Args:
-            number: of the part.
-        """
+        """Count a part as done."""
         self._tell((number, 1.0))
 
     def _hear(self, number: int, share: float) -> None:

@@ -154,16 +154,7 @@ class CasePlayer:
 
 
 def case_figures(run: _core.PlaybackFigures, *, contour: bool = True, response: bool = True) -> CaseFigures:
-    """What a playback showed.
-
-    Args:
-        run: the playback.
-        contour: the deviations were measured.
-        response: that of the response among them.
-
-    Returns:
-        Its figures.
-    """
+    """What a playback showed."""
     if not contour:
         return CaseFigures(run.residual_mm, None, None, run.duration_s)
     followed = Deviation.of([run.response]) if response else None

@@ -211,16 +211,7 @@ def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[Judged]:
 def region_misses(
     cases: Sequence[Case], figures: Sequence[CaseFigures | None], limits: RegionLimits
 ) -> list[tuple[str, Judged]]:
-    """Every figure of a cut that leaves its limit in a condition that counts: the worst condition of each, in words.
-
-    Args:
-        cases: the operating conditions.
-        figures: of the cut in each; None: not simulated.
-        limits: of the cut.
-
-    Returns:
-        Each miss in words, and the figure.
-    """
+    """Every figure of a cut that leaves its limit in a condition that counts: the worst condition of each, in words."""
     worst: dict[str, tuple[Judged, Case]] = {}
     for case, played in zip(cases, figures, strict=True):
         for judged in judge_region(played, limits) if case.counts and played is not None else ():

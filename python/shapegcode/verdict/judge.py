@@ -125,35 +125,14 @@ class Judge:
         pool: Executor,
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
-        """Play every emitted region beside its original: `begin` and `figures`.
-
-        Args:
-            emitted: the program read back.
-            placed: the regions and their places in it.
-            originals: the originals' playbacks under way, one per region.
-            pool: runs the playbacks.
-            on_step: called with playbacks done and playbacks in all.
-
-        Returns:
-            The figures of each region, in the order of the text.
-        """
+        """Play every emitted region beside its original: `begin` and `figures`."""
         trackers = [_core.ContourTracker(place.region.path) for place in placed]
         return self.figures(self.begin(emitted, placed, trackers, pool), originals, on_step)
 
     def begin(
         self, emitted: Program, placed: Sequence[Placed], trackers: Iterable[_core.ContourTracker], pool: Executor
     ) -> list[Playing]:
-        """Begin to play every emitted region.
-
-        Args:
-            emitted: the program read back.
-            placed: the regions and their places in it.
-            trackers: of their programmed paths.
-            pool: runs the playbacks.
-
-        Returns:
-            The playbacks of each region.
-        """
+        """Begin to play every emitted region."""
         limits = self._model.limits()
         running = []
         for place, tracker in zip(placed, trackers, strict=True):
@@ -178,16 +157,7 @@ class Judge:
         originals: Sequence[Future[_core.PlaybackFigures]],
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
-        """What the playbacks show.
-
-        Args:
-            running: the emitted regions' playbacks under way.
-            originals: the originals'.
-            on_step: called with playbacks done and playbacks in all.
-
-        Returns:
-            The figures of each region.
-        """
+        """What the playbacks show."""
         results: list[RegionFigures] = []
         # A program may be one long region: what moves is the number of its playbacks.
         done = count(1)
@@ -209,13 +179,6 @@ class Judge:
         """Largest deviation from the path of what the contour tolerance is about, over the cases that count, µm.
 
         Without those that a lower feed is no remedy for: look-ahead left on, a starved block.
-
-        Args:
-            figures: of the region.
-            turned: False: only the cases at 100 % feed override.
-
-        Returns:
-            The deviation.
         """
         deviations = [
             played.command if self.target == "command" else played.response
@@ -231,16 +194,7 @@ class Judge:
     def verdicts(
         self, figures: Sequence[RegionFigures], placed: Sequence[Placed], block_period_s: float
     ) -> tuple[RegionVerdict, ...]:
-        """Every cut beside its limits.
-
-        Args:
-            figures: per cut, as simulated.
-            placed: the cuts.
-            block_period_s: of the emitted blocks, s.
-
-        Returns:
-            A verdict for each cut.
-        """
+        """Every cut beside its limits."""
         return tuple(
             self._verdict(region, place, block_period_s) for region, place in zip(figures, placed, strict=True)
         )
@@ -252,17 +206,7 @@ class Judge:
         block_period_s: float,
         rapid_vibration_um: Pair[Xyz[float]],
     ) -> PlayedFigures:
-        """The figures of all cuts; see `verdicts`.
-
-        Args:
-            figures: per cut, shaped or left unchanged.
-            placed: the cuts.
-            block_period_s: of the emitted blocks, s.
-            rapid_vibration_um: behind rapids, of original and emitted program.
-
-        Returns:
-            The figures of the whole program.
-        """
+        """The figures of all cuts; see `verdicts`."""
         emitted = [run for region in figures for run in region.emitted]
         originals = [region.original for region in figures]
         side = self._machine.input.material_side
@@ -319,15 +263,7 @@ class Judge:
         return None if worst is None else worst.lines
 
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
-        """What a region is judged by: its residual beside that of the original as programmed, in whatever case.
-
-        Args:
-            figures: of the region.
-            place: the region.
-
-        Returns:
-            Its limits.
-        """
+        """What a region is judged by: its residual beside that of the original as programmed, in whatever case."""
         tolerance = self._machine.tolerance
         increment_um = least_increment_mm(self._machine, place.region.exit.units) * 1e3
         floor_um = max(tolerance.residual_floor_um, tolerance.residual_floor_increments * increment_um)
@@ -388,18 +324,7 @@ def case_verdict(
     lines: Sequence[tuple[int, int]],
     material_side: str | None,
 ) -> CaseVerdict:
-    """All regions in one case.
-
-    Args:
-        case: in which they were played.
-        played: per region.
-        limits: per region.
-        lines: of the original program, per region.
-        material_side: "left" or "right" of the travel; None: not known.
-
-    Returns:
-        The worst of the regions in this case.
-    """
+    """All regions in one case."""
     judged = [
         (each, where)
         for where, run, limit in zip(lines, played, limits, strict=True)

@@ -34,20 +34,7 @@ Vector = npt.NDArray[np.float64]
 def judge_program(
     emitted: Program, original: Program, machine: Machine, *, shaped: bool | None = None
 ) -> PlayedFigures:
-    """An emitted program judged in the operating conditions that count, as `convert` judges its own.
-
-    Args:
-        emitted: what was written, read back.
-        original: from which it was made.
-        machine: whose tolerances and stated band count.
-        shaped: whether cuts are shaped blocks; None: those of which the program says so.
-
-    Returns:
-        The figures of the whole program.
-
-    Raises:
-        ArgumentError: the original has a cut that the emitted program has not.
-    """
+    """An emitted program judged in the operating conditions that count, as `convert` judges its own."""
     model = MachineModel(machine)
     judge = Judge(model, [case for case in stated_cases(machine) if case.counts or case.nominal])
     pairs = list(paired_regions(emitted, original))
@@ -80,16 +67,6 @@ def simulate_unchanged(
 
     Rules of block timing, a buffer underrun and look-ahead left on concern shaped blocks alone: there it is as it is
     meant to run. Other feed overrides and uncertain modes are simulated where they count.
-
-    Args:
-        judge: whose operating conditions count.
-        model: of the machine.
-        mine: the cut as it stands in the emitted program.
-        region: the cut of the original.
-        original: it, simulated.
-
-    Returns:
-        Its figures.
     """
     path, offset = mine.path, model.offset(region)
     same = path.moves_as(region.path)
@@ -112,15 +89,7 @@ def simulate_unchanged(
 
 
 def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
-    """Vibration that rapids leave where a cut follows: maximum of |table - command| once their set-points rest.
-
-    Args:
-        program: any; shaped rapids are simulated as shaped blocks.
-        model: of the machine.
-
-    Returns:
-        Per axis, µm; it is held to no limit, as nothing is cut while a rapid moves.
-    """
+    """Vibration that rapids leave where a cut follows: maximum of |table - command| once their set-points rest."""
     found: dict[tuple[float, ...], Vector] = {}
     for start_mm, end_mm in _rapids_before_cuts(program):
         key = tuple(np.round(end_mm - start_mm, 9))
@@ -156,19 +125,7 @@ def _rapids_before_cuts(program: Program) -> Iterator[tuple[Vector, Vector]]:
 def unshaped_regions(
     emitted: Program, shaped_lines: Sequence[tuple[int, int]], expected: Sequence[_core.Region]
 ) -> list[_core.Region]:
-    """The cuts of an emitted program that were left unchanged.
-
-    Args:
-        emitted: read back.
-        shaped_lines: of it, first and last, of each shaped cut and shaped rapid.
-        expected: the cuts of the original that were left unchanged, in order.
-
-    Returns:
-        One for each of them.
-
-    Raises:
-        RoundTripError: there are others.
-    """
+    """The cuts of an emitted program that were left unchanged."""
     starts = sorted(shaped_lines)
     begins = [begin for begin, _ in starts]
 

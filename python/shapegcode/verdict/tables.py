@@ -15,15 +15,7 @@ _SWINGS_UM = 0.005  # an axis that nowhere reaches this has no column
 
 
 def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table:
-    """What every case leaves, whether it counts, and which one decides.
-
-    Args:
-        cases: as played.
-        worst: the one that decides; None: no case counts.
-
-    Returns:
-        The table.
-    """
+    """What every case leaves, whether it counts, and which one decides."""
     columns = (
         Column("condition", value=lambda case: unbroken(case.name), text=True),
         *(
@@ -49,14 +41,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
 
 
 def unbroken(text: str) -> str:
-    """Keep a number on the line of its unit.
-
-    Args:
-        text: of a cell.
-
-    Returns:
-        The text with no-break spaces.
-    """
+    """Keep a number on the line of its unit."""
     return _NUMBER.sub(rf"\1{NO_BREAK}\2", text)
 
 

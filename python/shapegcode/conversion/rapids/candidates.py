@@ -86,15 +86,7 @@ class Gap:
 
 
 def find_gaps(program: Program, machine: Machine) -> list[Gap]:
-    """Rapids of an emitted text, gathered between its cuts.
-
-    Args:
-        program: read as emitted text.
-        machine: whose controller reads it.
-
-    Returns:
-        The gaps, in the order of the text.
-    """
+    """Rapids of an emitted text, gathered between its cuts."""
     core = program.core
     moves = core.other_moves
     functions = core.functions

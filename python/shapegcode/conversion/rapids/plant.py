@@ -50,17 +50,7 @@ class Timing:
 
 
 def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_per_s: float, band_mm: float) -> float:
-    """Time from the end of a command until the table stays within a band around it, s; at most 30 s.
-
-    Args:
-        command_mm: set-points from rest to rest, one per period, (n, 3).
-        options: the plant.
-        slowest_per_s: decay rate of the slowest mode (damping ratio times angular frequency), 1/s.
-        band_mm: half the width of the band, above 0.
-
-    Returns:
-        The time in s.
-    """
+    """Time from the end of a command until the table stays within a band around it, s; at most 30 s."""
     still = _core.Path([_core.Segment.line(command_mm[0], command_mm[0], 1.0)])
     options.measure_contour = False
     options.record_samples = 0
@@ -146,15 +136,7 @@ class RapidPlant:
         return Timing(seconds, 0.0, 0.0, np.zeros((1, 3)))
 
     def ready_s(self, steps: Sequence[Timing], region: _core.Region) -> float:
-        """Time of steps one after the other until the table has settled behind all of them together, s.
-
-        Args:
-            steps: in order.
-            region: whose modes hold, where modes vary with position.
-
-        Returns:
-            The time in s.
-        """
+        """Time of steps one after the other until the table has settled behind all of them together, s."""
         period = self.model.period_s
         clock_s = math.fsum(step.clock_s for step in steps)
         parts: list[Vector] = []

@@ -69,23 +69,7 @@ def shape_rapids(
     pool: Executor,
     budget: Budget | None = None,
 ) -> ShapedRapids:
-    """Replace the rapids of an emitted text where that brings the next cut closer.
-
-    Args:
-        emitted: a program with shaped regions, read back.
-        placed: the regions and their places in it.
-        model: of the machine: controller, modes and tolerances.
-        grid: block period and shaper.
-        pool: runs playbacks.
-        budget: limits of the whole text; rapids get what the regions leave.
-
-    Returns:
-        The text with those that were replaced, and what each gained.
-
-    Raises:
-        ArgumentError: `tolerance.residual_floor_um` is 0: there is no band to settle in.
-        RoundTripError: see `read_back`.
-    """
+    """Replace the rapids of an emitted text where that brings the next cut closer."""
     if model.machine.tolerance.residual_floor_um <= 0.0:
         raise _core.ArgumentError(
             "tolerance.residual_floor_um is 0: shaped rapids need the band in which vibration counts as having decayed"

@@ -27,16 +27,7 @@ class Spliced:
 
 
 def splice(text: bytes, placed: Sequence[Placed], choices: Sequence[Choice]) -> Spliced:
-    """A text with replacements in the places of rapids.
-
-    Args:
-        text: with shaped regions.
-        placed: the regions.
-        choices: what is replaced, in the order of the text.
-
-    Returns:
-        The new text, and where its replacements stand.
-    """
+    """A text with replacements in the places of rapids."""
     parts, at = [], 0
     shifts = []  # (line behind which it holds, lines that were added)
     added = 0

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, RecordError
+from shapegcode.io.data_file import open_file
 from shapegcode.io.edge_capture import EdgeCapture
 from shapegcode.io.edge_json import is_edge_json, read_edge_json
 from shapegcode.io.servo_log import parse_units, read_log
@@ -121,9 +122,7 @@ def read_servo_record(path: str | Path, units: str | None = None) -> ServoRecord
         OSError: it cannot be read.
     """
     path = Path(path)
-    if path.exists() and not path.is_file():
-        raise RecordError(f"{path}: not a regular file")
-    with path.open("rb") as file:
+    with open_file(path) as file:
         head = file.read(200)
     if is_edge_json(head) or path.suffix.lower() == ".json":
         if units is not None:

@@ -131,7 +131,7 @@ class ServoAxis:
         return next((each for each in self.parameters if each.name == name), None)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class ServoFit(Result):
     """Position loops as a log of commands and actual positions shows them.
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from shapegcode.results.json import plain
 from shapegcode.results.made import Made, this_version
-from shapegcode.results.outcome import NotKeptError, Outcome, Plot
+from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.page.how import HOW, UNKNOWN
 from shapegcode.results.page.model import (
     Figure,
@@ -41,14 +41,7 @@ _PRINTED_PICTURES = 2  # so that the page stays within four sheets
 
 
 def title_of(result: Outcome) -> str:
-    """What the result is, in words, and of which program.
-
-    Args:
-        result: of any class.
-
-    Returns:
-        For example "Cycle time of part.nc on vx500".
-    """
+    """What the result is, in words, and of which program."""
     words = " ".join(word.lower() for word in _WORD.findall(type(result).__name__))
     name = getattr(result, "program", None)
     machine = getattr(result, "machine", None)
@@ -58,15 +51,7 @@ def title_of(result: Outcome) -> str:
 
 
 def sections_of(result: Outcome, figures: Sequence[Figure] = ()) -> tuple[Section, ...]:
-    """Key figures, warnings, next step, tables and pictures of any result.
-
-    Args:
-        result: of any class.
-        figures: the few that people look at first.
-
-    Returns:
-        The sections in the order in which they stand on the page.
-    """
+    """Key figures, warnings, next step, tables and pictures of any result."""
     try:
         tables = result.tables()
     except NotKeptError:
@@ -81,28 +66,13 @@ def _first(figures: Sequence[Figure]) -> Iterator[Section]:
 
 
 def warnings_of(result: Outcome) -> Iterator[Section]:
-    """The warnings, if there are any.
-
-    Args:
-        result: of any class.
-
-    Returns:
-        One section or none.
-    """
+    """The warnings, if there are any."""
     if result.warnings:
         yield Section("warnings", "Warnings", (Text(tuple(result.warnings), warning=True),))
 
 
 def next_steps(result: Outcome, *further: NextStep) -> Section:
-    """What to do next.
-
-    Args:
-        result: whose next step it is; a command that is named in it is shown to be copied.
-        further: steps behind it.
-
-    Returns:
-        The section.
-    """
+    """What to do next."""
     text = result.next_step
     is_command = text.startswith("shapegcode ")
     said = text if is_command else text[:1].upper() + text[1:]
@@ -134,16 +104,8 @@ def _tables(tables: Sequence[Table]) -> Iterator[Section]:
 
 
 def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Section]:
-    """The pictures, each with a line that says how to read it.
-
-    Args:
-        result: of any class.
-        printed: names of those that are on paper too; none: the first two.
-
-    Returns:
-        A section of those on paper, one of the others; none where there are none.
-    """
-    pictures = [Picture(name, plot, how_to_read(name)) for name, plot in _drawable(result).items()]
+    """The pictures, each with a line that says how to read it."""
+    pictures = [Picture(name, plot, how_to_read(name)) for name, plot in result.plots().items()]
     chosen = [each for each in pictures if each.name in printed] or pictures[:_PRINTED_PICTURES]
     if chosen:
         yield Section("pictures", "Pictures", tuple(chosen))
@@ -154,44 +116,13 @@ def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Sectio
         yield Section("no-pictures", "Pictures that are not here", (Text((left_out,)),), printed=False)
 
 
-def _drawable(result: Outcome) -> Mapping[str, Plot]:
-    """The pictures; of a result that came from its JSON those which need nothing else."""
-    try:
-        plots = result.plots()
-    except NotKeptError:
-        return {}
-    return {name: plot for name, plot in plots.items() if not result.from_json or _draws(plot)}
-
-
-def _draws(plot: Plot) -> bool:
-    try:
-        plot()
-    except NotKeptError:
-        return False
-    return True
-
-
 def how_to_read(name: str) -> str:
-    """How to read a picture.
-
-    Args:
-        name: of the picture, as `plots()` has it.
-
-    Returns:
-        One line.
-    """
+    """How to read a picture."""
     return HOW.get(name, UNKNOWN)
 
 
 def made_section(made: Made) -> Section:
-    """Command, version and files with their hashes.
-
-    Args:
-        made: of what the result was made.
-
-    Returns:
-        The section.
-    """
+    """Command, version and files with their hashes."""
     rows = [("by", made.by)]
     rows += [("command", made.command)] if made.command else []
     rows += [
@@ -212,20 +143,7 @@ def page_of(
     made: Made | None = None,
     problems: Sequence[str] = (),
 ) -> Page:
-    """The page of a result.
-
-    Args:
-        result: of any class.
-        title: heading.
-        light: colour and reason.
-        sections: between the verdict and what it was made of.
-        scene: motion to look at.
-        made: of what the result was made.
-        problems: what is not as it should be with the page itself.
-
-    Returns:
-        The page.
-    """
+    """The page of a result."""
     report: dict[str, Any] = result.to_json()
     if made is not None:
         report["made"] = plain(made)
@@ -255,15 +173,7 @@ def _named(scene: Scene | None, made: Made) -> Scene | None:
 
 
 def raw_page(report: Mapping[str, Any], why: str) -> Page:
-    """The page of a result that cannot be read back: its JSON as it stands.
-
-    Args:
-        report: the JSON.
-        why: it cannot be read.
-
-    Returns:
-        The page.
-    """
+    """The page of a result that cannot be read back: its JSON as it stands."""
     made = report.get("made")
     by = made.get("by", "another version") if isinstance(made, dict) else "another version"
     return Page(
@@ -290,14 +200,7 @@ def _short(value: object) -> str:
 
 
 def short_html(result: Outcome) -> str:
-    """Answer, warnings and tables for a notebook.
-
-    Args:
-        result: of any class.
-
-    Returns:
-        HTML without scripts and styles of its own, everything in it escaped.
-    """
+    """Answer, warnings and tables for a notebook."""
     parts = [f"<p><b>{escape(result.answer)}</b></p>"]
     parts += [f"<p>warning: {escape(warning)}</p>" for warning in result.warnings]
     for table in result.tables():

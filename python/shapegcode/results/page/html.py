@@ -33,19 +33,7 @@ STYLES = ("page.css", "scene.css", "print.css")
 
 
 def to_html(page: Page, script: Script = "inline") -> str:
-    """The file of a page.
-
-    Args:
-        page: what stands on it.
-        script: "inline": with Plotly in it; "beside": Plotly is the file `plotly_name()` in the same folder.
-
-    Returns:
-        HTML, without a reference to anything else.
-
-    Raises:
-        ArgumentError: another `script`.
-        ValueError: a section has a key that is an id of the page itself.
-    """
+    """The file of a page."""
     if script not in ("inline", "beside"):
         raise ArgumentError(f'script must be "inline" or "beside", not {script!r}')
     own = _assets(SCRIPTS)
@@ -124,21 +112,7 @@ def _problems(page: Page) -> str:
 
 
 def save(page: Page, path: str | Path, script: Script = "inline") -> list[str]:
-    """Write the file of a page; it is either complete or as it was before.
-
-    Args:
-        page: what stands on it.
-        path: of the file.
-        script: "beside": Plotly is written once into the same folder, for all pages there.
-
-    Returns:
-        The files that were written.
-
-    Raises:
-        ArgumentError: another `script`.
-        ValueError: see `to_html`.
-        OSError: a file cannot be written.
-    """
+    """Write the file of a page; it is either complete or as it was before."""
     text = to_html(page, script)
     wrote = []
     if script == "beside" and page.scene is not None:
@@ -157,14 +131,7 @@ def plotly_name() -> str:
 
 
 def is_shared(name: str) -> bool:
-    """Whether a file is such a script, of any version of Plotly.
-
-    Args:
-        name: with or without its folder.
-
-    Returns:
-        True if pages beside it may need it.
-    """
+    """Whether a file is such a script, of any version of Plotly."""
     return re.fullmatch(r"plotly-[\w.]+\.min\.js", name.rpartition("/")[2]) is not None
 
 

@@ -62,17 +62,7 @@ def prose(text: str) -> str:
 
 
 def number(value: float, digits: int, *, key: str = "", factor: float = 1.0) -> str:
-    """A number, and where the JSON has it.
-
-    Args:
-        value: as it is shown.
-        digits: behind the point.
-        key: where the JSON holds it: names and ranks with dots between; empty: nowhere.
-        factor: from the number in the JSON to the one shown.
-
-    Returns:
-        A span that holds the text, the value with all digits, and the place.
-    """
+    """A number, and where the JSON has it."""
     # As the JSON rounds it, so that both agree in the last digit.
     value = float(f"{value / factor:.9g}") * factor
     place = f' data-json="{escape(key)}" data-factor="{factor!r}" data-digits="{digits}"' if key else ""
@@ -80,14 +70,7 @@ def number(value: float, digits: int, *, key: str = "", factor: float = 1.0) -> 
 
 
 def section_of(section: Section) -> str:
-    """A section with its heading.
-
-    Args:
-        section: of the page.
-
-    Returns:
-        A `section`, or where it is folded a `section` that holds `details`.
-    """
+    """A section with its heading."""
     kinds = ["part", *(["sheet"] if section.sheet else []), *([] if section.printed else ["unprinted"])]
     how = f'<p class="how"><b>How to read this:</b> {prose(section.how)}</p>' if section.how else ""
     body = how + "\n".join(_part(part, f"{section.key}-{rank}") for rank, part in enumerate(section.parts))
@@ -345,15 +328,7 @@ def _cut_picker(picker: CutPicker, key: str) -> str:
 
 
 def json_script(key: str, value: Any) -> str:
-    """JSON inside of HTML: what could end the element or start another one is written by its number.
-
-    Args:
-        key: id of the element.
-        value: that JSON can hold.
-
-    Returns:
-        A script element that does not run.
-    """
+    """JSON inside of HTML: what could end the element or start another one is written by its number."""
     encoder = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     if isinstance(value, Mapping) and any(isinstance(each, Streamed) for each in value.values()):
         stream = io.StringIO()

@@ -143,13 +143,6 @@ def packed(scene: Scene) -> tuple[dict[str, Any], str]:
 
     Numbers are 16-bit ranks between the least and the largest value of their column (`low`, `high`), stored as
     differences modulo 65536 (`u2d`); samples, lines and blocks are 32-bit differences (`i4d`).
-
-    Args:
-        scene: to pack.
-
-    Returns:
-        A head for JSON, which says of every column at which byte it begins, how many numbers it has, of which kind and
-        between which limits; and the bytes, compressed by gzip, in base64.
     """
     body = bytearray()
 

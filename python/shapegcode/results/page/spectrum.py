@@ -42,15 +42,7 @@ class AccelerationSpectrum:
         self._windows += 1
 
     def lines(self, variant: str, *, most_hz: float) -> list[SceneSpectrum]:
-        """The spectral density of each axis that moves.
-
-        Args:
-            variant: key of what was played.
-            most_hz: up to which frequency.
-
-        Returns:
-            Root of the power spectral density in m/s² per root hertz, one for each axis that moves.
-        """
+        """The spectral density of each axis that moves."""
         if len(self._rest) and not self._windows:
             # A motion shorter than one window: with rest behind it.
             self._count(np.concatenate([self._rest, np.zeros((self._length - len(self._rest), 3))]))

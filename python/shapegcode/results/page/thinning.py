@@ -57,12 +57,7 @@ class Thinner:
     """Takes samples piece by piece and keeps at most so many."""
 
     def __init__(self, scales: Mapping[str, float], most: int) -> None:
-        """Keep at most so many samples.
-
-        Args:
-            scales: "path": half a pixel of it, mm; by the names of curves: range below which a curve is flat.
-            most: samples that are kept.
-        """
+        """Keep at most so many samples."""
         self._scales = scales
         self._most = most
         self._names: list[str] = []
@@ -83,16 +78,7 @@ class Thinner:
         curves: Mapping[str, FloatArray],
         starts: npt.NDArray[np.intp],
     ) -> None:
-        """Further samples.
-
-        Args:
-            sample: their numbers, (k,), rising.
-            labels: what is said of each, (k, labels).
-            command_mm: (k, 3).
-            deviation_um: (k, 3).
-            curves: by name, each (k,); the same names every time.
-            starts: rows that are kept as long as there is room.
-        """
+        """Further samples."""
         self._names = list(curves)
         values = np.column_stack([command_mm, deviation_um, *curves.values()])
         low, high = values.min(axis=0), values.max(axis=0)
@@ -151,14 +137,7 @@ class Thinner:
         return (sample[rows], labels[rows], values[rows], started[rows]), factor
 
     def result(self) -> Kept:
-        """What is left.
-
-        Returns:
-            The kept samples.
-
-        Raises:
-            ValueError: no sample has passed.
-        """
+        """What is left."""
         if not self._pieces:
             raise ValueError("no sample: nothing to show")
         (sample, labels, values, _), factor = self._thinned(_STEP, most=self._most)

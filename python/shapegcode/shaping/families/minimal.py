@@ -24,10 +24,6 @@ def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[Sha
 
     Searched up to the duration of the convolved ZV, and, only if there is none, up to twice that; never beyond
     `options.max_duration_s` or 100 periods of the fastest mode.
-
-    Raises:
-        ArgumentError: as `minimal_shapers` does, for more than six modes or two alike.
-        DesignError: none was found; the message says how far that is proven.
     """
     modes = [band.mode for band in bands]
     longest_s = min(options.max_duration_s, _MOST_PERIODS / max(mode.frequency_hz for mode in modes))

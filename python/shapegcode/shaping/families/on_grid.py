@@ -36,19 +36,6 @@ def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: fl
     Among the shapers of the shortest duration, one without negative taps has the least second central moment that
     was found (the contour cost; a local minimum from three starts), one with them the least sum of magnitudes.
 
-    Args:
-        conditions: zeros, limits and the range of the taps.
-        period_s: period of the grid in s, above 0.
-        max_duration_s: longest duration in s that is tried, above 0.
-        title: what is designed, for the message where there is none.
-
-    Returns:
-        The shaper: every zero leaves at most 1e-10 (about 1e-16 as a rule), every limit holds.
-
-    Raises:
-        ArgumentError: a time that is not finite and positive.
-        DesignError: no such shaper within `max_duration_s`; the message tells what is nearest.
-
     Source: this project.
     """
     for name, value in (("period_s", period_s), ("max_duration_s", max_duration_s)):

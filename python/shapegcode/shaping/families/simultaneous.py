@@ -33,17 +33,6 @@ _SMALLEST_TAP = 1e-9
 def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
     """Shortest shaper with non-negative taps at continuous times that cancels every mode.
 
-    Args:
-        modes: modes to cancel, at least one.
-        max_duration_s: longest duration in s, above 0.
-
-    Returns:
-        The shaper, each mode's residual at most 1e-13. Its duration is that of the nearest exact solution to the
-        optimum of a time grid of at least 40 steps per period of the fastest mode.
-
-    Raises:
-        DesignError: there is none within the duration.
-
     Source: this project (numerical optimum over all modes at once).
     """
     fastest_hz = max(mode.frequency_hz for mode in modes)

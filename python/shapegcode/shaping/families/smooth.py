@@ -38,20 +38,6 @@ def smooth_kernel(
 ) -> Callable[[Mode, DesignOptions], Shaper]:
     """The design of one mode by a polynomial kernel.
 
-    Args:
-        name: of the family, for messages.
-        ratios: frequencies of its zeros over the mode's; one that is given twice is a double zero. Each has the damping
-            ratio of the mode.
-        periods: usual length of the kernel in periods of the mode, from zero to zero.
-        at_least: the kernel is never shorter than that; else the shortest one without a negative sample is taken.
-
-    Returns:
-        A function of mode and options that returns the shaper: samples of a polynomial of degree
-        ``2*len(ratios) + 2``, the first and the last one inside its ends.
-
-    Raises:
-        DesignError: by the function that is returned: more than 20 000 samples, or no such kernel on the grid.
-
     Source: D. Butyugin's smoothers of the printer firmware Kalico; their derivation on a grid: this project.
     """
 

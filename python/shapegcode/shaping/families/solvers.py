@@ -133,18 +133,7 @@ def simultaneous(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shap
 
 
 def user_taps(_bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
-    """The taps that were given, on the grid if there is one.
-
-    Args:
-        _bands: not looked at.
-        options: with the taps and the grid.
-
-    Returns:
-        One shaper.
-
-    Raises:
-        ArgumentError: no taps are given.
-    """
+    """The taps that were given, on the grid if there is one."""
     if options.taps is None:
         raise ArgumentError("the family taps judges taps that are given: none are")
     return [options.taps if options.period_s is None else on_grid(options.taps, options.period_s)]

@@ -152,9 +152,6 @@ class TapProblem:
         """Taps with the least worst residual, or None if the equalities have no solution.
 
         With a limit the search ends as soon as it is known on which side of it the optimum lies.
-
-        Raises:
-            DesignError: bound and design did not meet, or the solver failed.
         """
         best = np.zeros(self.last + 1)
         lower, upper = 0.0, math.inf
@@ -285,9 +282,6 @@ def proven_worst(shaper: Shaper, bands: Sequence[ModeBand]) -> float:
 
     Between two samples a distance h apart, |R| is at most the larger of the two plus ``h²/8*max|R''|``, and R'' is
     bounded by the taps' magnitudes times |q|²; the sweep is as fine as that asks for.
-
-    Raises:
-        DesignError: the shaper is too long for a sweep of 200 000 samples of a band.
     """
     worst = 0.0
     for band in bands:

@@ -54,22 +54,6 @@ def least_worst(
     1e-6 counts as none). The exception is a damped mode on a grid where the best use of the last periods is to wait:
     the residual counts from the last tap, so the shaper is then shorter, or a last tap of 0.001 marks the end.
 
-    Args:
-        bands: modes with their bands, at least one. One without a band is cancelled exactly.
-        period_s: period of the grid in s, above 0.
-        duration_s: longest duration in s; rounded down to the grid.
-        non_negative: no tap is negative.
-        max_abs_sum: largest sum of the taps' magnitudes where taps may be negative, at least 1.
-        zeros_at_nominal: every mode is cancelled exactly at its nominal frequency besides.
-
-    Returns:
-        The design with its worst residual and the least that is possible.
-
-    Raises:
-        ArgumentError: no mode, or a value outside its range.
-        DesignError: the exact zeros have no solution of this duration, or no band was given and so no duration is
-            better than another; the message tells what there is.
-
     Source: this project.
     """
     task = Task.checked(bands, period_s, non_negative, max_abs_sum, zeros_at_nominal)
@@ -103,26 +87,6 @@ def minimax_robust(
     The number of periods is the smallest for which the least worst residual is below the limit (to 0.1 %). Among the
     non-negative designs of that duration the one with the least second central moment, the contour cost, is taken
     (to 0.5 %); with negative taps, the one with the least sum of magnitudes.
-
-    Args:
-        bands: modes with their bands, at least one. One without a band is cancelled exactly; if none has a band the
-            result is the shortest exact non-negative design.
-        period_s: period of the grid in s, above 0.
-        vibration_limit: largest residual ratio over the bands, above 0 and below 1.
-        max_duration_s: longest duration in s that is tried.
-        non_negative: no tap is negative.
-        max_abs_sum: largest sum of the taps' magnitudes where taps may be negative, at least 1.
-        zeros_at_nominal: every mode is cancelled exactly at its nominal frequency besides.
-        mirrored: the taps are the same read backwards, so that a contour comes out alike either way.
-        hints: a refusal looks for what would do, which may take seconds.
-
-    Returns:
-        The design with its worst residual and the least that is possible.
-
-    Raises:
-        ArgumentError: no mode, or a value outside its range.
-        DesignError: no such design within `max_duration_s`. With hints the message says what the longest allowed one
-            reaches, which duration would do (up to four times the longest), and which period would do better.
 
     Source: this project.
     """

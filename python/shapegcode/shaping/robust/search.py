@@ -84,11 +84,7 @@ class Task:
         zeros_at_nominal: bool,
         mirrored: bool = False,
     ) -> Task:
-        """The task, its values checked.
-
-        Raises:
-            ArgumentError: no mode, or a value outside its range.
-        """
+        """The task, its values checked."""
         if not bands:
             raise ArgumentError("a shaper needs at least one mode: 0 given")
         check_time("period_s", period_s)
@@ -177,18 +173,7 @@ def _exact(task: Task, max_duration_s: float) -> RobustDesign | None:
 
 
 def best_within(task: Task, last: int) -> RobustDesign | None:
-    """The least worst residual within `last` periods; None if the exact zeros have no solution.
-
-    Args:
-        task: the modes, their bands and the grid.
-        last: periods that the shaper may last.
-
-    Returns:
-        The design, or None.
-
-    Raises:
-        DesignError: it does not survive being solved in full precision.
-    """
+    """The least worst residual within `last` periods; None if the exact zeros have no solution."""
     bounds = task.problem(last).least_worst()
     if bounds is None:
         return None
@@ -268,11 +253,7 @@ def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesi
 
 
 def check_time(name: str, value_s: float) -> None:
-    """Refuse a time that is not finite and above 0.
-
-    Raises:
-        ArgumentError: with name and value.
-    """
+    """Refuse a time that is not finite and above 0."""
     if not (math.isfinite(value_s) and value_s > 0.0):
         raise ArgumentError(f"{name} is {value_s} s: it must be finite and above 0")
 

@@ -143,7 +143,7 @@ def _error(predicted_s: float | None, measured_s: float | None, held_s: float) -
     return 100.0 * (predicted_s / (measured_s - held_s) - 1.0)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class LearnedClock(Result):
     """A machine learned from what it did.
 

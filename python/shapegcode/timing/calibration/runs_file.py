@@ -16,6 +16,7 @@ from typing import Annotated, Literal
 from pydantic import Field, Strict, model_validator
 
 from shapegcode.errors import Problem, RecordError, RunsFileError
+from shapegcode.io.data_file import open_file
 from shapegcode.io.run_items import ItemTable, stated_feed_unit
 from shapegcode.io.run_log import LogFormat, RunLog, read_run_logs
 from shapegcode.settings.keys import Positive, Text, TomlTable, key, toml
@@ -65,7 +66,8 @@ class RunEntry:
         """Under which a log may know the program."""
         if self.logged_as is not None:
             return (self.logged_as,)
-        head = self.program.read_bytes()[:_HEAD_BYTES].decode("latin-1")
+        with open_file(self.program) as file:
+            head = file.read(_HEAD_BYTES).decode("latin-1")
         number = re.search(r"^\s*:?(O\d{1,8})\b", head, re.MULTILINE)
         return (self.program.name, number[1]) if number and int(number[1][1:]) else (self.program.name,)
 

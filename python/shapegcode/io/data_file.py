@@ -1,0 +1,220 @@
+"""What a data file may be, in one place: a regular file, with limits of size, unpacked size, depth, text and memory.
+
+Whoever reads a file that came from elsewhere opens it here: settings, records, logs, dumps, results, programs. So no
+file of a few megabytes takes gigabytes, and none that is no file keeps a command waiting.
+"""
+
+from __future__ import annotations
+
+import errno
+import gzip
+import json
+import os
+import re
+import stat
+import tomllib
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, BinaryIO, Self, cast
+
+from shapegcode.errors import RecordError, ShapegcodeError
+
+__all__ = ["MAX_DEPTH", "MAX_SETTINGS_BYTES", "MAX_TEXT_BYTES", "DataFile", "open_file", "read_file", "toml_tables"]
+
+MAX_DEPTH = 64
+"""Lists and tables within each other."""
+MAX_TEXT_BYTES = 1 << 20
+"""Of one text, key, or line."""
+MAX_SETTINGS_BYTES = 4 << 20
+"""Of a TOML file."""
+_MAX_BYTES = 2 << 30
+_MAX_INTEGER = 2**63 - 1
+#: Unpacked over packed: numbers of a log come to 5 to 15. Up to some size any ratio will do.
+_MAX_RATIO, _ANY_RATIO_BYTES = 50, 16 << 20
+#: Bytes that the values of a JSON file may take over its own bytes, and what a small one may take anyway.
+_MAX_GROWTH, _ANY_GROWTH_BYTES = 60, 600 << 20
+_PIECE_BYTES = 1 << 20
+_GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
+_PACKED_FAULTS = (EOFError, NotImplementedError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error)
+_KINDS = {
+    stat.S_IFIFO: "a pipe", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device", stat.S_IFSOCK: "a socket",
+}  # fmt: skip
+#: What a value takes in memory at most, by the character that makes it: objects with one key are the dearest.
+_MEMORY = {b"{": 240, b"[": 100, b":": 100, b'"': 30, b",": 40}
+_NOT_STRUCTURE = bytes(set(range(256)) - set(b'[]{}"'))
+_STRING = re.compile(rb'"[^"]*+"')
+_ONE_KIND = bytes.maketrans(b"{}", b"[]")
+_KEY_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+#: tomllib takes the square of the length of such a key.
+_LONG_KEY = re.compile(rf"(?<![\w.-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{MAX_DEPTH}}}")
+
+Fault = Callable[[str], Exception]
+
+
+def open_file(path: str | Path) -> BinaryIO:
+    """Open a regular file to read it; a pipe or device is refused at once, without waiting for it."""
+    wanted = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_NONBLOCK", 0)
+    try:
+        mode = os.stat(path).st_mode  # before it is opened: that alone can wind a tape back
+        if stat.S_ISREG(mode):
+            descriptor = os.open(path, wanted)
+            mode = os.fstat(descriptor).st_mode
+            if stat.S_ISREG(mode):
+                return os.fdopen(descriptor, "rb")
+            os.close(descriptor)
+    except ValueError as error:  # a NUL in its name
+        raise OSError(errno.EINVAL, str(error), str(path)) from None
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    kind = _KINDS.get(stat.S_IFMT(mode), "something else")
+    raise OSError(errno.EINVAL, f"{kind}, not a regular file; write it to a file first", str(path))
+
+
+def read_file(path: str | Path, most: int = _MAX_BYTES) -> bytes:
+    """The bytes of a regular file."""
+    with open_file(path) as file:
+        try:
+            data = file.read(most + 1)
+        except OSError as error:
+            raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"more than {most} bytes: no more is read at once", str(path))
+    return data
+
+
+class DataFile:
+    """One file that is read, plain or packed, and how much of its limits is used up.
+
+    Attributes:
+        path: of the file.
+        size: on the disk, bytes.
+        kind: "gzip", "zip", or "" where it is not packed.
+    """
+
+    def __init__(self, path: str | Path, fault: Fault = RecordError) -> None:
+        """Open it."""
+        self.path, self._fault = Path(path), fault
+        self._file = open_file(path)
+        self.size = os.fstat(self._file.fileno()).st_size
+        head = self._file.read(4)
+        self._file.seek(0)
+        self.kind = "gzip" if head[:2] == _GZIP else "zip" if head == _ZIP else ""
+        self._unpacked = self._memory = 0
+
+    def __enter__(self) -> Self:
+        """It is open already."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self._file.close()
+
+    def pieces(self) -> Iterator[bytes]:
+        """Its content in pieces, unpacked by gzip where it is packed so."""
+        if self.kind != "gzip":
+            while piece := self._file.read(_PIECE_BYTES):
+                yield piece
+            return
+        with gzip.open(self._file) as packed:
+            yield from self._checked(cast(BinaryIO, packed))
+
+    def read(self) -> bytes:
+        """Its whole content, unpacked; see `pieces`."""
+        if self.kind != "gzip" and self.size > _MAX_BYTES:
+            raise self._fault(f"{self.path}: {self.size} bytes: at most {_MAX_BYTES} are read at once")
+        return b"".join(self.pieces())
+
+    def members(self, suffix: str) -> Iterator[tuple[str, bytes]]:
+        """Files in a zip archive."""
+        try:
+            with zipfile.ZipFile(self._file) as archive:
+                for each in archive.infolist():
+                    if each.filename.lower().endswith(suffix):
+                        with archive.open(each) as packed:
+                            yield each.filename, b"".join(self._checked(cast(BinaryIO, packed)))
+        except _PACKED_FAULTS as error:
+            if isinstance(error, ShapegcodeError):
+                raise
+            raise self._fault(f"{self.path}: the packed file is cut off or damaged: {error}") from error
+
+    def _checked(self, packed: BinaryIO) -> Iterator[bytes]:
+        """Pieces of what is unpacked, whatever sizes the file states."""
+        most = min(max(_MAX_RATIO * self.size, _ANY_RATIO_BYTES), _MAX_BYTES if self.kind == "zip" else 2**63)
+        while True:
+            try:
+                piece = packed.read(_PIECE_BYTES)
+            except (gzip.BadGzipFile, *_PACKED_FAULTS) as error:
+                raise self._fault(f"{self.path}: the packed file is cut off or damaged: {error}") from error
+            if not piece:
+                return
+            self._unpacked += len(piece)
+            if self._unpacked > most:
+                raise self._fault(
+                    f"{self.path}: {self.size} bytes unpack to more than {most}: at most {_MAX_RATIO} times the packed "
+                    "size is read; unpack it yourself if that is right"
+                )
+            yield piece
+
+    def json(self, where: str, data: bytes, constant: Callable[[str], Any] | None = None) -> Any:
+        """The value of a JSON text of this file, within the limits."""
+        self._memory += len(data) * (3 if data.isascii() else 6)
+        self._memory += sum(count * data.count(mark) for mark, count in _MEMORY.items())
+        most = max(_MAX_GROWTH * self.size, _ANY_GROWTH_BYTES)
+        if self._memory > most:
+            raise self._fault(
+                f"{where}: its values would take some {self._memory} bytes of memory: at most {most} for a file of "
+                f"{self.size} bytes"
+            )
+        structure = data.replace(b"\\\\", b"").replace(b'\\"', b"")
+        longest = max((each.end() - each.start() for each in _STRING.finditer(structure)), default=0)
+        if longest > MAX_TEXT_BYTES:
+            raise self._fault(f"{where}: a text of {longest} bytes: at most {MAX_TEXT_BYTES} are read")
+        structure = _STRING.sub(b"", structure.translate(None, _NOT_STRUCTURE)).translate(_ONE_KIND)
+        for _ in range(MAX_DEPTH):  # the innermost pairs
+            structure = structure.replace(b"[]", b"")
+        if structure.count(b"[") > MAX_DEPTH or b"[]" in structure:
+            raise self._fault(f"{where}: nested too deeply: at most {MAX_DEPTH} lists and objects within each other")
+        integer = None
+        if re.search(rb"\d{19}", data):
+
+            def integer(digits: str) -> int:
+                return _integer(digits, lambda text: self._fault(f"{where}: {text}"))
+
+        return json.loads(data.decode("utf-8-sig"), parse_int=integer, parse_constant=constant)
+
+
+def _integer(digits: str, fault: Fault) -> int:
+    if len(digits) > 20 or abs(int(digits)) > _MAX_INTEGER:
+        shown = digits if len(digits) <= 24 else f"{digits[:12]}... ({len(digits)} digits)"
+        raise fault(f"the whole number {shown}: must be from -{_MAX_INTEGER} to {_MAX_INTEGER}")
+    return int(digits)
+
+
+def toml_tables(text: str) -> dict[str, Any]:
+    """The tables of a TOML text, within the limits."""
+    if len(text) > MAX_SETTINGS_BYTES:
+        raise ValueError(f"more than {MAX_SETTINGS_BYTES} characters: no more is read of a TOML file")
+    if found := _LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise ValueError(f"a key of more than {MAX_DEPTH} parts (at line {line}, column 1)")
+    try:
+        tables = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError(f"nested too deeply: at most {MAX_DEPTH} lists and tables within each other") from None
+    waiting: list[tuple[Any, int]] = [(tables, 1)]
+    while waiting:
+        value, depth = waiting.pop()
+        if isinstance(value, dict | list):
+            if depth > MAX_DEPTH:
+                raise ValueError(f"nested too deeply: at most {MAX_DEPTH} lists and tables within each other")
+            waiting += [(each, depth + 1) for each in (value.values() if isinstance(value, dict) else value)]
+            if isinstance(value, dict) and any(len(key) > MAX_TEXT_BYTES for key in value):
+                raise ValueError(f"a key of more than {MAX_TEXT_BYTES} characters")
+        elif isinstance(value, str) and len(value) > MAX_TEXT_BYTES:
+            raise ValueError(f"a text of {len(value)} characters: at most {MAX_TEXT_BYTES} are read")
+        elif isinstance(value, int) and abs(value) > _MAX_INTEGER:
+            digits = str(value) if abs(value) < 10**40 else f"of some {value.bit_length() * 3 // 10} digits"
+            raise ValueError(f"the whole number {digits}: must be from -{_MAX_INTEGER} to {_MAX_INTEGER}")
+    return tables
