@@ -26,8 +26,6 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import is_temporary, write_lines
 from shapegcode.verdict.ahead import cores
 
-__all__ = ["Cluster", "batch"]
-
 _SCRATCH = ".batch-scratch"
 _SUMMARY = "summary.csv"
 _NAMED = 5

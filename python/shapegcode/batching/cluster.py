@@ -14,8 +14,6 @@ from shapegcode.results.made import this_version
 if TYPE_CHECKING:
     from distributed import Client
 
-__all__ = ["cluster_executor"]
-
 LOCAL = "local"
 """Word for a cluster of this machine."""
 

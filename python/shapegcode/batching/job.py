@@ -16,8 +16,6 @@ from typing import Literal
 
 from shapegcode.results.made import this_version
 
-__all__ = ["FAILED_CODES", "Base", "BatchJob", "Ending", "JobOutcome", "Packed", "pack"]
-
 Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
 """How a run ended: by itself with an exit code, or not."""
 
@@ -27,13 +25,9 @@ FAILED_CODES = {97: "crashed", 98: "out of memory"}
 
 @dataclass(frozen=True)
 class Base:
-    """The folder in which a batch was begun: a run sees names from there, also when it goes on from another folder.
+    """The folder in which a batch was begun: a run sees names from there, also when it goes on from another folder."""
 
-    Attributes:
-        folder: its absolute path.
-    """
-
-    folder: str
+    folder: str  # its absolute path
 
     def name_of(self, path: str | Path) -> str:
         """Name of a file in the folder of a run."""
@@ -46,19 +40,12 @@ class Base:
 
 @dataclass(frozen=True)
 class BatchJob:
-    """A run that is to be done.
+    """A run that is to be done."""
 
-    Attributes:
-        program: what it is of, as it was given.
-        machine: likewise.
-        words: of the command line.
-        output: its main file, as a name in its folder; the JSON is beside it.
-    """
-
-    program: str
+    program: str  # what it is of, as it was given
     machine: str
-    words: tuple[str, ...]
-    output: str
+    words: tuple[str, ...]  # of the command line
+    output: str  # its main file, as a name in its folder; the JSON is beside it
 
     @property
     def key(self) -> str:
@@ -73,50 +60,29 @@ class BatchJob:
 
 @dataclass(frozen=True)
 class Packed:
-    """A run with all that it reads; nothing in it names a file of the machine that sends it.
+    """A run with all that it reads; nothing in it names a file of the machine that sends it."""
 
-    Attributes:
-        words: of the command line.
-        files: content by name in the folder of the run.
-        version: of shapegcode that it is meant for.
-        fingerprint: of all of this: equal ones give equal results.
-        seconds: that it may take; 0: any time.
-        memory_bytes: that it may need; 0: any.
-        scratch: folder for the folder of the run; empty: where temporary files go.
-    """
-
-    words: tuple[str, ...]
-    files: Mapping[str, bytes]
-    version: str
-    fingerprint: str
-    seconds: float = 0.0
-    memory_bytes: int = 0
-    scratch: str = ""
+    words: tuple[str, ...]  # of the command line
+    files: Mapping[str, bytes]  # content by name in the folder of the run
+    version: str  # of shapegcode that it is meant for
+    fingerprint: str  # of all of this: equal ones give equal results
+    seconds: float = 0.0  # that it may take; 0: any time
+    memory_bytes: int = 0  # that it may need; 0: any
+    scratch: str = ""  # folder for the folder of the run; empty: where temporary files go
 
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """What came back.
+    """What came back."""
 
-    Attributes:
-        ending: how it ended.
-        code: exit code of the command; 0 where it did not end by itself.
-        said: what it wrote to standard output.
-        complained: what it wrote to standard error, or why it did not end by itself.
-        files: content of what it wrote, by name in its folder.
-        wall_s: how long it took.
-        cpu_s: processor time.
-        peak_bytes: most memory that it had at a time.
-    """
-
-    ending: Ending
-    code: int
-    said: str
-    complained: str
-    files: Mapping[str, bytes]
-    wall_s: float = 0.0
-    cpu_s: float = 0.0
-    peak_bytes: int = 0
+    ending: Ending  # how it ended
+    code: int  # exit code of the command; 0 where it did not end by itself
+    said: str  # what it wrote to standard output
+    complained: str  # what it wrote to standard error, or why it did not end by itself
+    files: Mapping[str, bytes]  # content of what it wrote, by name in its folder
+    wall_s: float = 0.0  # how long it took
+    cpu_s: float = 0.0  # processor time
+    peak_bytes: int = 0  # most memory that it had at a time
 
 
 def pack(

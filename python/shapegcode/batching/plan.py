@@ -13,8 +13,6 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import read_file
 from shapegcode.machine import Machine
 
-__all__ = ["COMMANDS", "WRITES", "Plan", "plan"]
-
 COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 """Commands of one program that can be run over many."""
 
@@ -38,27 +36,16 @@ class _OnMachine:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be done: a run is made when its turn comes, machine by machine.
+    """What is to be done: a run is made when its turn comes, machine by machine."""
 
-    Attributes:
-        base: folder in which the batch was begun.
-        sources: the programs, in the order in which they were given.
-        lines: one for each machine.
-        command: of `COMMANDS`.
-        words: further ones of each command line.
-        output: folder of the results, as a run sees it.
-        html: likewise of the pages; empty: none.
-        shared: content of the files that many of them read, by name.
-    """
-
-    base: Base
-    sources: Sequence[Source]
-    lines: tuple[_OnMachine, ...]
-    command: str
-    words: tuple[str, ...]
-    output: str
-    html: str
-    shared: Mapping[str, bytes]
+    base: Base  # folder in which the batch was begun
+    sources: Sequence[Source]  # the programs, in the order in which they were given
+    lines: tuple[_OnMachine, ...]  # one for each machine
+    command: str  # of `COMMANDS`
+    words: tuple[str, ...]  # further ones of each command line
+    output: str  # folder of the results, as a run sees it
+    html: str  # likewise of the pages; empty: none
+    shared: Mapping[str, bytes]  # content of the files that many of them read, by name
 
     def __len__(self) -> int:
         """How many runs there are."""

@@ -22,9 +22,6 @@ from shapegcode.batching.job import FAILED_CODES, Ending, JobOutcome, Packed
 from shapegcode.io.atomic import named_errors
 from shapegcode.results.made import this_version
 
-__all__ = ["Hosts", "begin_host", "run_packed"]
-
-
 _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",  # other runs have the other cores
     "LD_BIND_NOW": "1",  # functions are linked once, not in each run anew

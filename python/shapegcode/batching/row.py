@@ -17,8 +17,6 @@ from shapegcode.batching.plan import Plan
 from shapegcode.batching.result import BatchRow, Ended, figures_of
 from shapegcode.results.outcome import Pair
 
-__all__ = ["KeptRows", "row_of", "row_read"]
-
 _ENDED: dict[int, Ended] = {0: "ok", 1: "not ok", 2: "refused"}
 _PAIRS = ("residual_um", "contour_um", "cycle_time_s")
 _PREFIX = "shapegcode: "

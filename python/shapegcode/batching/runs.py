@@ -25,8 +25,6 @@ from shapegcode.io.atomic import write_bytes
 from shapegcode.results.json import plain
 from shapegcode.results.page.html import is_shared
 
-__all__ = ["OnBatch", "Runs"]
-
 OnBatch = Callable[[float, str], None]
 """Told the share that is done, and how many runs are done, under way and failed."""
 

@@ -11,8 +11,6 @@ from typing import Any
 from shapegcode.batching.result import BatchRow
 from shapegcode.results.json import plain
 
-__all__ = ["summary_lines"]
-
 
 def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
     """The rows as CSV."""

@@ -25,8 +25,6 @@ from typing import Any
 
 from shapegcode.cli.arguments import CommandParser
 
-__all__ = ["COMMANDS", "Command", "ExitCode", "main", "parser_of"]
-
 _DEBUG = "--debug"
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _WITH_REST = "batch"
@@ -50,15 +48,10 @@ class ExitCode:
 
 @dataclass(frozen=True)
 class Command:
-    """One sub-command.
+    """One sub-command."""
 
-    Attributes:
-        name: what the user types; also the name of its module in ``shapegcode.cli``.
-        help: one line for ``shapegcode --help``.
-    """
-
-    name: str
-    help: str
+    name: str  # what the user types; also the name of its module in ``shapegcode.cli``
+    help: str  # one line for ``shapegcode --help``
 
     @property
     def module(self) -> str:

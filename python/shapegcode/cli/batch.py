@@ -9,8 +9,6 @@ from pathlib import Path
 from shapegcode.cli.options import add_amount_arguments
 from shapegcode.cli.typed import count, seconds, size
 
-__all__ = ["add_arguments", "run"]
-
 _INDEX = "index.html"
 
 

@@ -21,15 +21,6 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-__all__ = [
-    "ProgressBar",
-    "add_json_argument",
-    "output_console",
-    "progress",
-    "wrapped",
-    "write_json",
-]
-
 _PIPE_WIDTH = 120
 _PIECES = 4096
 _PROGRESS_DELAY_S = 1.0

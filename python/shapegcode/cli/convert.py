@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
     from shapegcode.program import Program
 
-__all__ = ["MACHINE_KEYS", "add_arguments", "run"]
-
 _MMAP_THRESHOLD = -3  # M_MMAP_THRESHOLD of glibc's malloc.h
 _LARGE_BYTES = 1 << 20
 

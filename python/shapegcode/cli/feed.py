@@ -14,8 +14,6 @@ from shapegcode.cli.options import (
 )
 from shapegcode.cli.typed import micrometres, share
 
-__all__ = ["add_arguments", "add_cutting_arguments", "read_cutting_arguments", "run"]
-
 
 def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
     """Declare what a feed schedule needs beside program and machine: tool, stock, margin, resolution."""

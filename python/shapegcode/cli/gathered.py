@@ -9,28 +9,18 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shapegcode.program.several import ProgramPlace
 
-__all__ = ["Gathered"]
-
 
 @dataclass
 class Gathered:
-    """What the runs of one command over a file came to.
+    """What the runs of one command over a file came to."""
 
-    Attributes:
-        source: the file.
-        text: of it.
-        places: its programs.
-        reports: what --json writes of each.
-        written: by place, the file that a command wants to write and the program in it.
-        at: the place that is being done.
-    """
-
-    source: str
+    source: str  # the file
     text: bytes
-    places: tuple[ProgramPlace, ...]
-    reports: list[dict[str, Any]] = field(default_factory=list)
+    places: tuple[ProgramPlace, ...]  # its programs
+    reports: list[dict[str, Any]] = field(default_factory=list)  # what --json writes of each
+    # by place, the file that a command wants to write and the program in it
     written: dict[int, tuple[Path | str, bytes]] = field(default_factory=dict)
-    at: int = 0
+    at: int = 0  # the place that is being done
 
     @property
     def address(self) -> str:

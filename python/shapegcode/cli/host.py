@@ -28,8 +28,6 @@ from shapegcode.batching.job import FAILED_CODES
 from shapegcode.io.atomic import write_in_passing
 from shapegcode.results.made import this_version
 
-__all__ = ["main"]
-
 _LOADED = (
     "shapegcode.cli.runner", "shapegcode.cli.options", "shapegcode.cli.made", "shapegcode.cli.typed",
     "shapegcode.results.table", "rich.console", "rich.table", "rich._emoji_codes", "importlib.metadata",

@@ -12,8 +12,6 @@ from shapegcode.cli import modes, options, typed
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["add_arguments", "run"]
-
 _MOST_MODES = 8  # as identify.MOST_MODES, which would have to be imported with all that is slow
 _HELP_TIME = "where the decay begins in the file, for example 250ms (default: found by itself)"
 # What the user says of a file, over what it says itself: option, field of ReadOptions, how it is read, help.

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from shapegcode.machine.description_result import MachineDescription
     from shapegcode.settings.keys import TomlTable
 
-__all__ = ["FILES", "add_arguments", "file_schema", "run"]
-
 FILES = ("machine", "tool", "stock", "study")
 """Kinds of TOML files that have a schema."""
 

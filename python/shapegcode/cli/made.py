@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from shapegcode.results.made import Made, MadeFile
     from shapegcode.results.result import Result
 
-__all__ = ["MACHINES", "READ", "given_files", "made_by"]
-
 READ = (
     "input", "inputs", "files", "machine", "tool", "stock", "against", "records", "cut", "update", "dump", "base",
 )  # fmt: skip

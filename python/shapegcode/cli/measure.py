@@ -15,8 +15,6 @@ from shapegcode.cli.options import (
 )
 from shapegcode.cli.typed import line_range, micrometres
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

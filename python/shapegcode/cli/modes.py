@@ -8,8 +8,6 @@ from collections.abc import Mapping
 
 from shapegcode.cli import typed
 
-__all__ = ["add_modes_arguments", "decided_modes"]
-
 
 def add_modes_arguments(parser: argparse.ArgumentParser, keep: str) -> None:
     """Declare what decides over modes that were not measured on this machine."""

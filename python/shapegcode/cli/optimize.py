@@ -10,8 +10,6 @@ from shapegcode.cli.options import add_plots_argument, add_result_arguments
 from shapegcode.cli.study import add_study_arguments, load
 from shapegcode.cli.typed import ratio
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

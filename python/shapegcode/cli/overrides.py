@@ -15,8 +15,6 @@ from shapegcode.cli.typed import micrometres, number, seconds
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["add_override_arguments", "overridden"]
-
 # How a value of a unit is typed on the command line: what is shown for it, what reads it, an example.
 _TYPED = {
     "µm": ("LENGTH", micrometres, "5um"),

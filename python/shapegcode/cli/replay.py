@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from shapegcode.model.playable import PlayedPrograms
     from shapegcode.results.made import Made, MadeFile
 
-__all__ = ["changes", "played_again"]
-
 _WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement", "Simulation")
 
 

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
     from shapegcode.results.page.model import Page
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from shapegcode.results.result import Result
     from shapegcode.results.table import Table
 
-__all__ = ["check_files", "finish", "progress"]
-
 # Options that name a file which a command writes.
 _WRITTEN = ("output", "json", "csv", "npz", "html")
 _NEVER_PIPED = {"npz": "an archive", "html": "a page"}

@@ -15,8 +15,6 @@ from shapegcode.cli.options import add_result_arguments
 if TYPE_CHECKING:
     from shapegcode.setup.answers import Answers
 
-__all__ = ["add_arguments", "ask_all", "run"]
-
 _UNKNOWN, _BACK = "unknown", "<"
 _TITLES = {
     _UNKNOWN: "not known yet",

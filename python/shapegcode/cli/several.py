@@ -18,8 +18,6 @@ from shapegcode.cli.gathered import Gathered
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["run_all"]
-
 _TABLES = ("csv", "npz", "html")
 
 

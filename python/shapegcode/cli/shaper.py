@@ -9,8 +9,6 @@ from shapegcode.cli.arguments import add_alias
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import positive, ratio, seconds, share
 
-__all__ = ["add_arguments", "run"]
-
 # The registry's, whose solvers take too long to load for a help text.
 _FAMILIES = (
     "zv", "zvd", "zvdd", "mzv", "ei", "ei2", "ei3", "si", "negative-zv", "simultaneous", "minimal", "polynomial",

@@ -7,8 +7,6 @@ import argparse
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import count, line_range
 
-__all__ = ["add_arguments", "run"]
-
 # Of the progress bar, for the regions; the rest is the motion in time, which takes most of it.
 _REGIONS_SHARE = 0.1
 

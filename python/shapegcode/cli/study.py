@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
     from shapegcode.studies.study_file import StudyFile
 
-__all__ = ["add_arguments", "add_study_arguments", "load", "run"]
-
 
 def add_study_arguments(parser: argparse.ArgumentParser, what: str, draws: str) -> None:
     """Declare the file of a study, the machine, the number of draws; `what` is read from it, `draws` how many."""

@@ -7,8 +7,6 @@ import argparse
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import override, ratio
 
-__all__ = ["add_arguments", "run"]
-
 # A table of more blocks is built only where it is written.
 _MOST_BLOCKS_SHOWN = 100_000
 

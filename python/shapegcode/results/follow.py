@@ -9,8 +9,6 @@ import numpy.typing as npt
 
 from shapegcode import _core
 
-__all__ = ["COARSE_STEP_RAD", "follow", "piece_of", "polyline_of"]
-
 FloatArray = npt.NDArray[np.float64]
 
 # Pieces of the programmed path among which the nearest one is looked for.

@@ -25,8 +25,6 @@ from shapegcode.results.trace import Trace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["RECORD_SAMPLES", "PlayedRegion", "motion_pictures"]
-
 FloatArray = npt.NDArray[np.float64]
 
 RECORD_SAMPLES = 1_000_000
@@ -41,17 +39,11 @@ _BEFORE_STOP_S = 2.0
 
 @dataclass(frozen=True, eq=False)
 class PlayedRegion:
-    """What the pictures of a region draw.
+    """What the pictures of a region draw."""
 
-    Attributes:
-        traces: one or more, for example of the original and of the emitted program.
-        path: as programmed.
-        part: which part of the program it is, for titles; empty where it is all of it.
-    """
-
-    traces: tuple[Trace, ...]
-    path: _core.Path
-    part: str = ""
+    traces: tuple[Trace, ...]  # one or more, for example of the original and of the emitted program
+    path: _core.Path  # as programmed
+    part: str = ""  # which part of the program it is, for titles; empty where it is all of it
 
     @classmethod
     def of_runs(
@@ -107,23 +99,14 @@ def _vibration(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """What of a region is drawn.
+    """What of a region is drawn."""
 
-    Attributes:
-        views: stretches of time: the whole, or the worst place and the stop.
-        part: which part of the program they are of.
-        near: the traces, or of a long region their stretches around the worst place.
-        near_part: which part of the program these are of.
-        programmed_mm: the path beside them, (m, 3).
-        whole_mm: the whole path where that is a piece of it, (k, 3).
-    """
-
-    views: tuple[View, ...]
-    part: str
-    near: tuple[Trace, ...]
-    near_part: str
-    programmed_mm: FloatArray
-    whole_mm: FloatArray | None = None
+    views: tuple[View, ...]  # stretches of time: the whole, or the worst place and the stop
+    part: str  # which part of the program they are of
+    near: tuple[Trace, ...]  # the traces, or of a long region their stretches around the worst place
+    near_part: str  # which part of the program these are of
+    programmed_mm: FloatArray  # the path beside them, (m, 3)
+    whole_mm: FloatArray | None = None  # the whole path where that is a piece of it, (k, 3)
 
     @classmethod
     def of(cls, played: PlayedRegion) -> _Scene:
@@ -145,17 +128,11 @@ class _Scene:
 
 @dataclass(frozen=True, eq=False)
 class _Worst:
-    """The neighbourhood of the place where the first trace is furthest from the path.
+    """The neighbourhood of the place where the first trace is furthest from the path."""
 
-    Attributes:
-        traces: the stretches of all traces that pass it; each is there at time 0.
-        piece: of the programmed path, (m, 3), mm.
-        time_s: instant of the first trace.
-    """
-
-    traces: tuple[Trace, ...]
-    piece: FloatArray
-    time_s: float
+    traces: tuple[Trace, ...]  # the stretches of all traces that pass it; each is there at time 0
+    piece: FloatArray  # of the programmed path, (m, 3), mm
+    time_s: float  # instant of the first trace
 
 
 def _worst_place(traces: tuple[Trace, ...], programmed: FloatArray, path: _core.Path) -> _Worst:

@@ -19,8 +19,6 @@ from shapegcode.results.trace import Trace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["View", "line_style", "plot_feed", "plot_vibration", "thin_min_max"]
-
 FloatArray = npt.NDArray[np.float64]
 
 _AXIS_NAMES = "XYZ"

@@ -17,8 +17,6 @@ from shapegcode.results.trace import Trace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Plane", "plot_path"]
-
 FloatArray = npt.NDArray[np.float64]
 Plane = Literal["XY", "ZX", "YZ"]
 

@@ -28,8 +28,6 @@ from shapegcode.results.made import FORMAT, Made
 from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.result import Result
 
-__all__ = ["MODULES", "NotKept", "load_result", "made_of", "revived", "written_reports"]
-
 MODULES: Mapping[str, str] = {
     "Batch": "batching.result",
     "Characterisation": "characterization.result",

@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Trace"]
-
 FloatArray = npt.NDArray[np.float64]
 
 _STILL_MM = 1e-9

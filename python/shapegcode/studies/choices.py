@@ -15,8 +15,6 @@ from shapegcode.machine import Machine
 from shapegcode.studies.distributions import listed
 from shapegcode.studies.varied import check_keys
 
-__all__ = ["Choices", "checked_choices", "search", "usual_choices"]
-
 Choices = Mapping[str, Sequence[object]]
 """Values to choose from, by key of the machine file."""
 Ranks = tuple[int, ...]

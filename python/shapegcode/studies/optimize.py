@@ -29,8 +29,6 @@ from shapegcode.studies.study import check_ends
 from shapegcode.studies.summary import check_probability, within
 from shapegcode.studies.varied import Vary, drawn_machine, varied_values
 
-__all__ = ["USUAL_CONVERSIONS", "USUAL_DRAWS", "optimize"]
-
 USUAL_DRAWS = 256
 """Machines on which a choice is played, if nothing else is said."""
 USUAL_CONVERSIONS = 300

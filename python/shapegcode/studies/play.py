@@ -11,8 +11,6 @@ from shapegcode.studies.replay import PackedText, Replay
 from shapegcode.studies.varied import drawn_machine
 from shapegcode.verdict.ahead import cores
 
-__all__ = ["DrawsJob", "play_all"]
-
 OVERRIDE = "times.feed_override_percent"
 """Where it is varied, the blocks are played at it."""
 
@@ -23,21 +21,13 @@ _KEPT_TEXTS = 4
 
 @dataclass(frozen=True)
 class DrawsJob:
-    """Some draws of one text.
+    """Some draws of one text."""
 
-    Attributes:
-        name: of the machine, in messages.
-        rows: values of the machine that plays, by key, a row for each draw.
-        draws: their numbers.
-        wanted: what is measured.
-        times: see `Replay.play`.
-    """
-
-    name: str
-    rows: tuple[Mapping[str, object], ...]
-    draws: tuple[int, ...]
-    wanted: tuple[str, ...]
-    times: bool
+    name: str  # of the machine, in messages
+    rows: tuple[Mapping[str, object], ...]  # values of the machine that plays, by key, a row for each draw
+    draws: tuple[int, ...]  # their numbers
+    wanted: tuple[str, ...]  # what is measured
+    times: bool  # see `Replay.play`
 
     def play(self, replay: Replay) -> list[list[float]]:
         """Play them."""

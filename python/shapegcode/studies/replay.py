@@ -19,8 +19,6 @@ from shapegcode.results.figures import Deviation
 from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures
 
-__all__ = ["CONTOURS", "DEFAULT_MEASURES", "MEASURES", "SHARE", "Replay", "checked_measures"]
-
 SHARE = "share_of_limit"
 MEASURES: Mapping[str, str] = {
     "residual_um": "residual vibration, worst axis",

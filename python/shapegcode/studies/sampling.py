@@ -15,8 +15,6 @@ from shapegcode.errors import ArgumentError
 from shapegcode.studies.distributions import Listed
 from shapegcode.studies.varied import Varied
 
-__all__ = ["MOST_DRAWS", "SAMPLINGS", "Sampling", "drawn", "index_problem"]
-
 Sampling = Literal["sobol", "lhs", "grid"]
 SAMPLINGS: tuple[Sampling, ...] = ("sobol", "lhs", "grid")
 

@@ -27,8 +27,6 @@ from shapegcode.studies.summary import bins_of, check_probability, decides, inte
 from shapegcode.studies.varied import Varied, Vary, drawn_machine, varied_values
 from shapegcode.verdict.ahead import cores
 
-__all__ = ["check_ends", "study"]
-
 Progress = Callable[[str, float], None]
 
 

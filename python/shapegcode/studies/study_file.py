@@ -44,8 +44,6 @@ from shapegcode.studies.optimize import USUAL_CONVERSIONS, USUAL_DRAWS
 from shapegcode.studies.replay import DEFAULT_MEASURES, MEASURES
 from shapegcode.studies.sampling import MOST_DRAWS
 
-__all__ = ["DrawnValue", "StudyFile", "StudyFileError", "load_study", "study_schema"]
-
 _KINDS = (("mean", "sd"), ("mean", "percent"), ("median", "percent"), ("low", "high"), ("one_of",))
 _GIVE = "give mean and sd (or percent), median and percent, low and high, or one_of"
 _MOST_CONVERSIONS = 100_000

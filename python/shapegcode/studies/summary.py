@@ -16,8 +16,6 @@ from shapegcode.studies.result import BinQuantiles, Decides, Quantity
 from shapegcode.studies.sampling import index_problem
 from shapegcode.studies.varied import Varied
 
-__all__ = ["PERCENT", "bins_of", "check_probability", "decides", "interval_of", "quantity"]
-
 FloatArray = npt.NDArray[np.float64]
 
 PERCENT = (5.0, 25.0, 50.0, 75.0, 95.0, 99.0)

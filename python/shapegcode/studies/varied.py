@@ -19,8 +19,6 @@ from shapegcode.machine import Machine
 from shapegcode.settings.change import missing_row
 from shapegcode.studies.distributions import Distribution, listed
 
-__all__ = ["Varied", "Vary", "check_keys", "drawn_machine", "varied_values"]
-
 Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]
 """What each key is drawn from."""
 
@@ -40,21 +38,13 @@ _TICK = "controller.interpolation_period_s"
 
 @dataclass(frozen=True)
 class Varied:
-    """A key of the machine file and what its values are drawn from.
+    """A key of the machine file and what its values are drawn from."""
 
-    Attributes:
-        key: dotted name.
-        distribution: of the values.
-        known: the converter knows each value; else only the machine that plays the text has it.
-        value: what the file says, as TOML.
-        unit: of the values.
-    """
-
-    key: str
-    distribution: Distribution
-    known: bool
-    value: str
-    unit: str
+    key: str  # dotted name
+    distribution: Distribution  # of the values
+    known: bool  # the converter knows each value; else only the machine that plays the text has it
+    value: str  # what the file says, as TOML
+    unit: str  # of the values
 
     @property
     def changes_times(self) -> bool:

@@ -30,8 +30,6 @@ from shapegcode.results.page.model import (
 from shapegcode.results.page.scene import Scene
 from shapegcode.results.table import Column, Table
 
-__all__ = ["next_steps", "page_of", "pictures_of", "raw_page", "sections_of", "short_html", "title_of", "warnings_of"]
-
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _NO_WORD = re.compile(r"^-|[A-Z0-9./=]")
 _UNFOLDED_ROWS = 24

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-__all__ = ["HOW", "UNKNOWN"]
-
 UNKNOWN = "Labels and units are at the axes."
 
 HOW: Mapping[str, str] = {

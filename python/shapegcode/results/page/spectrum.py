@@ -7,8 +7,6 @@ import numpy.typing as npt
 
 from shapegcode.results.page.scene import SceneSpectrum
 
-__all__ = ["AccelerationSpectrum"]
-
 FloatArray = npt.NDArray[np.float64]
 
 _SEGMENT_S = 2.0  # so the lines lie half a hertz apart

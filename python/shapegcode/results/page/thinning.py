@@ -14,8 +14,6 @@ import numpy.typing as npt
 
 from shapegcode import _core
 
-__all__ = ["PIXELS_HIGH", "PIXELS_WIDE", "Kept", "Thinner"]
-
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
@@ -32,25 +30,15 @@ _SHARE_OF_STARTS = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """What is left.
+    """What is left."""
 
-    Attributes:
-        sample: which samples, (n,).
-        labels: what was said of each, (n, labels).
-        command_mm: (n, 3).
-        deviation_um: (n, 3).
-        curves: by name, each (n,).
-        path_pixels: how far the path may be off.
-        pixels: how far a curve may be off.
-    """
-
-    sample: IntArray
-    labels: IntArray
-    command_mm: FloatArray
-    deviation_um: FloatArray
-    curves: Mapping[str, FloatArray]
-    path_pixels: float
-    pixels: float
+    sample: IntArray  # which samples, (n,)
+    labels: IntArray  # what was said of each, (n, labels)
+    command_mm: FloatArray  # (n, 3)
+    deviation_um: FloatArray  # (n, 3)
+    curves: Mapping[str, FloatArray]  # by name, each (n,)
+    path_pixels: float  # how far the path may be off
+    pixels: float  # how far a curve may be off
 
 
 class Thinner:
