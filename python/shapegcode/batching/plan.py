@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shapegcode.batching.inputs import Source, called_files
-from shapegcode.batching.job import Base, BatchJob
+from shapegcode.batching.process import Base, BatchJob
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import read_file
 from shapegcode.machine import Machine
@@ -18,6 +18,7 @@ COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 
 WRITES = ("convert", "feed")
 """Those that write a program."""
+_AMOUNT = frozenset({"-q", "--quiet", "-v", "--verbose"})
 _OF_ONE_RUN = (
     "-o", "--output", "-m", "--machine", "--json", "--html", "--html-script", "--csv", "--npz", "--plots",
 )  # fmt: skip
@@ -59,7 +60,7 @@ class Plan:
         words = [self.command, self.base.name_of(source.path), "-m", line.word]
         words += ["-o", target] if self.command in WRITES else []
         words += ["--json", f"{target}.json", *(["--html", page, "--html-script", "beside"] if page else [])]
-        words += [*([] if _says_how_much(self.words) else ["-q"]), *self.words]
+        words += [*(["-q"] if _AMOUNT.isdisjoint(self.words) else []), *self.words]
         return BatchJob(source.path, line.given, tuple(words), target)
 
     def files(self, rank: int) -> dict[str, bytes]:
@@ -127,7 +128,3 @@ def _with_files(options: Sequence[str], base: Base) -> tuple[list[str], list[tup
         else:
             words.append(word)
     return words, files
-
-
-def _says_how_much(words: Sequence[str]) -> bool:
-    return any(word in ("-q", "--quiet", "-v", "--verbose") for word in words)

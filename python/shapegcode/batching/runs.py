@@ -16,9 +16,9 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
-from shapegcode.batching.job import BatchJob, JobOutcome, Packed
 from shapegcode.batching.manifest import Manifest
 from shapegcode.batching.plan import Plan
+from shapegcode.batching.process import BatchJob, JobOutcome, Packed
 from shapegcode.batching.row import row_of
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_bytes

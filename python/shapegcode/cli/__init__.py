@@ -93,13 +93,9 @@ class _Version(argparse.Action):
     """``--version``; looks the version up only when asked."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        from importlib import metadata
+        from shapegcode.results.made import this_version
 
-        try:
-            version = metadata.version("shapegcode")
-        except metadata.PackageNotFoundError:
-            version = "(not installed)"
-        print(f"shapegcode {version}")
+        print(this_version())
         parser.exit(ExitCode.OK)
 
 

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "on how many sampled machines a choice is simulated",
     )
     parser.add_argument(
-        "--at-least", type=ratio, default=None, metavar="RATIO",
+        "--at-least", type=ratio, metavar="RATIO",
         help="probability of staying within tolerance, for example 99%% (default: the file's)",
     )  # fmt: skip
     add_plots_argument(parser, "write time and probability of the choices as a picture (PNG and SVG) into this folder")

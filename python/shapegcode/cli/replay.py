@@ -35,7 +35,7 @@ def changes(made: Made, folder: Path) -> tuple[dict[tuple[str, str], Path], list
 
 
 def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
-    from shapegcode.cli.made import MACHINES
+    from shapegcode.cli.runner import MACHINES
     from shapegcode.machine import Machine
     from shapegcode.results.made import MadeFile, file_hash
 
@@ -122,8 +122,7 @@ def _read_again(
 
 
 def _machine(args: argparse.Namespace, found: Mapping[tuple[str, str], Path]) -> Machine:
-    from shapegcode.cli.options import load_machine
-    from shapegcode.cli.overrides import overridden
+    from shapegcode.cli.options import load_machine, overridden
 
     place = found.get(("machine", str(args.machine)))
     args.machine = str(place) if place is not None else args.machine

@@ -28,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--against",
         metavar="ORIGINAL",
-        default=None,
         help="measure the contour error against the path of this program, such as the original of a shaped one; "
         "without it against IN's own path",
     )
@@ -42,10 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--csv",
         metavar="FILE",
-        default=None,
         help="write the motion in time, one line per period; - for standard output",
     )
-    parser.add_argument("--npz", metavar="FILE", default=None, help="write the same columns as a NumPy archive")
+    parser.add_argument("--npz", metavar="FILE", help="write the same columns as a NumPy archive")
     parser.add_argument(
         "--every", metavar="N", type=count, default=1, help="write every N-th sample only (default: %(default)d)"
     )
@@ -53,7 +51,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--lines",
         metavar="A-B",
         type=line_range,
-        default=None,
         help="motion in time of these lines alone, as `shapegcode expand` numbers them; the program is played from its "
         "start in any case",
     )

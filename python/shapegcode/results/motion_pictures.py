@@ -9,18 +9,15 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.results.follow import COARSE_STEP_RAD, follow, piece_of, polyline_of
-from shapegcode.results.motion_plots import View, plot_feed, plot_vibration
-from shapegcode.results.path_plots import Plane, plot_path
+from shapegcode.results.motion_plots import Trace, View, plot_feed, plot_vibration
+from shapegcode.results.path_plots import COARSE_STEP_RAD, Plane, follow, piece_of, plot_path, polyline_of
 from shapegcode.results.result import Plot
-from shapegcode.results.trace import Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,23 +75,20 @@ def _trace(label: str, run: _core.PlaybackFigures, period_s: float) -> Trace:
 
 def motion_pictures(played: Callable[[], PlayedRegion]) -> dict[str, Plot]:
     """Path, feed and vibration of a region, by name."""
-    once = functools.cache(lambda: _Scene.of(played()))
-    return {"path": partial(_path, once), "feed": partial(_feed, once), "vibration": partial(_vibration, once)}
+    scene = functools.cache(lambda: _Scene.of(played()))
 
+    def path(ax: Axes | None = None) -> Axes:
+        s = scene()
+        plane = _widest_plane(s.programmed_mm)
+        return plot_path(s.programmed_mm, s.near, ax, plane=plane, part=s.near_part, whole_mm=s.whole_mm)
 
-def _path(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
-    s = scene()
-    return plot_path(
-        s.programmed_mm, s.near, ax, plane=_widest_plane(s.programmed_mm), part=s.near_part, whole_mm=s.whole_mm
-    )
+    def feed(ax: Axes | None = None) -> Axes:
+        return plot_feed(scene().views, ax, part=scene().part)
 
+    def vibration(ax: Axes | None = None) -> Axes:
+        return plot_vibration(scene().views, ax, part=scene().part)
 
-def _feed(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
-    return plot_feed(scene().views, ax, part=scene().part)
-
-
-def _vibration(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
-    return plot_vibration(scene().views, ax, part=scene().part)
+    return {"path": path, "feed": feed, "vibration": vibration}
 
 
 @dataclass(frozen=True, eq=False)

@@ -147,7 +147,7 @@ class CutTotals:
 
 @dataclass(frozen=True)
 class CutPicker:
-    """A table of cuts to sort and to tick; what the ticked ones cost and gain, and the command that shapes only them."""
+    """A table of cuts to sort and to tick; cost and gain of the ticked ones, and the command that shapes only them."""
 
     rows: tuple[CutRow, ...]  # of the table, in the order of the program
     command: str  # to type, with `{lines}` where the lines of the ticked cuts stand, such as `12-80,95-240`
