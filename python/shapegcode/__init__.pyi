@@ -49,10 +49,8 @@ from shapegcode._core import (
     zv as zv,
     zv_on_grid as zv_on_grid,
 )
-from shapegcode.batching.batch import (
-    Cluster as Cluster,
-    batch as batch,
-)
+from shapegcode.batching.batch import batch as batch
+from shapegcode.batching.cluster import Cluster as Cluster
 from shapegcode.batching.result import (
     Batch as Batch,
     BatchRow as BatchRow,
@@ -88,7 +86,7 @@ from shapegcode.conversion.scheduled import (
 )
 from shapegcode.cutting.stock import Stock as Stock
 from shapegcode.cutting.tool import Tool as Tool
-from shapegcode.demos.path import path_demo as path_demo
+from shapegcode.demos.path import PathDemo as PathDemo, path_demo as path_demo
 from shapegcode.errors import (
     ArgumentError as ArgumentError,
     DesignError as DesignError,
@@ -183,12 +181,17 @@ from shapegcode.program import Program as Program
 from shapegcode.program.expand import expand as expand
 from shapegcode.program.result import Expansion as Expansion
 from shapegcode.results.json import schema as schema
-from shapegcode.results.motion_plots import View as View, plot_feed as plot_feed, plot_vibration as plot_vibration
+from shapegcode.results.motion_plots import (
+    Trace as Trace,
+    View as View,
+    plot_feed as plot_feed,
+    plot_vibration as plot_vibration,
+)
 from shapegcode.results.path_plots import plot_path as plot_path
+from shapegcode.results.report_result import Reports as Reports
 from shapegcode.results.result import Pair as Pair, Result as Result, Xyz as Xyz
 from shapegcode.results.revive import load_result as load_result
 from shapegcode.results.table import Column as Column, Table as Table
-from shapegcode.results.trace import Trace as Trace
 from shapegcode.setup.answers import Answers as Answers, AnswersError as AnswersError, read_answers as read_answers
 from shapegcode.setup.build import set_up as set_up
 from shapegcode.setup.result import MachineSetup as MachineSetup

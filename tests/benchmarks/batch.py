@@ -28,9 +28,8 @@ from processes import ROOT, launched
 from table import Sample
 
 from shapegcode.batching.inputs import find_programs
-from shapegcode.batching.job import Base, pack
 from shapegcode.batching.plan import plan
-from shapegcode.batching.process import Hosts
+from shapegcode.batching.process import Base, Hosts, pack
 
 COMMAND = Path(sys.executable).with_name("shapegcode")
 SAMPLES = ("TEST_G90.NC", "G83.NC", "VINT_360arc.NC", "helical_bore.nc")

@@ -18,8 +18,7 @@ import shapegcode as sg
 from acceptance import PROGRAMS
 from command import run, run_process
 from shapegcode.cli import COMMANDS, convert
-from shapegcode.cli.options import load_machine
-from shapegcode.cli.overrides import overridden
+from shapegcode.cli.options import load_machine, overridden
 from shapegcode.results.json import schema
 
 ROOT = Path(__file__).resolve().parents[2]

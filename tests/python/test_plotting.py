@@ -21,11 +21,9 @@ from shapegcode.conversion.convert import convert
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.results import plot
-from shapegcode.results.follow import follow, polyline_of
-from shapegcode.results.motion_plots import View, plot_feed, plot_vibration, thin_min_max
-from shapegcode.results.path_plots import plot_path
+from shapegcode.results.motion_plots import Trace, View, plot_feed, plot_vibration, thin_min_max
+from shapegcode.results.path_plots import follow, plot_path, polyline_of
 from shapegcode.results.table import warning_table
-from shapegcode.results.trace import Trace
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -26,11 +26,10 @@ from shapegcode.demos.path import path_program
 from shapegcode.errors import ArgumentError, MachineError
 from shapegcode.machine.output import ANY_PRICE
 from shapegcode.studies import replay as replays
-from shapegcode.studies.play import DrawsJob, play_all
-from shapegcode.studies.sampling import drawn
+from shapegcode.studies.replay import DrawsJob, play_all
 from shapegcode.studies.study_file import StudyFileError
 from shapegcode.studies.summary import decides, interval_of
-from shapegcode.studies.varied import varied_values
+from shapegcode.studies.varied import drawn, varied_values
 
 ROOT = Path(__file__).resolve().parents[2]
 X_HZ, Y_HZ = "axes.x.modes.1.frequency_hz", "axes.y.modes.1.frequency_hz"

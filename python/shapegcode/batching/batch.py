@@ -9,45 +9,23 @@ import shutil
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 
+from shapegcode.batching.cluster import Cluster, cluster_executor
 from shapegcode.batching.inputs import find_programs
-from shapegcode.batching.job import Base, pack
 from shapegcode.batching.manifest import Manifest, begun_in
 from shapegcode.batching.plan import COMMANDS, plan
-from shapegcode.batching.process import Hosts, run_packed
+from shapegcode.batching.process import Base, Hosts, pack, run_packed
 from shapegcode.batching.result import Batch
-from shapegcode.batching.row import KeptRows
+from shapegcode.batching.row import KeptRows, summary_lines
 from shapegcode.batching.runs import OnBatch, Runs
-from shapegcode.batching.summary import summary_lines
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import is_temporary, write_lines
 from shapegcode.verdict.ahead import cores
 
-__all__ = ["Cluster", "batch"]
-
 _SCRATCH = ".batch-scratch"
 _SUMMARY = "summary.csv"
 _NAMED = 5
-
-
-@dataclass(frozen=True)
-class Cluster:
-    """Where Dask runs the jobs.
-
-    Attributes:
-        scheduler: its address, such as ``tcp://host:8786``, or "local" for a cluster on this machine.
-        tls_ca: file of the authority's certificate, as Dask takes it; empty: none; likewise the next two.
-        tls_cert: of this client.
-        tls_key: of this client.
-    """
-
-    scheduler: str
-    tls_ca: str = ""
-    tls_cert: str = ""
-    tls_key: str = ""
 
 
 def batch(
@@ -103,8 +81,6 @@ def batch(
     with contextlib.ExitStack() as stack:
         hosts = Hosts()
         stack.callback(hosts.end)
-        if cluster is None:
-            hosts.begin(command)  # loads while programs are looked for
         sources = find_programs([str(each) for each in programs], output)
         called = [source.path for source in sources if source.subprogram]
         sources = tuple(source for source in sources if not source.subprogram)
@@ -114,7 +90,7 @@ def batch(
         planned = plan(sources, [str(each) for each in machines], str(output), command, options, html, base)
         # A scheduler that does not answer is found before anything is written; processes of this machine end before
         # the folder goes that they work in.
-        remote = None if cluster is None else stack.enter_context(_remote_executor(command, processes, cluster))
+        remote = None if cluster is None else stack.enter_context(cluster_executor(cluster, processes))
         manifest = Manifest(Path(output), resume=resume, base=base.folder)
         stack.callback(manifest.close)
         if html is not None:
@@ -153,13 +129,6 @@ def _warnings(stopped: str, called: Sequence[str]) -> tuple[str, ...]:
         more = f" and {len(called) - _NAMED} more" if len(called) > _NAMED else ""
         found.append(f"subprograms (M99), done where they are called: {', '.join(called[:_NAMED])}{more}")
     return tuple(found)
-
-
-def _remote_executor(command: str, processes: int, cluster: Cluster) -> AbstractContextManager[tuple[Executor, int]]:
-    from shapegcode.batching.cluster import cluster_executor
-
-    tls = {name: getattr(cluster, name) for name in ("tls_ca", "tls_cert", "tls_key")}
-    return cluster_executor(cluster.scheduler, processes=processes, command=command, **tls)
 
 
 @contextlib.contextmanager

@@ -5,16 +5,14 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.batching.process import begin_host
 from shapegcode.errors import ArgumentError
 from shapegcode.results.made import this_version
 
 if TYPE_CHECKING:
     from distributed import Client
-
-__all__ = ["cluster_executor"]
 
 LOCAL = "local"
 """Word for a cluster of this machine."""
@@ -23,21 +21,37 @@ _RETRIES = 3
 _WAIT_S = 30
 
 
+@dataclass(frozen=True)
+class Cluster:
+    """Where Dask runs the jobs.
+
+    Attributes:
+        scheduler: its address, such as ``tcp://host:8786``, or "local" for a cluster on this machine.
+        tls_ca: file of the authority's certificate, as Dask takes it; empty: none; likewise the next two.
+        tls_cert: of this client.
+        tls_key: of this client.
+    """
+
+    scheduler: str
+    tls_ca: str = ""
+    tls_cert: str = ""
+    tls_key: str = ""
+
+
 @contextlib.contextmanager
-def cluster_executor(
-    scheduler: str, *, processes: int, command: str = "", tls_ca: str = "", tls_cert: str = "", tls_key: str = ""
-) -> Iterator[tuple[Executor, int]]:
+def cluster_executor(cluster: Cluster, processes: int) -> Iterator[tuple[Executor, int]]:
     """An executor of a Dask cluster, whose workers were found to have this version of shapegcode."""
+    scheduler = cluster.scheduler
     try:
         from distributed import Client, LocalCluster
         from distributed.security import Security
     except ModuleNotFoundError as error:
         raise ArgumentError(f"--scheduler needs {error.name}: pip install 'shapegcode[cluster]'") from None
     security = None
-    if tls_ca or tls_cert or tls_key:
+    if cluster.tls_ca or cluster.tls_cert or cluster.tls_key:
         security = Security(  # type: ignore[no-untyped-call]
-            tls_ca_file=tls_ca or None, tls_client_cert=tls_cert or None, tls_client_key=tls_key or None,
-            require_encryption=True,
+            tls_ca_file=cluster.tls_ca or None, tls_client_cert=cluster.tls_cert or None,
+            tls_client_key=cluster.tls_key or None, require_encryption=True,
         )  # fmt: skip
     with contextlib.ExitStack() as stack:
         if scheduler == LOCAL:
@@ -51,8 +65,6 @@ def cluster_executor(
         except (OSError, ValueError, TypeError) as error:
             raise ArgumentError(f"--scheduler {scheduler}: no scheduler answers there ({error})") from None
         slots = _checked_slots(client, scheduler)
-        if command:
-            client.run(begin_host, command)
         executor = client.get_executor(pure=False, retries=_RETRIES)
         try:
             yield executor, slots

@@ -19,8 +19,6 @@ from shapegcode.program.several import is_subprogram
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["Source", "called_files", "find_programs"]
-
 _NUMBERED = re.compile(r"[Oo]\d{1,8}")
 _COMMENT = re.compile(r"(?:^|\s)#.*")
 _CALL = re.compile(rb"(?:M *0*(?:98|198)|G *0*(?:65|66))(?!\d)", re.IGNORECASE)
@@ -30,16 +28,11 @@ _COMPUTED = re.compile(rb"P *[\[#]", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A program of a batch.
+    """A program of a batch."""
 
-    Attributes:
-        path: as it was given.
-        place: where its results go below the output folder: its path below the folder that was given.
-        subprogram: it stands in a folder that was given, and only returns to who called it: it is done there.
-    """
-
-    path: str
-    place: str
+    path: str  # as it was given
+    place: str  # where its results go below the output folder: its path below the folder that was given
+    # it stands in a folder that was given, and only returns to who called it: it is done there
     subprogram: bool = False
 
 

@@ -21,8 +21,6 @@ from typing import Any, BinaryIO
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import named_errors, write_lines
 
-__all__ = ["MANIFEST", "Manifest", "begun_in", "short"]
-
 MANIFEST = "batch.jsonl"
 """Name of the file, in the output folder."""
 

@@ -8,18 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shapegcode.batching.inputs import Source, called_files
-from shapegcode.batching.job import Base, BatchJob
+from shapegcode.batching.process import Base, BatchJob
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import read_file
 from shapegcode.machine import Machine
-
-__all__ = ["COMMANDS", "WRITES", "Plan", "plan"]
 
 COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 """Commands of one program that can be run over many."""
 
 WRITES = ("convert", "feed")
 """Those that write a program."""
+_AMOUNT = frozenset({"-q", "--quiet", "-v", "--verbose"})
 _OF_ONE_RUN = (
     "-o", "--output", "-m", "--machine", "--json", "--html", "--html-script", "--csv", "--npz", "--plots",
 )  # fmt: skip
@@ -38,27 +37,16 @@ class _OnMachine:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be done: a run is made when its turn comes, machine by machine.
+    """What is to be done: a run is made when its turn comes, machine by machine."""
 
-    Attributes:
-        base: folder in which the batch was begun.
-        sources: the programs, in the order in which they were given.
-        lines: one for each machine.
-        command: of `COMMANDS`.
-        words: further ones of each command line.
-        output: folder of the results, as a run sees it.
-        html: likewise of the pages; empty: none.
-        shared: content of the files that many of them read, by name.
-    """
-
-    base: Base
-    sources: Sequence[Source]
-    lines: tuple[_OnMachine, ...]
-    command: str
-    words: tuple[str, ...]
-    output: str
-    html: str
-    shared: Mapping[str, bytes]
+    base: Base  # folder in which the batch was begun
+    sources: Sequence[Source]  # the programs, in the order in which they were given
+    lines: tuple[_OnMachine, ...]  # one for each machine
+    command: str  # of `COMMANDS`
+    words: tuple[str, ...]  # further ones of each command line
+    output: str  # folder of the results, as a run sees it
+    html: str  # likewise of the pages; empty: none
+    shared: Mapping[str, bytes]  # content of the files that many of them read, by name
 
     def __len__(self) -> int:
         """How many runs there are."""
@@ -72,7 +60,7 @@ class Plan:
         words = [self.command, self.base.name_of(source.path), "-m", line.word]
         words += ["-o", target] if self.command in WRITES else []
         words += ["--json", f"{target}.json", *(["--html", page, "--html-script", "beside"] if page else [])]
-        words += [*([] if _says_how_much(self.words) else ["-q"]), *self.words]
+        words += [*(["-q"] if _AMOUNT.isdisjoint(self.words) else []), *self.words]
         return BatchJob(source.path, line.given, tuple(words), target)
 
     def files(self, rank: int) -> dict[str, bytes]:
@@ -140,7 +128,3 @@ def _with_files(options: Sequence[str], base: Base) -> tuple[list[str], list[tup
         else:
             words.append(word)
     return words, files
-
-
-def _says_how_much(words: Sequence[str]) -> bool:
-    return any(word in ("-q", "--quiet", "-v", "--verbose") for word in words)

@@ -7,6 +7,7 @@ milliseconds. Each thread that runs jobs has such a host. The same function runs
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
 import shutil
@@ -15,14 +16,91 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from shapegcode.batching.job import FAILED_CODES, Ending, JobOutcome, Packed
 from shapegcode.io.atomic import named_errors
 from shapegcode.results.made import this_version
 
-__all__ = ["Hosts", "begin_host", "run_packed"]
+Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
+"""How a run ended: by itself with an exit code, or not."""
+
+FAILED_CODES = {97: "crashed", 98: "out of memory"}
+"""Exit codes of a run that are no command's."""
+
+
+@dataclass(frozen=True)
+class Base:
+    """The folder in which a batch was begun: a run sees names from there, also when it goes on from another folder."""
+
+    folder: str  # its absolute path
+
+    def name_of(self, path: str | Path) -> str:
+        """Name of a file in the folder of a run."""
+        return os.path.relpath(path, self.folder)
+
+    def path_of(self, name: str) -> str:
+        """The inverse of it."""
+        return os.path.normpath(os.path.join(os.path.relpath(self.folder), name))
+
+
+@dataclass(frozen=True)
+class BatchJob:
+    """A run that is to be done."""
+
+    program: str  # what it is of, as it was given
+    machine: str
+    words: tuple[str, ...]  # of the command line
+    output: str  # its main file, as a name in its folder; the JSON is beside it
+
+    @property
+    def key(self) -> str:
+        """What it is called in the manifest: its main file."""
+        return self.output
+
+    @property
+    def report(self) -> str:
+        """Name of its JSON."""
+        return f"{self.output}.json"
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A run with all that it reads; nothing in it names a file of the machine that sends it."""
+
+    words: tuple[str, ...]  # of the command line
+    files: Mapping[str, bytes]  # content by name in the folder of the run
+    version: str  # of shapegcode that it is meant for
+    fingerprint: str  # of all of this: equal ones give equal results
+    seconds: float = 0.0  # that it may take; 0: any time
+    memory_bytes: int = 0  # that it may need; 0: any
+    scratch: str = ""  # folder for the folder of the run; empty: where temporary files go
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """What came back."""
+
+    ending: Ending  # how it ended
+    code: int  # exit code of the command; 0 where it did not end by itself
+    said: str  # what it wrote to standard output
+    complained: str  # what it wrote to standard error, or why it did not end by itself
+    files: Mapping[str, bytes]  # content of what it wrote, by name in its folder
+    wall_s: float = 0.0  # how long it took
+    cpu_s: float = 0.0  # processor time
+    peak_bytes: int = 0  # most memory that it had at a time
+
+
+def pack(
+    job: BatchJob, files: Mapping[str, bytes], *, seconds: float = 0.0, memory_bytes: int = 0, scratch: str = ""
+) -> Packed:
+    """A run that can travel."""
+    version = this_version()
+    hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+    whole = json.dumps([version, list(job.words), hashes], sort_keys=True)
+    fingerprint = hashlib.sha256(whole.encode()).hexdigest()
+    return Packed(job.words, files, version, fingerprint, seconds, memory_bytes, scratch)
 
 
 _ENVIRONMENT = {
@@ -39,7 +117,7 @@ class _Host:
     """A process that forks one for each job; `ask` may be called by one thread at a time."""
 
     def __init__(self, command: str) -> None:
-        self._process = subprocess.Popen(
+        self._process: subprocess.Popen[bytes] = subprocess.Popen(
             [sys.executable, "-m", "shapegcode.cli.host", command],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -60,10 +138,8 @@ class _Host:
             return None
         return json.loads(line) if line.endswith(b"\n") else None
 
-    def end(self, *, at_once: bool = False) -> None:
-        """End it, and the job that it runs; at once if it runs none."""
-        if at_once:
-            self._process.kill()
+    def end(self) -> None:
+        """End it, and the job that it runs."""
         # It ends its job when its input ends.
         with contextlib.suppress(OSError, ValueError):
             if self._process.stdin is not None:
@@ -85,13 +161,7 @@ class Hosts:
         self._own = threading.local()
         self._lock = threading.Lock()
         self._all: set[_Host] = set()
-        self._ready: dict[str, _Host] = {}
         self._ended = False
-
-    def begin(self, command: str) -> None:
-        """Have one load while its first job is still looked for."""
-        host = self._ready[command] = _Host(command)
-        self._all.add(host)
 
     def run(self, packed: Packed) -> JobOutcome:
         """Run a job in a process of its own, in a folder that is gone afterwards."""
@@ -110,7 +180,7 @@ class Hosts:
             hosts = list(self._all)
             self._all.clear()
         for host in hosts:
-            host.end(at_once=host in self._ready.values())
+            host.end()
 
     def _host(self, command: str) -> _Host | None:
         """That of this thread; None: there shall be none any more."""
@@ -119,7 +189,7 @@ class Hosts:
             if self._ended:
                 return None
             if host is None or host not in self._all:
-                host = self._own.host = self._ready.pop(command, None) or _Host(command)
+                host = self._own.host = _Host(command)
                 self._all.add(host)
             return host
 
@@ -159,11 +229,6 @@ class Hosts:
 
 
 _of_worker = Hosts()
-
-
-def begin_host(command: str) -> None:
-    """Have a Dask worker load what its first run needs."""
-    _of_worker.begin(command)
 
 
 def run_packed(packed: Packed) -> JobOutcome:

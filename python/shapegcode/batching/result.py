@@ -16,8 +16,6 @@ from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-__all__ = ["Batch", "BatchRow", "Ended"]
-
 Ended = Literal["ok", "not ok", "refused", "failed"]
 """Within tolerance; done, but not; the input is bad; it did not end by itself."""
 

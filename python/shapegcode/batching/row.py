@@ -1,23 +1,24 @@
-"""From the outcome of a run to its row, and rows read back from the manifest."""
+"""Rows of a batch: from the outcome of a run, read back from the manifest, and as a table for spreadsheets."""
 
 from __future__ import annotations
 
+import csv
 import errno
+import io
 import json
 import os
 import weakref
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, overload
 
-from shapegcode.batching.job import BatchJob, JobOutcome
 from shapegcode.batching.plan import Plan
+from shapegcode.batching.process import BatchJob, JobOutcome
 from shapegcode.batching.result import BatchRow, Ended, figures_of
+from shapegcode.results.json import plain
 from shapegcode.results.outcome import Pair
-
-__all__ = ["KeptRows", "row_of", "row_read"]
 
 _ENDED: dict[int, Ended] = {0: "ok", 1: "not ok", 2: "refused"}
 _PAIRS = ("residual_um", "contour_um", "cycle_time_s")
@@ -117,3 +118,31 @@ class KeptRows(Sequence[BatchRow]):
         files = {name: base.path_of(row[name]) for name in ("output", "report", "page") if row[name]}
         given = {"program": job.program, "machine": job.machine}
         return row_read(row | files | given, earlier=bool(self._earlier[rank]))
+
+
+def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
+    """The rows as CSV."""
+    names = ["residual_um", "contour_um", "cycle_time_s"]
+    heads: list[str] = []
+    for field in fields(BatchRow):
+        heads += [f"{field.name}.original", f"{field.name}.emitted"] if field.name in names else [field.name]
+    yield _csv_line(heads)
+    for row in rows:
+        flat = _flat(plain(row))
+        yield _csv_line([flat.get(head, "") for head in heads])
+
+
+def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in row.items():
+        if isinstance(value, Mapping):
+            flat |= {f"{name}.{key}": inner for key, inner in value.items()}
+        else:
+            flat[name] = value
+    return flat
+
+
+def _csv_line(cells: Sequence[object]) -> str:
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerow(["" if cell is None else cell for cell in cells])
+    return stream.getvalue()

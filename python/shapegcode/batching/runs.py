@@ -16,16 +16,14 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
-from shapegcode.batching.job import BatchJob, JobOutcome, Packed
 from shapegcode.batching.manifest import Manifest
 from shapegcode.batching.plan import Plan
+from shapegcode.batching.process import BatchJob, JobOutcome, Packed
 from shapegcode.batching.row import row_of
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_bytes
 from shapegcode.results.json import plain
 from shapegcode.results.page.html import is_shared
-
-__all__ = ["OnBatch", "Runs"]
 
 OnBatch = Callable[[float, str], None]
 """Told the share that is done, and how many runs are done, under way and failed."""

@@ -25,8 +25,6 @@ from typing import Any
 
 from shapegcode.cli.arguments import CommandParser
 
-__all__ = ["COMMANDS", "Command", "ExitCode", "main", "parser_of"]
-
 _DEBUG = "--debug"
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _WITH_REST = "batch"
@@ -50,15 +48,10 @@ class ExitCode:
 
 @dataclass(frozen=True)
 class Command:
-    """One sub-command.
+    """One sub-command."""
 
-    Attributes:
-        name: what the user types; also the name of its module in ``shapegcode.cli``.
-        help: one line for ``shapegcode --help``.
-    """
-
-    name: str
-    help: str
+    name: str  # what the user types; also the name of its module in ``shapegcode.cli``
+    help: str  # one line for ``shapegcode --help``
 
     @property
     def module(self) -> str:
@@ -100,13 +93,9 @@ class _Version(argparse.Action):
     """``--version``; looks the version up only when asked."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        from importlib import metadata
+        from shapegcode.results.made import this_version
 
-        try:
-            version = metadata.version("shapegcode")
-        except metadata.PackageNotFoundError:
-            version = "(not installed)"
-        print(f"shapegcode {version}")
+        print(this_version())
         parser.exit(ExitCode.OK)
 
 

@@ -8,8 +8,6 @@ from typing import Any
 
 from shapegcode.cli.examples import EXAMPLES
 
-__all__ = ["GROUPS", "CommandParser", "add_alias", "one_of"]
-
 GROUPS: dict[str, tuple[str, ...]] = {
     "input": (
         "input", "inputs", "files", "dump", "name", "kind", "machine", "set", "program", "against", "shaped", "lines",

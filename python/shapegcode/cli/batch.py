@@ -6,10 +6,8 @@ import argparse
 import shlex
 from pathlib import Path
 
-from shapegcode.cli.options import add_amount_arguments
+from shapegcode.cli.options import add_amount_arguments, add_cluster_arguments, cluster_of
 from shapegcode.cli.typed import count, seconds, size
-
-__all__ = ["add_arguments", "run"]
 
 _INDEX = "index.html"
 
@@ -59,17 +57,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SIZE",
         help="of each run, such as 2G, beyond what is loaded (default: none; Linux only)",
     )
+    add_cluster_arguments(parser, "run")
+    parser.add_argument("--json", metavar="FILE", help="write all rows as JSON; - for standard output")
     parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        default=None,
-        help="run on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
-    )
-    for name, what in (("ca", "the authority's certificate"), ("cert", "own certificate"), ("key", "own key")):
-        parser.add_argument(f"--tls-{name}", metavar="FILE", default="", help=f"{what}, for tls:// schedulers")
-    parser.add_argument("--json", metavar="FILE", default=None, help="write all rows as JSON; - for standard output")
-    parser.add_argument(
-        "--html", metavar="DIR", default=None, help="write a page for each run into this folder, and an index of them"
+        "--html", metavar="DIR", help="write a page for each run into this folder, and an index of them"
     )
     add_amount_arguments(parser)
 
@@ -78,12 +69,11 @@ def run(args: argparse.Namespace) -> int:
     """Run the batch."""
     from dataclasses import replace
 
-    from shapegcode.batching.batch import Cluster, batch
+    from shapegcode.batching.batch import batch
     from shapegcode.cli import ExitCode, runner
 
     options = list(getattr(args, "rest", ()))
     _check_options(args, options)
-    cluster = None if args.scheduler is None else Cluster(args.scheduler, args.tls_ca, args.tls_cert, args.tls_key)
     html, args.html = args.html, None
     name = f"{args.batch_command}: "
     with runner.progress(f"{name}reading", args) as bar:
@@ -99,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
             command=args.batch_command,
             options=options,
             jobs=args.jobs,
-            cluster=cluster,
+            cluster=cluster_of(args),
             resume=args.resume,
             html=html,
             time_limit_s=args.time_limit,

@@ -11,8 +11,6 @@ from shapegcode.cli.options import add_machine_argument, add_plots_argument, add
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -9,8 +9,6 @@ import argparse
 import os
 import sys
 
-__all__ = ["add_arguments", "complete", "run"]
-
 _SHELLS = ("bash", "zsh", "fish")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import itertools
 import json
@@ -19,30 +18,11 @@ from shapegcode.io.atomic import write_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress, TaskID
-
-__all__ = [
-    "ProgressBar",
-    "add_json_argument",
-    "output_console",
-    "progress",
-    "wrapped",
-    "write_json",
-]
+    from rich.progress import Progress
 
 _PIPE_WIDTH = 120
 _PIECES = 4096
 _PROGRESS_DELAY_S = 1.0
-
-
-def add_json_argument(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--json FILE``; the value is ``args.json``, None where it is not given."""
-    parser.add_argument(
-        "--json",
-        metavar="FILE",
-        default=None,
-        help="write the result as JSON to FILE; - for standard output and nothing else there",
-    )
 
 
 def output_console(json_target: str | None = None, *, file: TextIO | None = None, least: int = 0) -> Console:
@@ -80,74 +60,54 @@ def write_json(data: object, target: str | Path) -> None:
 
 
 class ProgressBar:
-    """A bar on standard error that shows itself only when the work takes longer than a second."""
+    """A bar on standard error; until it is opened nothing is shown."""
 
-    def __init__(self, description: str, *, enabled: bool) -> None:
-        """Start the clock; nothing is shown yet."""
+    def __init__(self, description: str) -> None:
+        """Say what is being done."""
         self._description = description
-        self._enabled = enabled
-        self._lock = threading.Lock()
-        self._timer: threading.Timer | None = None
-        self._closed = False
-        self._bar: Progress | None = None
-        self._task: TaskID | None = None
+        self.bar: Progress | None = None
 
     def update(self, fraction: float) -> None:
         """Tell how much of the work is done, 0 to 1; cheap enough for every step of a loop."""
-        if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=min(max(fraction, 0.0), 1.0), total=1.0)
+        if self.bar is not None:
+            self.bar.update(self.bar.task_ids[0], completed=min(max(fraction, 0.0), 1.0), total=1.0)
 
     def say(self, text: str) -> None:
         """Say what is being done in other words."""
         self._description = text
-        if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, description=text)
+        if self.bar is not None:
+            self.bar.update(self.bar.task_ids[0], description=text)
 
-    def wait(self) -> None:
-        """Show from the first second on that work goes on, also as long as nobody tells how much of it is done."""
-        if self._enabled:
-            self._timer = threading.Timer(_PROGRESS_DELAY_S, self._open_late)
-            self._timer.daemon = True
-            self._timer.start()
-
-    def close(self) -> None:
-        """Remove the bar from the screen."""
-        if self._timer is not None:
-            self._timer.cancel()
-        with self._lock:
-            self._closed = True
-            if self._bar is not None:
-                self._bar.stop()
-                self._bar = None
-
-    def _open_late(self) -> None:
-        with self._lock:
-            if not self._closed:
-                self._open()
-
-    def _open(self) -> None:
+    def open(self) -> None:
+        """Show it."""
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-        bar = Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TimeRemainingColumn(),
-            TimeElapsedColumn(),
-            console=Console(stderr=True),
-            transient=True,
-        )
-        self._task = bar.add_task(self._description, total=None)
+        text = TextColumn("{task.description}", markup=False)
+        columns = (text, BarColumn(), TimeRemainingColumn(), TimeElapsedColumn())
+        bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        bar.add_task(self._description, total=None)
         bar.start()
-        self._bar = bar
+        self.bar = bar
 
 
 @contextlib.contextmanager
 def progress(description: str, json_target: str | None = None) -> Iterator[ProgressBar]:
-    """A progress bar for the block; off if standard error is no terminal or JSON goes to standard output."""
-    bar = ProgressBar(description, enabled=sys.stderr.isatty() and json_target != "-")
-    bar.wait()
+    """A progress bar for the block, from its first second on, also as long as nobody tells how much of it is done.
+
+    There is none if standard error is no terminal or JSON goes to standard output.
+    """
+    bar = ProgressBar(description)
+    later = threading.Timer(_PROGRESS_DELAY_S, bar.open)
+    later.daemon = True
+    shown = sys.stderr.isatty() and json_target != "-"
+    if shown:
+        later.start()
     try:
         yield bar
     finally:
-        bar.close()
+        if shown:
+            later.cancel()
+            later.join()  # it may be opening just now
+        if bar.bar is not None:
+            bar.bar.stop()

@@ -13,13 +13,14 @@ from shapegcode.cli.arguments import add_alias
 from shapegcode.cli.feed import add_cutting_arguments
 from shapegcode.cli.options import (
     add_machine_argument,
+    add_override_arguments,
     add_plots_argument,
     add_program_argument,
     add_result_arguments,
     load_machine,
     output_file,
+    overridden,
 )
-from shapegcode.cli.overrides import add_override_arguments, overridden
 from shapegcode.cli.typed import line_ranges, positive, ratio, seconds, size
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from shapegcode.conversion.result import Conversion
     from shapegcode.machine import Machine
     from shapegcode.program import Program
-
-__all__ = ["MACHINE_KEYS", "add_arguments", "run"]
 
 _MMAP_THRESHOLD = -3  # M_MMAP_THRESHOLD of glibc's malloc.h
 _LARGE_BYTES = 1 << 20
@@ -61,7 +60,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--arc-feed",
         metavar="RATIO",
         type=ratio,
-        default=None,
         help="feed on arcs relative to the programmed feed, for example 60%%",
     )
     add_override_arguments(parser, MACHINE_KEYS)
@@ -75,7 +73,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--only",
         metavar="A-B,...",
         type=line_ranges,
-        default=None,
         help="shape nothing but the cuts in these lines of IN, for example 12-80,95-240",
     )
     parser.add_argument(
@@ -95,28 +92,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--block-period",
         metavar="TIME",
         type=seconds,
-        default=None,
         help="duration of the shortest block, for example 5ms (default: chosen for the modes)",
     )
     parser.add_argument(
         "--max-bytes",
         metavar="N[k|M]",
         type=size,
-        default=None,
         help="largest size of the emitted program, for example 256k (1k = 1024): what gains least is left unchanged",
     )
     parser.add_argument(
         "--baud",
         metavar="N",
         type=positive,
-        default=None,
         help="speed of the serial line that feeds the program: longer block periods, then cuts left unchanged",
     )
     parser.add_argument(
         "--max-blocks-per-second",
         metavar="N",
         type=positive,
-        default=None,
         help="blocks that the control reads per second; as --baud",
     )
     parser.add_argument(

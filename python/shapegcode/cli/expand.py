@@ -6,8 +6,6 @@ import argparse
 
 from shapegcode.cli.options import add_input_arguments, add_result_arguments, load_machine
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

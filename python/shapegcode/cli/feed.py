@@ -14,8 +14,6 @@ from shapegcode.cli.options import (
 )
 from shapegcode.cli.typed import micrometres, share
 
-__all__ = ["add_arguments", "add_cutting_arguments", "read_cutting_arguments", "run"]
-
 
 def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
     """Declare what a feed schedule needs beside program and machine: tool, stock, margin, resolution."""
@@ -37,14 +35,12 @@ def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) ->
         "--margin",
         metavar="RATIO",
         type=share,
-        default=None,
         help="share of each limit that is left free, for example 3%% (default: 1.5%%)",
     )
     parser.add_argument(
         "--resolution",
         metavar="LENGTH",
         type=micrometres,
-        default=None,
         help="grid of the material, for example 50um (default: a hundredth of the tool's diameter)",
     )
 

@@ -1,14 +1,12 @@
 """A process that has everything loaded and forks one for each command line that it is told.
 
-``python -m shapegcode.cli.host convert`` runs the command once on a program of its own, so that what a first run sets
-up is there, too. Then it reads one JSON object per line: the folder of a run, the words of its command line, its
-limits; and answers with one: exit code, time, memory. It ends when its input does, and takes a running command with it.
-`shapegcode.batching` is the one that asks.
+``python -m shapegcode.cli.host convert`` reads one JSON object per line: the folder of a run, the words of its command
+line, its limits; and answers with one: exit code, time, memory. It ends when its input does, and takes a running
+command with it. `shapegcode.batching` is the one that asks.
 """
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import gc
 import importlib
@@ -20,24 +18,21 @@ import sys
 import time
 import traceback
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from shapegcode.batching.job import FAILED_CODES
+from shapegcode.batching.process import FAILED_CODES
 from shapegcode.io.atomic import write_in_passing
 from shapegcode.results.made import this_version
 
-__all__ = ["main"]
-
 _LOADED = (
-    "shapegcode.cli.runner", "shapegcode.cli.options", "shapegcode.cli.made", "shapegcode.cli.typed",
+    "shapegcode.cli.runner", "shapegcode.cli.options", "shapegcode.cli.typed",
     "shapegcode.results.table", "rich.console", "rich.table", "rich._emoji_codes", "importlib.metadata",
     "importlib.readers", "email.parser", "shlex",
 )  # fmt: skip
 _OF_COMMAND = {
     "convert": (
-        "shapegcode.conversion.convert", "shapegcode.shaping", "shapegcode.cli.feed", "shapegcode.cli.overrides",
+        "shapegcode.conversion.convert", "shapegcode.shaping", "shapegcode.cli.feed",
         "shapegcode.model.signatures",
     ),
     "time": ("shapegcode.timing.cycle_time",),
@@ -47,7 +42,6 @@ _OF_COMMAND = {
     "simulate": ("shapegcode.simulation.simulate",),
 }  # fmt: skip
 """What a run imports when it gets there: each would do so anew."""
-_REHEARSED = {"convert": ("-o", os.devnull), "feed": ("-o", os.devnull), "measure": ("--tool-diameter", "10mm")}
 _CODES = {name: code for code, name in FAILED_CODES.items()}
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl
 
@@ -60,8 +54,6 @@ def main() -> int:
     this_version()  # looked up once
     os.environ["SHAPEGCODE_THREADS"] = "1"  # other runs have the other cores
     write_in_passing()
-    for command in sys.argv[1:]:
-        _rehearse(command)
     gc.collect()
     gc.freeze()  # what is loaded stays shared: a collection in a run would copy it
     answers = os.dup(1)
@@ -71,27 +63,6 @@ def main() -> int:
             return 0
         os.write(answers, json.dumps(reply).encode() + b"\n")
     return 0
-
-
-def _rehearse(command: str) -> None:
-    """Run it once: what a first run makes is then shared (parsers, tables, linked functions, code that is warm).
-
-    Whatever comes of it is of no interest, and no file is written.
-    """
-    program = str(resources.files("shapegcode") / "data" / "paper_path.nc")
-    kept = [os.dup(stream) for stream in (1, 2)]
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):
-        os.dup2(nothing, stream)
-    with contextlib.suppress(Exception):
-        importlib.import_module("shapegcode.cli").main(
-            [command, program, "-m", "vx500", "--json", "-", "-q", *_REHEARSED.get(command, ())]
-        )
-    sys.stdout.flush()
-    for stream, copy in zip((1, 2), kept, strict=True):
-        os.dup2(copy, stream)
-        os.close(copy)
-    os.close(nothing)
 
 
 def _run(job: Mapping[str, Any]) -> dict[str, Any] | None:

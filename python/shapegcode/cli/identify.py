@@ -7,12 +7,10 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli import modes, options, typed
+from shapegcode.cli import options, typed
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
-
-__all__ = ["add_arguments", "run"]
 
 _MOST_MODES = 8  # as identify.MOST_MODES, which would have to be imported with all that is slow
 _HELP_TIME = "where the decay begins in the file, for example 250ms (default: found by itself)"
@@ -65,19 +63,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files", metavar="FILE", nargs="*", help="CSV, UFF (dataset 58), WAV, .frf, .mat; several of one point together"
     )
     along = "use the response along this axis; where the file names none, it is this one"
-    add("--axis", choices=("x", "y", "z"), default=None, help=along)
-    add("--update", metavar="MACHINE.toml", default=None, help="put the supported modes into this machine file")
-    modes.add_modes_arguments(parser, "--keep-modes")
+    add("--axis", choices=("x", "y", "z"), help=along)
+    add("--update", metavar="MACHINE.toml", help="put the supported modes into this machine file")
+    options.add_modes_arguments(parser, "--keep-modes")
     add("--tap-plan", action="store_true", help="say how to do the test (for the modes of -m MACHINE), nothing else")
     options.add_machine_argument(parser, required=False)
-    add("--modes", metavar="N", type=typed.count, default=None, help="how many (default: chosen by evidence)")
+    add("--modes", metavar="N", type=typed.count, help="how many (default: chosen by evidence)")
     most = "largest number of modes that is tried (default: %(default)s)"
     add("--most-modes", metavar="N", type=typed.count, default=_MOST_MODES, help=most)
     within = "look for modes between these frequencies, Hz"
-    add("--frequencies", metavar="LOW:HIGH", type=typed.frequency_band, default=None, help=within)
+    add("--frequencies", metavar="LOW:HIGH", type=typed.frequency_band, help=within)
     ignore = "take it as a free decay: do not use the force, even if there is one"
     add("--decay", "--ignore-force", dest="ignore_force", action="store_true", help=ignore)
-    add("--start", metavar="TIME", type=typed.start_time, default=None, help=_HELP_TIME)
+    add("--start", metavar="TIME", type=typed.start_time, help=_HELP_TIME)
     for name, field, how, said in _OF_FILES:
         add(name, dest=field, help=said, **({"default": None} | how))
     options.add_plots_argument(
@@ -141,5 +139,5 @@ def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> Non
     from shapegcode.identification.other_axes import open_modes, require_decisions
 
     found = open_modes(machine, axis)
-    args.keep_modes, args.rigid = modes.decided_modes(args, found, f"{args.update}: not measured on this machine:")
+    args.keep_modes, args.rigid = options.decided_modes(args, found, f"{args.update}: not measured on this machine:")
     require_decisions(found, args.keep_modes, args.rigid, args.update)

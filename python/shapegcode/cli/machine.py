@@ -6,15 +6,12 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from shapegcode.cli import modes
-from shapegcode.cli.options import add_result_arguments
+from shapegcode.cli.options import add_modes_arguments, add_result_arguments, decided_modes
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
     from shapegcode.machine.description_result import MachineDescription
     from shapegcode.settings.keys import TomlTable
-
-__all__ = ["FILES", "add_arguments", "file_schema", "run"]
 
 FILES = ("machine", "tool", "stock", "study")
 """Kinds of TOML files that have a schema."""
@@ -68,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     take.add_argument(
         "--from", dest="base", metavar="MACHINE", help="machine for what the dump does not say, such as the modes"
     )
-    modes.add_modes_arguments(take, "--keep-modes")
+    add_modes_arguments(take, "--keep-modes")
     take.add_argument("--name", metavar="NAME", help="name of the machine (default: that of the dump's file)")
     take.add_argument("--force", action="store_true", help="overwrite an existing file")
     add_result_arguments(take)
@@ -84,7 +81,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--for",
         dest="input",
         metavar="PROGRAM",
-        default=None,
         help="convert this program, and rank the unverified parameters by how far each changes its verdict",
     )
     show.add_argument(
@@ -143,7 +139,7 @@ def _import(args: argparse.Namespace) -> int:
     runner.check_files(args)
     dump, tables = _sorted(args.dump)
     base = Machine.load(args.base) if args.base else None
-    keep, rigid = modes.decided_modes(args, _modes_of(base), "no dump holds modes, and")
+    keep, rigid = decided_modes(args, _modes_of(base), "no dump holds modes, and")
     found = import_parameters(dump, base, tables=tables, name=args.name, keep_modes=keep, rigid=rigid)
     if found.ok:
         _write(args, found.to_toml())

@@ -15,8 +15,6 @@ from shapegcode.cli.options import (
 )
 from shapegcode.cli.typed import line_range, micrometres
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -42,7 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--against",
         metavar="ORIGINAL",
-        default=None,
         help="measure against the path of this program (default: the first one if shapegcode wrote the others, else "
         "each program's own path)",
     )
@@ -51,7 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="A-B",
         type=line_range,
         action="append",
-        default=None,
         help="measure the cut of these lines as one section; may be repeated (default: every line and arc)",
     )
     length = partial(parser.add_argument, metavar="LENGTH", type=micrometres)

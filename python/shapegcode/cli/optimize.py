@@ -10,8 +10,6 @@ from shapegcode.cli.options import add_plots_argument, add_result_arguments
 from shapegcode.cli.study import add_study_arguments, load
 from shapegcode.cli.typed import ratio
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -26,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "on how many sampled machines a choice is simulated",
     )
     parser.add_argument(
-        "--at-least", type=ratio, default=None, metavar="RATIO",
+        "--at-least", type=ratio, metavar="RATIO",
         help="probability of staying within tolerance, for example 99%% (default: the file's)",
     )  # fmt: skip
     add_plots_argument(parser, "write time and probability of the choices as a picture (PNG and SVG) into this folder")

@@ -1,18 +1,19 @@
-"""Arguments that several commands share: the program, the machine with `--set`, pictures, files."""
+"""Arguments that several commands share: program, machine with `--set` and options for its keys, pictures, files."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 from shapegcode.cli.arguments import one_of
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.typed import program_choice
+from shapegcode.cli.typed import axes, micrometres, number, program_choice, seconds
 
 if TYPE_CHECKING:
+    from shapegcode.batching.cluster import Cluster
     from shapegcode.machine import Machine
 
 
@@ -47,7 +48,7 @@ def add_plots_argument(
     what: str = "write pictures (PNG and SVG) of the region that vibrates most into this folder",
 ) -> None:
     """Declare ``--plots DIR``; *what* is its help."""
-    parser.add_argument("--plots", metavar="DIR", default=None, help=what)
+    parser.add_argument("--plots", metavar="DIR", help=what)
 
 
 def add_result_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,11 +57,19 @@ def add_result_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--html",
         metavar="FILE",
-        default=None,
         help="write the result as a page: one file that any browser opens, without a network",
     )
     add_script_argument(parser)
     add_amount_arguments(parser)
+
+
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--json FILE``; the value is ``args.json``, None where it is not given."""
+    parser.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write the result as JSON to FILE; - for standard output and nothing else there",
+    )
 
 
 def add_amount_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,6 +79,24 @@ def add_amount_arguments(parser: argparse.ArgumentParser) -> None:
     amount.add_argument(
         "-v", "--verbose", action="store_true", help="every table with every column and row, however wide"
     )
+
+
+def add_cluster_arguments(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare ``--scheduler`` and its certificates; `what` is done there."""
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help=f"{what} on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
+    )
+    for name, of in (("ca", "the authority's certificate"), ("cert", "own certificate"), ("key", "own key")):
+        parser.add_argument(f"--tls-{name}", metavar="FILE", default="", help=f"{of}, for tls:// schedulers")
+
+
+def cluster_of(args: argparse.Namespace) -> Cluster | None:
+    """What `add_cluster_arguments` declared."""
+    from shapegcode.batching.cluster import Cluster
+
+    return None if args.scheduler is None else Cluster(args.scheduler, args.tls_ca, args.tls_cert, args.tls_key)
 
 
 def add_script_argument(parser: argparse.ArgumentParser) -> None:
@@ -88,7 +115,6 @@ def add_program_argument(parser: argparse.ArgumentParser) -> None:
         "--program",
         metavar="O1234",
         type=program_choice,
-        default=None,
         help="program to read of a file that holds several (default: the first): its number, /FOLDER/O1234 where "
         "folders of a memory punch hold the same one, <NAME>, #3 for the third one; all: each that no other one calls",
     )
@@ -150,3 +176,91 @@ def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
                 raise ArgumentError(
                     f"{target} would overwrite {other}, which this run reads or writes too: name another file"
                 )
+
+
+# How a value of a unit is typed on the command line: what is shown for it, what reads it, an example.
+_TYPED = {
+    "µm": ("LENGTH", micrometres, "5um"),
+    "s": ("TIME", seconds, "5ms"),
+    "%": ("PERCENT", lambda text: number(text.removesuffix("%")), "10%"),
+}
+_MOST_CHOICES_SHOWN = 4
+
+
+def add_override_arguments(parser: argparse.ArgumentParser, keys: Mapping[str, str]) -> None:
+    """Declare an option for each key, without a default: what is not typed is the machine's own."""
+    for option, key in keys.items():
+        meaning, unit, kind = _facts(key)
+        said: dict[str, Any] = {"default": None}
+        if kind is bool:
+            said["action"] = argparse.BooleanOptionalAction
+        elif get_origin(kind) is Literal:
+            said["choices"] = get_args(kind)
+            if len(said["choices"]) > _MOST_CHOICES_SHOWN:
+                said["metavar"] = key.rpartition(".")[2].upper()
+                meaning += f". One of {', '.join(said['choices'])}"
+        elif unit in _TYPED:
+            said["metavar"], said["type"], example = _TYPED[unit]
+            meaning += f"; for example {example}"
+        else:
+            said["metavar"], said["type"] = unit.upper() or "N", number
+        text = f"{meaning} (default: {key} of the machine file)".replace("%", "%%")
+        parser.add_argument(option, help=text, **said)
+
+
+def overridden(machine: Machine, args: argparse.Namespace, keys: Mapping[str, str]) -> Machine:
+    """The machine with the values that were typed."""
+    typed = {key: getattr(args, option.removeprefix("--").replace("-", "_")) for option, key in keys.items()}
+    stated = {key: value for key, value in typed.items() if value is not None}
+    return machine.with_values(stated, source="options") if stated else machine
+
+
+def _facts(key: str) -> tuple[str, str, Any]:
+    """Meaning, unit and type of a key of the machine file."""
+    from shapegcode.machine import Machine
+    from shapegcode.settings.keys import facts, table_type
+
+    table: Any = Machine
+    *tables, last = key.split(".")
+    for name in tables:
+        table = table_type(table.model_fields[name])
+    field = table.model_fields[last]
+    kind = field.annotation
+    if isinstance(kind, UnionType):
+        kind = get_args(kind)[0]
+    if get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
+    return field.description or "", facts(field).get("unit", ""), kind
+
+
+def add_modes_arguments(parser: argparse.ArgumentParser, keep: str) -> None:
+    """Declare what decides over modes that were not measured on this machine."""
+    parser.add_argument(
+        keep,
+        dest="keep_modes",
+        metavar="AXES",
+        type=axes,
+        help="keep the modes of these axes, for example XY, though they were not measured here: it is the same machine",
+    )
+    parser.add_argument(
+        "--rigid",
+        metavar="AXES",
+        type=axes,
+        help="these axes have no vibration mode that counts, for example Z",
+    )
+
+
+def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], said: str) -> tuple[str, str]:
+    """What the options say, and at a terminal the answers to a question for each axis that they leave open."""
+    keep, rigid = args.keep_modes or "", args.rigid or ""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return keep, rigid
+    for axis, modes in open_modes.items():
+        if axis in keep or axis in rigid:
+            continue
+        question = f"{said} {axis.upper()} has {modes}: [k]eep, [r]igid, or leave [o]pen? "
+        print(question, end="", file=sys.stderr, flush=True)
+        answer = sys.stdin.readline().strip().lower()[:1]
+        keep += axis if answer == "k" else ""
+        rigid += axis if answer == "r" else ""
+    return keep, rigid

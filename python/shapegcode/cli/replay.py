@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from shapegcode.model.playable import PlayedPrograms
     from shapegcode.results.made import Made, MadeFile
 
-__all__ = ["changes", "played_again"]
-
 _WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement", "Simulation")
 
 
@@ -37,7 +35,7 @@ def changes(made: Made, folder: Path) -> tuple[dict[tuple[str, str], Path], list
 
 
 def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
-    from shapegcode.cli.made import MACHINES
+    from shapegcode.cli.runner import MACHINES
     from shapegcode.machine import Machine
     from shapegcode.results.made import MadeFile, file_hash
 
@@ -124,8 +122,7 @@ def _read_again(
 
 
 def _machine(args: argparse.Namespace, found: Mapping[tuple[str, str], Path]) -> Machine:
-    from shapegcode.cli.options import load_machine
-    from shapegcode.cli.overrides import overridden
+    from shapegcode.cli.options import load_machine, overridden
 
     place = found.get(("machine", str(args.machine)))
     args.machine = str(place) if place is not None else args.machine

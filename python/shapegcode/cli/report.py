@@ -11,13 +11,10 @@ if TYPE_CHECKING:
 
     from shapegcode.results.page.model import Page
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    from shapegcode.cli.console import add_json_argument
-    from shapegcode.cli.options import add_amount_arguments, add_script_argument
+    from shapegcode.cli.options import add_amount_arguments, add_json_argument, add_script_argument
 
     parser.description = (
         "Makes the page that --html writes later, from the JSON: figures from the JSON, and where the programs and the "
@@ -26,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("inputs", metavar="RESULT.json", nargs="+", help="what --json has written")
     parser.add_argument(
-        "-o", "--output", metavar="PAGE.html", default=None, help="page to write (default: RESULT.html beside the JSON)"
+        "-o", "--output", metavar="PAGE.html", help="page to write (default: RESULT.html beside the JSON)"
     )
     add_script_argument(parser)
     add_json_argument(parser)

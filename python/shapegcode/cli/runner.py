@@ -12,22 +12,20 @@ def run(args):
 from __future__ import annotations
 
 import argparse
-import contextlib
+import shlex
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import console as terminal
-from shapegcode.cli.made import given_files, made_by
 from shapegcode.io.atomic import write_bytes
 
 if TYPE_CHECKING:
-    from shapegcode.cli.gathered import Gathered
+    from shapegcode.results.made import Made, MadeFile
     from shapegcode.results.result import Result
     from shapegcode.results.table import Table
-
-__all__ = ["check_files", "finish", "progress"]
 
 # Options that name a file which a command writes.
 _WRITTEN = ("output", "json", "csv", "npz", "html")
@@ -60,11 +58,9 @@ def standard_output(args: argparse.Namespace) -> str | None:
     return "-" if "-" in [getattr(args, name, None) for name in _WRITTEN] else None
 
 
-@contextlib.contextmanager
-def progress(description: str, args: argparse.Namespace) -> Iterator[terminal.ProgressBar]:
+def progress(description: str, args: argparse.Namespace) -> AbstractContextManager[terminal.ProgressBar]:
     """A bar on standard error for the block, if that is a terminal and the work takes longer than a second."""
-    with terminal.progress(description, standard_output(args)) as bar:
-        yield bar
+    return terminal.progress(description, standard_output(args))
 
 
 def write_program(target: str | Path, content: bytes | memoryview) -> None:
@@ -133,7 +129,7 @@ def finish(
     written = [str(file) for file in (*wrote, *([output[0]] if output is not None else []))]
     step = report["next_step"] = result.next_step_after(written[0]) if written else result.next_step
     pages = _write_page(result, args, report, output, wrote)
-    several: Gathered | None = getattr(args, "several", None)
+    several = getattr(args, "several", None)
     if several is not None:
         several.add(report, output)
     else:
@@ -189,3 +185,61 @@ def _say(
     for line in last:
         # Paths and commands stay whole, so that they can be copied.
         console.print(line, markup=False, soft_wrap=True)
+
+
+READ = (
+    "input", "inputs", "files", "machine", "tool", "stock", "against", "records", "cut", "update", "dump", "base",
+)  # fmt: skip
+"""Options that name a file which a command reads."""
+
+
+MACHINES = ("machine", "base", "files")
+"""Those of them that may name a built-in machine."""
+
+
+def given_files(args: argparse.Namespace) -> Iterator[tuple[str, str]]:
+    """What was given to the options that name files to read."""
+    for role in READ:
+        value = getattr(args, role, None)
+        for entry in value if isinstance(value, list | tuple) else [value]:
+            if entry is not None:
+                yield role, str(entry)
+
+
+def made_by(
+    result: Result,
+    args: argparse.Namespace,
+    output: tuple[str | Path, bytes | memoryview] | None = None,
+    wrote: Sequence[str | Path] = (),
+) -> Made:
+    """Of what a command made its result."""
+    from shapegcode.results.made import FORMAT, Made, MadeFile, this_version
+
+    files = [_read(role, name) for role, name in given_files(args)]
+    if output is not None:
+        # Programs of one file are written together, behind the last of them.
+        alone = getattr(args, "several", None) is None
+        files.append(MadeFile.of("output" if alone else "output of all", output[0], output[1]))
+    files += [MadeFile.of("wrote", name) for name in wrote if Path(name).is_file()]
+    return Made(type(result).__name__, this_version(), FORMAT, _command(args), tuple(files))
+
+
+def _read(role: str, name: str) -> MadeFile:
+    from shapegcode.results.made import MadeFile
+
+    if role in MACHINES and not Path(name).exists():
+        from shapegcode.machine import Machine
+
+        if name in Machine.builtin_names():
+            return MadeFile.of(role, name, Machine.builtin_text(name).encode())
+    return MadeFile.of(role, name)
+
+
+def _command(args: argparse.Namespace) -> str:
+    """As it was typed; of several programs of a file the one that is done."""
+    words = list(getattr(args, "typed", ()))
+    if getattr(args, "several", None) is not None:
+        at = next((rank for rank, word in enumerate(words) if word.startswith("--program")), None)
+        if at is not None:
+            words[at : at + (1 if "=" in words[at] else 2)] = ["--program", str(args.program)]
+    return shlex.join(["shapegcode", *words]) if words else ""

@@ -15,8 +15,6 @@ from shapegcode.cli.options import add_result_arguments
 if TYPE_CHECKING:
     from shapegcode.setup.answers import Answers
 
-__all__ = ["add_arguments", "ask_all", "run"]
-
 _UNKNOWN, _BACK = "unknown", "<"
 _TITLES = {
     _UNKNOWN: "not known yet",
@@ -60,7 +58,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--answers",
         metavar="FILE",
-        default=None,
         help="answers from a file (TOML, or JSON) in place of questions; the keys are in docs/howto/setup.md",
     )
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")

@@ -9,8 +9,6 @@ from shapegcode.cli.arguments import add_alias
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import positive, ratio, seconds, share
 
-__all__ = ["add_arguments", "run"]
-
 # The registry's, whose solvers take too long to load for a help text.
 _FAMILIES = (
     "zv", "zvd", "zvdd", "mzv", "ei", "ei2", "ei3", "si", "negative-zv", "simultaneous", "minimal", "polynomial",
@@ -47,12 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="designs at continuous times, with --block-period beside those on its grid (default: without a machine)",
     )  # fmt: skip
     families = f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"
-    add("--family", metavar="NAME", action="extend", nargs="+", default=None, help=families)
+    add("--family", metavar="NAME", action="extend", nargs="+", help=families)
     add(
         "--list-families", action="store_true", help="say what each family is and where it comes from, and nothing else"
     )
     add(
-        "--max-duration", metavar="TIME", type=seconds, default=None,
+        "--max-duration", metavar="TIME", type=seconds,
         help="longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if "
         "that is not enough)",
     )  # fmt: skip
@@ -61,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="largest sum of the taps' magnitudes (default: %(default)g)",
     )  # fmt: skip
     add(
-        "--vibration-limit", metavar="RATIO", type=ratio, default=None,
+        "--vibration-limit", metavar="RATIO", type=ratio,
         help="largest share of the vibration that may be left anywhere in the bands (default: the machine's "
         "shaping.vibration_limit, else 5%%)",
     )  # fmt: skip
@@ -71,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "vibration (default: %(default)s)",
     )  # fmt: skip
     add("--negative", action="store_true", help="a design with negative taps may be recommended")
-    add("--taps", metavar="TIME:A,...", default=None, help='compare a shaper of your own: "0:.5,10.9ms:.5"')
+    add("--taps", metavar="TIME:A,...", help='compare a shaper of your own: "0:.5,10.9ms:.5"')
     add(
         "--speed", metavar="MM/S", type=positive, default=200.0,
         help="speed at which the contour cost is shown (default: %(default)g)",

@@ -7,8 +7,6 @@ import argparse
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import count, line_range
 
-__all__ = ["add_arguments", "run"]
-
 # Of the progress bar, for the regions; the rest is the motion in time, which takes most of it.
 _REGIONS_SHARE = 0.1
 
@@ -30,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--against",
         metavar="ORIGINAL",
-        default=None,
         help="measure the contour error against the path of this program, such as the original of a shaped one; "
         "without it against IN's own path",
     )
@@ -44,10 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--csv",
         metavar="FILE",
-        default=None,
         help="write the motion in time, one line per period; - for standard output",
     )
-    parser.add_argument("--npz", metavar="FILE", default=None, help="write the same columns as a NumPy archive")
+    parser.add_argument("--npz", metavar="FILE", help="write the same columns as a NumPy archive")
     parser.add_argument(
         "--every", metavar="N", type=count, default=1, help="write every N-th sample only (default: %(default)d)"
     )
@@ -55,7 +51,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--lines",
         metavar="A-B",
         type=line_range,
-        default=None,
         help="motion in time of these lines alone, as `shapegcode expand` numbers them; the program is played from its "
         "start in any case",
     )

@@ -5,21 +5,26 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
+from shapegcode.cli.options import (
+    add_cluster_arguments,
+    add_machine_argument,
+    add_plots_argument,
+    add_result_arguments,
+    cluster_of,
+    load_machine,
+)
 from shapegcode.cli.typed import count
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
     from shapegcode.studies.study_file import StudyFile
 
-__all__ = ["add_arguments", "add_study_arguments", "load", "run"]
-
 
 def add_study_arguments(parser: argparse.ArgumentParser, what: str, draws: str) -> None:
     """Declare the file of a study, the machine, the number of draws; `what` is read from it, `draws` how many."""
     parser.add_argument("input", metavar="STUDY.toml", help=what)
     add_machine_argument(parser, required=False)
-    parser.add_argument("-n", "--draws", type=count, default=None, metavar="N", help=f"{draws} (default: the file's)")
+    parser.add_argument("-n", "--draws", type=count, metavar="N", help=f"{draws} (default: the file's)")
 
 
 def load(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
@@ -46,15 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "within tolerance, quantiles, and which value decides. Exit code 1 if that is less likely than at_least."
     )
     add_study_arguments(parser, "program, machine, and what is varied", "how many draws")
-    parser.add_argument("--csv", metavar="FILE", default=None, help="write one line per draw; - for standard output")
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        default=None,
-        help="simulate on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
-    )
-    for name, what in (("ca", "the authority's certificate"), ("cert", "own certificate"), ("key", "own key")):
-        parser.add_argument(f"--tls-{name}", metavar="FILE", default="", help=f"{what}, for tls:// schedulers")
+    parser.add_argument("--csv", metavar="FILE", help="write one line per draw; - for standard output")
+    add_cluster_arguments(parser, "simulate")
     add_plots_argument(
         parser, "write what decides, and the quantiles over it, as pictures (PNG and SVG) into this folder"
     )
@@ -63,13 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the study."""
-    from shapegcode.batching.batch import Cluster
     from shapegcode.cli import runner
     from shapegcode.io.atomic import write_lines
     from shapegcode.studies.study import study
 
     file, machine = load(args)
-    cluster = None if args.scheduler is None else Cluster(args.scheduler, args.tls_ca, args.tls_cert, args.tls_key)
     options: dict[str, Any] = file.options()
     with runner.progress(f"{args.input}: converting", args) as bar:
 
@@ -77,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
             bar.update(share)
             bar.say(f"{args.input}: {stage}")
 
-        result = study(file.program, machine, **options, scheduler=cluster, on_progress=tell)
+        result = study(file.program, machine, **options, scheduler=cluster_of(args), on_progress=tell)
     if args.csv is not None:
         write_lines(args.csv, result.csv_lines())
     return runner.finish(result, args)

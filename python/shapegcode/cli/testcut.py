@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from shapegcode.testcut.design import CornerShape, CutConditions
     from shapegcode.testcut.result import CutDesign
 
-__all__ = ["add_arguments", "run"]
-
 
 def _list(text: str) -> tuple[float, ...]:
     """Numbers above 0, divided by commas."""

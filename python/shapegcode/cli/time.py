@@ -7,8 +7,6 @@ import argparse
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import override, ratio
 
-__all__ = ["add_arguments", "run"]
-
 # A table of more blocks is built only where it is written.
 _MOST_BLOCKS_SHOWN = 100_000
 
@@ -24,21 +22,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--override",
         type=override,
-        default=None,
         metavar="RATIO",
         help="feed override, for example 80%% (at most 254%%; default: times.feed_override_percent)",
     )
     parser.add_argument(
         "--rapid-override",
         type=ratio,
-        default=None,
         metavar="RATIO",
         help="rapid override, for example 25%% (at most 100%%; default: times.rapid_override_percent); the "
         "acceleration of rapids stays what it is",
     )
     parser.add_argument("--no-full", action="store_true", help="closed form only, no full interpolation")
     parser.add_argument("--blocks", action="store_true", help="put every block into the JSON")
-    parser.add_argument("--csv", metavar="FILE", default=None, help="write one line per block; - for standard output")
+    parser.add_argument("--csv", metavar="FILE", help="write one line per block; - for standard output")
     add_plots_argument(parser, "write the picture of where the time goes (PNG and SVG) into this folder")
     add_result_arguments(parser)
 

@@ -9,6 +9,7 @@ import argparse
 import math
 import re
 from collections.abc import Mapping
+from typing import NoReturn
 
 _LARGEST_OVERRIDE = 2.54
 _SIZE_UNITS = {"": 1, "k": 1024, "M": 1024**2, "G": 1024**3}
@@ -16,12 +17,14 @@ _LENGTH_UNITS = {"um": 1.0, "µm": 1.0, "mm": 1e3}
 _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
 
+def _refuse(text: str, must: str) -> NoReturn:
+    raise argparse.ArgumentTypeError(f"{text!r}: must be {must}")
+
+
 def program_number(text: str) -> int:
     """An O number with or without its letter."""
     match = re.fullmatch(r"[Oo]?0*([1-9][0-9]{0,7})", text)
-    if match is None:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a program number, O1 ... O99999999")
-    return int(match[1])
+    return int(match[1]) if match else _refuse(text, "a program number, O1 ... O99999999")
 
 
 def program_choice(text: str) -> int | str:
@@ -30,17 +33,15 @@ def program_choice(text: str) -> int | str:
         return text
     try:
         return program_number(text)
-    except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(
-            f"{text!r}: must be a program number, O1 ... O99999999, /FOLDER/O1, <NAME>, #3 for the third one, or all"
-        ) from None
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{error}, /FOLDER/O1, <NAME>, #3 for the third one, or all") from None
 
 
 def axes(text: str) -> str:
     """Axes such as ``XZ``, ``x,z`` or ``"x z"``."""
     letters = set(re.sub(r"[\s,]+", "", text.lower()))
     if not letters or letters - set("xyz"):
-        raise argparse.ArgumentTypeError(f"{text!r}: must be axes, for example X or XZ")
+        _refuse(text, "axes, for example X or XZ")
     return "".join(sorted(letters))
 
 
@@ -48,9 +49,7 @@ def line_range(text: str) -> tuple[int, int]:
     """Lines such as ``120-180`` or ``120``, first and last, from 1."""
     match = re.fullmatch(r"0*([1-9][0-9]{0,9})(?:-0*([1-9][0-9]{0,9}))?", text)
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
-    if first > last:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be lines, first to last, for example 120-180")
-    return first, last
+    return (first, last) if first <= last else _refuse(text, "lines, first to last, for example 120-180")
 
 
 def line_ranges(text: str) -> tuple[tuple[int, int], ...]:
@@ -61,33 +60,27 @@ def line_ranges(text: str) -> tuple[tuple[int, int], ...]:
 def count(text: str) -> int:
     """A whole number, 1 or more."""
     match = re.fullmatch(r"0*([1-9][0-9]{0,11})", text)
-    if match is None:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 1 or more")
-    return int(match[1])
+    return int(match[1]) if match else _refuse(text, "a whole number, 1 or more")
+
+
+def _share(text: str) -> float:
+    return number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
 
 
 def ratio(text: str) -> float:
     """A share such as ``60%`` or ``0.6``, above 0 and at most 1."""
-    value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
-    if not 0.0 < value <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most 100%")
-    return value
+    return value if 0.0 < (value := _share(text)) <= 1.0 else _refuse(text, "above 0 and at most 100%")
 
 
 def share(text: str) -> float:
     """A share such as ``3%`` or ``0.03``, at least 0 and below 1."""
-    value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
-    if not 0.0 <= value < 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be at least 0 and below 100%")
-    return value
+    return value if 0.0 <= (value := _share(text)) < 1.0 else _refuse(text, "at least 0 and below 100%")
 
 
 def override(text: str) -> float:
     """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
-    value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
-    if not 0.0 < value <= _LARGEST_OVERRIDE:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most {_LARGEST_OVERRIDE:.0%}")
-    return value
+    most = _LARGEST_OVERRIDE
+    return value if 0.0 < (value := _share(text)) <= most else _refuse(text, f"above 0 and at most {most:.0%}")
 
 
 def seconds(text: str) -> float:
@@ -102,14 +95,11 @@ def start_time(text: str) -> float:
 
 def frequency_band(text: str) -> tuple[float, float]:
     """Two frequencies in Hz such as ``20:400``, ascending."""
-    low, _, high = text.partition(":")
     try:
-        band = float(low), float(high)
+        low, high = map(float, text.split(":"))
     except ValueError:
-        band = math.nan, math.nan
-    if not 0.0 <= band[0] < band[1] < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be two frequencies in Hz, for example 20:400")
-    return band
+        low, high = math.nan, math.nan
+    return (low, high) if 0.0 <= low < high < math.inf else _refuse(text, "two frequencies in Hz, for example 20:400")
 
 
 def micrometres(text: str) -> float:
@@ -124,37 +114,26 @@ def _with_unit(text: str, what: str, units: Mapping[str, float], example: str) -
         value = float(match[1]) * units[match[2]] if match else 0.0
     except ValueError:
         value = 0.0
-    if not (math.isfinite(value) and value > 0.0):
-        typed = ", ".join(unit for unit in units if unit.isascii())
-        raise argparse.ArgumentTypeError(
-            f"{text!r}: must be a {what} above 0 with its unit ({typed}), for example {example}"
-        )
-    return value
+    typed = ", ".join(unit for unit in units if unit.isascii())
+    good = math.isfinite(value) and value > 0.0
+    return value if good else _refuse(text, f"a {what} above 0 with its unit ({typed}), for example {example}")
 
 
 def size(text: str) -> int:
     """A number of bytes such as ``262144``, ``256k``, ``1M`` or ``2G`` (1024 bytes, 1024 k, 1024 M), above 0."""
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([kMG]?)", text)
     value = math.floor(float(match[1]) * _SIZE_UNITS[match[2]]) if match else 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a number of bytes above 0, for example 65536, 64k or 1M")
-    return value
+    return value if value >= 1 else _refuse(text, "a number of bytes above 0, for example 65536, 64k or 1M")
 
 
 def positive(text: str) -> float:
     """A number above 0."""
-    value = number(text)
-    if not (math.isfinite(value) and value > 0.0):
-        raise argparse.ArgumentTypeError(f"{text!r}: must be above 0")
-    return value
+    return value if math.isfinite(value := number(text)) and value > 0.0 else _refuse(text, "above 0")
 
 
 def nonzero(text: str) -> float:
     """A number other than 0."""
-    value = number(text)
-    if not math.isfinite(value) or value == 0.0:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a number other than 0")
-    return value
+    return value if math.isfinite(value := number(text)) and value != 0.0 else _refuse(text, "a number other than 0")
 
 
 def number(text: str) -> float:

@@ -20,8 +20,7 @@ from shapegcode.model.stream import Chunk, stream
 from shapegcode.program import Program
 from shapegcode.program.pairing import paired_regions
 from shapegcode.results.page.scene import ModeLine, Scene, SceneSpectrum, Variant
-from shapegcode.results.page.spectrum import AccelerationSpectrum
-from shapegcode.results.page.thinning import PIXELS_HIGH, PIXELS_WIDE, Kept, Thinner
+from shapegcode.results.page.thinning import PIXELS_HIGH, PIXELS_WIDE, AccelerationSpectrum, Kept, Thinner
 
 MOST_POINTS = 60_000
 """Samples of a program that a page shows, at most."""

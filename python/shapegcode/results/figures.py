@@ -36,17 +36,11 @@ class Tracks(Generic[T]):
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far a track leaves the programmed path.
+    """How far a track leaves the programmed path."""
 
-    Attributes:
-        largest_mm: distance, either side; corners that the track cuts short count too.
-        left_mm: to the left of the travel, or above.
-        right_mm: to the right of it, or below.
-    """
-
-    largest_mm: float
-    left_mm: float
-    right_mm: float
+    largest_mm: float  # distance, either side; corners that the track cuts short count too
+    left_mm: float  # to the left of the travel, or above
+    right_mm: float  # to the right of it, or below
 
     @classmethod
     def of(cls, stats: Iterable[_core.DeviationStats]) -> Deviation:

@@ -23,8 +23,6 @@ import numpy as np
 
 from shapegcode.results.made import Made
 
-__all__ = ["Streamed", "exact", "hidden", "plain", "schema", "sparse", "to_text"]
-
 _DIGITS = 9
 _NOTHING = 1e-9  # of a unit in which nobody measures so little
 _COARSE_UNITS = ("_um", "_mm", "_s", "_percent")

@@ -8,8 +8,6 @@ from pathlib import Path
 
 from shapegcode.io.data_file import open_file
 
-__all__ = ["FORMAT", "Made", "MadeFile", "file_hash", "this_version"]
-
 FORMAT = 1
 """Of the JSON of results: raised where an older file can no longer be read."""
 

@@ -9,23 +9,18 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.results.follow import COARSE_STEP_RAD, follow, piece_of, polyline_of
-from shapegcode.results.motion_plots import View, plot_feed, plot_vibration
-from shapegcode.results.path_plots import Plane, plot_path
+from shapegcode.results.motion_plots import Trace, View, plot_feed, plot_vibration
+from shapegcode.results.path_plots import COARSE_STEP_RAD, Plane, follow, piece_of, plot_path, polyline_of
 from shapegcode.results.result import Plot
-from shapegcode.results.trace import Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["RECORD_SAMPLES", "PlayedRegion", "motion_pictures"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -41,17 +36,11 @@ _BEFORE_STOP_S = 2.0
 
 @dataclass(frozen=True, eq=False)
 class PlayedRegion:
-    """What the pictures of a region draw.
+    """What the pictures of a region draw."""
 
-    Attributes:
-        traces: one or more, for example of the original and of the emitted program.
-        path: as programmed.
-        part: which part of the program it is, for titles; empty where it is all of it.
-    """
-
-    traces: tuple[Trace, ...]
-    path: _core.Path
-    part: str = ""
+    traces: tuple[Trace, ...]  # one or more, for example of the original and of the emitted program
+    path: _core.Path  # as programmed
+    part: str = ""  # which part of the program it is, for titles; empty where it is all of it
 
     @classmethod
     def of_runs(
@@ -86,44 +75,32 @@ def _trace(label: str, run: _core.PlaybackFigures, period_s: float) -> Trace:
 
 def motion_pictures(played: Callable[[], PlayedRegion]) -> dict[str, Plot]:
     """Path, feed and vibration of a region, by name."""
-    once = functools.cache(lambda: _Scene.of(played()))
-    return {"path": partial(_path, once), "feed": partial(_feed, once), "vibration": partial(_vibration, once)}
+    scene = functools.cache(lambda: _Scene.of(played()))
 
+    def path(ax: Axes | None = None) -> Axes:
+        s = scene()
+        plane = _widest_plane(s.programmed_mm)
+        return plot_path(s.programmed_mm, s.near, ax, plane=plane, part=s.near_part, whole_mm=s.whole_mm)
 
-def _path(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
-    s = scene()
-    return plot_path(
-        s.programmed_mm, s.near, ax, plane=_widest_plane(s.programmed_mm), part=s.near_part, whole_mm=s.whole_mm
-    )
+    def feed(ax: Axes | None = None) -> Axes:
+        return plot_feed(scene().views, ax, part=scene().part)
 
+    def vibration(ax: Axes | None = None) -> Axes:
+        return plot_vibration(scene().views, ax, part=scene().part)
 
-def _feed(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
-    return plot_feed(scene().views, ax, part=scene().part)
-
-
-def _vibration(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
-    return plot_vibration(scene().views, ax, part=scene().part)
+    return {"path": path, "feed": feed, "vibration": vibration}
 
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """What of a region is drawn.
+    """What of a region is drawn."""
 
-    Attributes:
-        views: stretches of time: the whole, or the worst place and the stop.
-        part: which part of the program they are of.
-        near: the traces, or of a long region their stretches around the worst place.
-        near_part: which part of the program these are of.
-        programmed_mm: the path beside them, (m, 3).
-        whole_mm: the whole path where that is a piece of it, (k, 3).
-    """
-
-    views: tuple[View, ...]
-    part: str
-    near: tuple[Trace, ...]
-    near_part: str
-    programmed_mm: FloatArray
-    whole_mm: FloatArray | None = None
+    views: tuple[View, ...]  # stretches of time: the whole, or the worst place and the stop
+    part: str  # which part of the program they are of
+    near: tuple[Trace, ...]  # the traces, or of a long region their stretches around the worst place
+    near_part: str  # which part of the program these are of
+    programmed_mm: FloatArray  # the path beside them, (m, 3)
+    whole_mm: FloatArray | None = None  # the whole path where that is a piece of it, (k, 3)
 
     @classmethod
     def of(cls, played: PlayedRegion) -> _Scene:
@@ -145,17 +122,11 @@ class _Scene:
 
 @dataclass(frozen=True, eq=False)
 class _Worst:
-    """The neighbourhood of the place where the first trace is furthest from the path.
+    """The neighbourhood of the place where the first trace is furthest from the path."""
 
-    Attributes:
-        traces: the stretches of all traces that pass it; each is there at time 0.
-        piece: of the programmed path, (m, 3), mm.
-        time_s: instant of the first trace.
-    """
-
-    traces: tuple[Trace, ...]
-    piece: FloatArray
-    time_s: float
+    traces: tuple[Trace, ...]  # the stretches of all traces that pass it; each is there at time 0
+    piece: FloatArray  # of the programmed path, (m, 3), mm
+    time_s: float  # instant of the first trace
 
 
 def _worst_place(traces: tuple[Trace, ...], programmed: FloatArray, path: _core.Path) -> _Worst:

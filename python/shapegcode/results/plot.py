@@ -23,23 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "COLOURS",
-    "FORMATS",
-    "GREY",
-    "aligned",
-    "axes",
-    "figure",
-    "grid",
-    "heading",
-    "legend_above",
-    "legend_below",
-    "number",
-    "save",
-    "save_all",
-    "svg_text",
-]
-
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 GREY = "#8a8a8a"
 FORMATS = (".png", ".svg")

@@ -28,41 +28,6 @@ from shapegcode.results.made import FORMAT, Made
 from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.result import Result
 
-__all__ = ["MODULES", "NotKept", "load_result", "made_of", "revived", "written_reports"]
-
-MODULES: Mapping[str, str] = {
-    "Batch": "batching.result",
-    "Characterisation": "characterization.result",
-    "CharacterisationTests": "characterization.result",
-    "Check": "checking.result",
-    "Conversion": "conversion.result",
-    "Comparison": "comparison.result",
-    "CornerResult": "testcut.result",
-    "CutDesign": "testcut.result",
-    "CycleTime": "timing.result",
-    "Expansion": "program.result",
-    "FeedSchedule": "feed.result",
-    "Identification": "identification.result",
-    "IntervalResult": "testcut.result",
-    "LearnedClock": "timing.calibration.result",
-    "MachineDifference": "machine.difference_result",
-    "MachineSetup": "setup.result",
-    "MachineDescription": "machine.description_result",
-    "MachineStudy": "studies.result",
-    "Measurement": "metrology.result",
-    "Optimum": "studies.optimum_result",
-    "ParameterImport": "machine.result",
-    "PathDemo": "demos.path",
-    "Recommendation": "shaping.result",
-    "Reports": "results.report_result",
-    "ScheduledConversion": "conversion.scheduled",
-    "ServoFit": "identification.servo.result",
-    "Simulation": "simulation.result",
-    "TapPlan": "identification.plan_result",
-    "TaperResult": "testcut.result",
-}
-"""Where each class of results is, below the package; a test holds it against the classes that there are."""
-
 
 class NotKept:
     """Stands for what the JSON does not hold."""
@@ -152,9 +117,10 @@ def made_of(report: Mapping[str, Any]) -> Made:
 def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingProxyType({})) -> Result:
     """A result from its JSON."""
     made = made_of(report)
-    if made.result not in MODULES:
+    package = importlib.import_module("shapegcode")  # every kind of result is public
+    cls = getattr(package, made.result) if made.result in package.__all__ else None
+    if not (isinstance(cls, type) and issubclass(cls, Result)):
         raise ArgumentError(f"made.result = {made.result}: not a result that this version knows")
-    cls: type[Result] = getattr(importlib.import_module(f"shapegcode.{MODULES[made.result]}"), made.result)
     beside = {*cls.json_extra, "made", "plots", "output", "program_address"}
     names = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     known = names | beside

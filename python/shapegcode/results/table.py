@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
     from rich.table import Table as RichTable
 
-__all__ = ["NO_BREAK", "Column", "Table", "share_percent", "warning_table", "xyz_columns"]
-
 NO_BREAK = "\N{NO-BREAK SPACE}"
 """Holds the words of a cell on one line."""
 _NARROWEST = 12

@@ -16,8 +16,6 @@ import numpy as np
 
 from shapegcode import _core
 
-__all__ = ["CoreFigures", "NotKeptError", "same_fields"]
-
 
 class NotKeptError(_core.ArgumentError):
     """Something was asked of a result that was read back, from its JSON or a pickle, which does not hold it."""

@@ -13,8 +13,6 @@ import numpy.typing as npt
 from shapegcode.errors import ArgumentError
 from shapegcode.settings.keys import toml
 
-__all__ = ["Distribution", "Listed", "Lognormal", "Normal", "Uniform", "listed", "lognormal", "normal", "uniform"]
-
 Unit = npt.NDArray[np.float64]
 
 

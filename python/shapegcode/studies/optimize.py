@@ -8,28 +8,27 @@ conversions that take a tenth of a second each.
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, DesignError, MachineError
 from shapegcode.machine import Machine
 from shapegcode.machine.output import ANY_PRICE
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
-from shapegcode.studies.choices import Choices, Ranks, checked_choices, search, usual_choices
+from shapegcode.studies.distributions import listed
 from shapegcode.studies.optimum_result import Candidate, ChosenValue, Optimum
-from shapegcode.studies.play import DrawsJob, play_all
-from shapegcode.studies.replay import SHARE, Replay
-from shapegcode.studies.sampling import MOST_DRAWS, Columns, drawn
+from shapegcode.studies.replay import SHARE, DrawsJob, Replay, play_all
 from shapegcode.studies.study import check_ends
 from shapegcode.studies.summary import check_probability, within
-from shapegcode.studies.varied import Vary, drawn_machine, varied_values
-
-__all__ = ["USUAL_CONVERSIONS", "USUAL_DRAWS", "optimize"]
+from shapegcode.studies.varied import MOST_DRAWS, Columns, Vary, check_keys, drawn, drawn_machine, varied_values
 
 USUAL_DRAWS = 256
 """Machines on which a choice is played, if nothing else is said."""
@@ -63,7 +62,7 @@ def optimize(
         program: what is converted, or its file.
         machine: as its file has it; its tolerances are those that count, whatever tolerance is aimed at.
         vary: what the machine that plays may differ in, as for `study`.
-        choose: values to choose from, by key; None: see `shapegcode.studies.choices.usual_choices`.
+        choose: values to choose from, by key; None: see `shapegcode.studies.optimize.usual_choices`.
         probability: of staying within tolerance.
         n: machines on which a choice is played; four times as many fresh ones confirm it.
         most: conversions at most.
@@ -185,16 +184,14 @@ class _Choosing:
         share = self._share(self._replays[ranks], 0)
         return found.time_s if share >= self._probability else _UNLIKELY_S * (1.0 + self._probability - share)
 
-    def _is_good(self, found: Candidate) -> bool:
-        return found.checked is not None and found.checked >= self._probability
-
     def best(self) -> Candidate | None:
         """The shortest that is likely enough; of the others only those are played that are shorter."""
         order = sorted(
             (ranks for ranks, each in self.candidates.items() if each.time_s is not None),
             key=lambda ranks: (self.candidates[ranks].time_s, ranks),
         )
-        return next((found for ranks in order if self._is_good(found := self.played(ranks))), None)
+        candidates = map(self.played, order)
+        return next((each for each in candidates if (each.checked or 0.0) >= self._probability), None)
 
     def as_it_is(self) -> Candidate | None:
         """The machine file without a choice."""
@@ -203,3 +200,78 @@ class _Choosing:
         except (ArgumentError, DesignError):
             return None
         return Candidate((), replay.time_s, self._share(replay, 0), self._share(replay, 1))
+
+
+Choices = Mapping[str, Sequence[object]]
+"""Values to choose from, by key of the machine file."""
+Ranks = tuple[int, ...]
+
+_FAMILIES = ("auto", "zv", "mzv", "zvd", "ei", "ei2")
+_SHARES = (1.0, 0.75, 0.5)
+_ARC_FEEDS = (1.0, 0.9, 0.8)
+_POPULATION = 12
+_WHOLE = 1e-6
+
+
+def usual_choices(machine: Machine) -> dict[str, tuple[object, ...]]:
+    """Block period, family, tolerance that is aimed at, and feed on arcs."""
+    controller = machine.controller
+    least = max(1, math.ceil(controller.block_time_s / controller.interpolation_period_s - _WHOLE))
+    ticks = sorted({least, least + 1, least + 2, math.ceil(1.5 * least), 2 * least})
+    return {
+        "emission.block_period_s": tuple(round(each * controller.interpolation_period_s, 12) for each in ticks),
+        "shaping.family": _FAMILIES,
+        "tolerance.contour_um": tuple(share * machine.tolerance.contour_um for share in _SHARES),
+        "shaping.arc_feed_ratio": _ARC_FEEDS,
+    }
+
+
+def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
+    """The choices, if they are such."""
+    if not choices:
+        raise ArgumentError("choose: nothing to choose: give a list of values for one key or more")
+    check_keys("choose", choices)
+    checked = {}
+    for key, values in choices.items():
+        try:
+            checked[key] = listed(values).values
+        except ArgumentError:
+            raise ArgumentError(f"choose: {key} = {values!r}: must be a list of one value or more") from None
+        if key in varied:
+            raise ArgumentError(f"choose: {key}: it is drawn (vary): a value is either drawn or chosen")
+    return checked
+
+
+def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float]) -> Iterator[Ranks]:
+    """Combinations worth a conversion: all of them, or as many as differential evolution gets to."""
+    sizes = [len(values) for values in choices.values()]
+    if math.prod(sizes) <= most:
+        yield from itertools.product(*(range(size) for size in sizes))
+        return
+    yield from _evolved(sizes, most, seed, cost)
+
+
+class _EnoughError(Exception):
+    """As many were tried as may be."""
+
+
+def _evolved(sizes: Sequence[int], most: int, seed: int, cost: Callable[[Ranks], float]) -> Iterator[Ranks]:
+    from scipy.optimize import Bounds, differential_evolution
+
+    known: dict[Ranks, float] = {}
+
+    def asked(point: npt.NDArray[np.float64]) -> float:
+        ranks = tuple(round(each) for each in point)
+        if ranks not in known:
+            if len(known) >= most:
+                raise _EnoughError
+            known[ranks] = cost(ranks)
+        return known[ranks]
+
+    bounds = Bounds(np.zeros(len(sizes)), np.array(sizes) - 1.0)
+    with contextlib.suppress(_EnoughError):
+        differential_evolution(
+            asked, bounds, integrality=np.ones(len(sizes), dtype=bool), popsize=_POPULATION, maxiter=most, tol=0.0,
+            polish=False, rng=np.random.default_rng(seed), x0=np.zeros(len(sizes)),
+        )  # fmt: skip
+    yield from known

@@ -12,8 +12,6 @@ from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
 
-__all__ = ["Candidate", "ChosenValue", "Optimum"]
-
 _SHOWN = 12
 
 

@@ -18,8 +18,6 @@ from shapegcode.studies.result import Bins, MachineStudy
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_bands", "plot_choices", "plot_tornado", "plots_of"]
-
 _BARS = 12
 _PANELS = 3
 

@@ -1,8 +1,10 @@
-"""A converted text played on other machines: converted once, played as often as one likes."""
+"""A converted text simulated on other machines: converted once, simulated as often as one likes, on all processors."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import functools
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,10 +18,10 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
 from shapegcode.results.figures import Deviation
+from shapegcode.studies.varied import drawn_machine
+from shapegcode.verdict.ahead import cores
 from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures
-
-__all__ = ["CONTOURS", "DEFAULT_MEASURES", "MEASURES", "SHARE", "Replay", "checked_measures"]
 
 SHARE = "share_of_limit"
 MEASURES: Mapping[str, str] = {
@@ -62,19 +64,6 @@ class _PlayedPart:
     blocks: _core.Path
     tracker: _core.ContourTracker
     limits: RegionLimits
-
-
-@dataclass(frozen=True)
-class PackedText:
-    """A replay as bytes and numbers, for another process."""
-
-    machine: str
-    source: str
-    original: bytes
-    emitted: bytes
-    places: tuple[tuple[int, int, int], ...]
-    limits: tuple[tuple[tuple[float, ...], float, str], ...]
-    time_s: float
 
 
 class Replay:
@@ -139,29 +128,12 @@ class Replay:
         places = [(ranks[id(place.region)], place.first_line, place.last_line) for place in found.placed]
         return cls(machine, original, found.emitted, places, limits, found.cycle_time_s.emitted)
 
-    def packed(self) -> PackedText:
-        """The same as bytes and numbers, without anything that only this process has."""
-        return PackedText(
-            self.machine.to_toml(short=True), self._original.source, self._original.expanded_text,
-            self._emitted.text, self._places,
-            tuple((tuple(part.limits.residual_um.tolist()), part.limits.contour_um, part.limits.target)
-                  for part in self._parts),
-            self.time_s,
-        )  # fmt: skip
-
-    @classmethod
-    def unpacked(cls, packed: PackedText) -> Replay:
-        """A replay that was packed."""
-        machine = Machine.from_toml(packed.machine)
-        limits: list[Any] = [
-            RegionLimits(np.array(residual), contour, target)  # type: ignore[arg-type]
-            for residual, contour, target in packed.limits
-        ]
-        return cls(
-            machine, Program.from_text(packed.original, machine, source=packed.source),
-            Program.from_text(packed.emitted, machine, source=packed.source, emitted=True),
-            packed.places, limits, packed.time_s,
-        )  # fmt: skip
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As bytes and numbers, for another process."""
+        limits = [part.limits for part in self._parts]
+        numbers = tuple((tuple(each.residual_um.tolist()), each.contour_um, each.target) for each in limits)
+        texts = self._original.source, self._original.expanded_text, self._emitted.text
+        return _replay, (self.machine.to_toml(short=True), *texts, self._places, numbers, self.time_s)
 
     @property
     def contour_limit_um(self) -> float:
@@ -224,3 +196,76 @@ class Replay:
             measured["original_residual_um"] = float(was.residual_mm.max()) * 1e3
             measured["original_contour_um"] = was.response.max_abs_mm * 1e3
         return {name: value for name, value in measured.items() if name in wanted}
+
+
+OVERRIDE = "times.feed_override_percent"
+"""Where it is varied, the blocks are played at it."""
+
+_AT_ONCE = 64  # draws of a task at most: long enough to be worth one
+_PLAYED_S = 900.0  # of motion in a task: short enough to tell how far it is, and to be stopped
+_KEPT_TEXTS = 4
+
+
+@dataclass(frozen=True)
+class DrawsJob:
+    """Some draws of one text."""
+
+    name: str  # of the machine, in messages
+    rows: tuple[Mapping[str, object], ...]  # values of the machine that plays, by key, a row for each draw
+    draws: tuple[int, ...]  # their numbers
+    wanted: tuple[str, ...]  # what is measured
+    times: bool  # see `Replay.play`
+
+    def play(self, replay: Replay) -> list[list[float]]:
+        """Play them."""
+        found = []
+        for row, draw in zip(self.rows, self.draws, strict=True):
+            machine = drawn_machine(replay.machine, row, f"{self.name}, draw {draw}")
+            override = machine.times.feed_override_percent / 100.0 if OVERRIDE in row else 1.0
+            measured = replay.play(machine, self.wanted, override=override, times=self.times)
+            found.append([measured[name] for name in self.wanted])
+        return found
+
+    def parts(self, motion_s: float) -> Iterator[DrawsJob]:
+        """The same in tasks."""
+        size = max(1, min(_AT_ONCE, int(_PLAYED_S / max(motion_s, 1e-3))))
+        for at in range(0, len(self.rows), size):
+            rows, draws = self.rows[at : at + size], self.draws[at : at + size]
+            yield DrawsJob(self.name, rows, draws, self.wanted, self.times)
+
+
+def play_all(
+    replay: Replay, job: DrawsJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
+) -> list[list[float]]:
+    """Play the draws of one text."""
+    parts = list(job.parts(replay.time_s))
+    found: list[list[float]] = []
+    threads = ThreadPoolExecutor(cores())
+    running = [(pool or threads).submit(part.play, replay) for part in parts]
+    try:
+        for future, part in zip(running, parts, strict=True):
+            found += future.result()
+            on_done(len(part.rows))
+    finally:
+        for future in running:
+            future.cancel()
+        threads.shutdown()
+    return found
+
+
+@functools.lru_cache(maxsize=_KEPT_TEXTS)
+def _replay(
+    toml: str,
+    source: str,
+    original: bytes,
+    emitted: bytes,
+    places: tuple[tuple[int, int, int], ...],
+    limits: tuple[tuple[tuple[float, ...], float, Any], ...],
+    time_s: float,
+) -> Replay:
+    """A replay that was pickled: on a worker a text is read once for all its draws."""
+    machine = Machine.from_toml(toml)
+    read = Program.from_text(original, machine, source=source)
+    shaped = Program.from_text(emitted, machine, source=source, emitted=True)
+    judged = [RegionLimits(np.array(residual), contour, target) for residual, contour, target in limits]
+    return Replay(machine, read, shaped, places, judged, time_s)

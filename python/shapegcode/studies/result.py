@@ -19,8 +19,6 @@ from shapegcode.results.table import Column, Table
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["BinQuantiles", "Bins", "Decides", "MachineStudy", "Quantity", "RefusedDraws", "VariedKey"]
-
 _PERCENT = (5, 25, 50, 75, 95, 99)
 _UNITS = {"_um": "µm", "_s": "s"}
 

@@ -3,31 +3,24 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from shapegcode.batching.batch import Cluster
-from shapegcode.batching.cluster import cluster_executor
+from shapegcode.batching.cluster import Cluster, cluster_executor
 from shapegcode.errors import ArgumentError, DesignError, MachineError
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
 from shapegcode.studies.distributions import Listed
-from shapegcode.studies.play import DrawsJob, play_all
-from shapegcode.studies.replay import CONTOURS, DEFAULT_MEASURES, SHARE, Replay, checked_measures
+from shapegcode.studies.replay import CONTOURS, DEFAULT_MEASURES, SHARE, DrawsJob, Replay, checked_measures, play_all
 from shapegcode.studies.result import Bins, MachineStudy, RefusedDraws, VariedKey
-from shapegcode.studies.sampling import Columns, drawn
 from shapegcode.studies.summary import bins_of, check_probability, decides, interval_of, quantity, within
-from shapegcode.studies.varied import Varied, Vary, drawn_machine, varied_values
+from shapegcode.studies.varied import Columns, Varied, Vary, drawn, drawn_machine, varied_values
 from shapegcode.verdict.ahead import cores
-
-__all__ = ["check_ends", "study"]
 
 Progress = Callable[[str, float], None]
 
@@ -86,7 +79,9 @@ def study(
     if isinstance(program, Program):
         program.require_machine(machine)
     source = str(program) if isinstance(program, Path) else program
-    with _pool(scheduler) as pool:
+    cluster = Cluster(scheduler) if isinstance(scheduler, str) else scheduler
+    with contextlib.ExitStack() as stack:
+        pool = None if cluster is None else stack.enter_context(cluster_executor(cluster, cores()))[0]
         run = _StudyRun(source, machine, varied, columns, wanted, pool, shape_all, on_progress)
         texts = run.play()
     return _result(run, texts, sampling, seed, at_least, indices=indices)
@@ -103,22 +98,6 @@ def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> 
         for index in ends:
             row = {one.key: values[index] for one, values in zip(varied, columns, strict=True)}
             drawn_machine(machine, row, f"{machine.name}, draw {index + 1}")
-
-
-@contextlib.contextmanager
-def _pool(scheduler: Cluster | str | None) -> Iterator[Executor | None]:
-    if scheduler is None:
-        yield None
-        return
-    where = Cluster(scheduler) if isinstance(scheduler, str) else scheduler
-    with cluster_executor(
-        where.scheduler,
-        processes=cores(),
-        tls_ca=where.tls_ca,
-        tls_cert=where.tls_cert,
-        tls_key=where.tls_key,
-    ) as (pool, _):
-        yield pool
 
 
 @dataclass(frozen=True)
@@ -255,9 +234,5 @@ def _result(
             "residual_um": min(replay.residual_limit_um for replay in replays),
             "contour_um": min(replay.contour_limit_um for replay in replays),
         },
-        draws={**_arrays(run.varied, columns), **measured},
+        draws={each.key: np.array(column) for each, column in zip(run.varied, columns, strict=True)} | measured,
     )
-
-
-def _arrays(varied: Sequence[Varied], columns: Columns) -> dict[str, npt.NDArray[Any]]:
-    return {each.key: np.array(column) for each, column in zip(varied, columns, strict=True)}

@@ -42,9 +42,7 @@ from shapegcode.settings.schema import keys_schema, toml_schema
 from shapegcode.studies.distributions import Distribution, listed, lognormal, normal, uniform
 from shapegcode.studies.optimize import USUAL_CONVERSIONS, USUAL_DRAWS
 from shapegcode.studies.replay import DEFAULT_MEASURES, MEASURES
-from shapegcode.studies.sampling import MOST_DRAWS
-
-__all__ = ["DrawnValue", "StudyFile", "StudyFileError", "load_study", "study_schema"]
+from shapegcode.studies.varied import MOST_DRAWS
 
 _KINDS = (("mean", "sd"), ("mean", "percent"), ("median", "percent"), ("low", "high"), ("one_of",))
 _GIVE = "give mean and sd (or percent), median and percent, low and high, or one_of"

@@ -13,10 +13,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.studies.distributions import Listed
 from shapegcode.studies.replay import SHARE
 from shapegcode.studies.result import BinQuantiles, Decides, Quantity
-from shapegcode.studies.sampling import index_problem
-from shapegcode.studies.varied import Varied
-
-__all__ = ["PERCENT", "bins_of", "check_probability", "decides", "interval_of", "quantity"]
+from shapegcode.studies.varied import Varied, index_problem
 
 FloatArray = npt.NDArray[np.float64]
 

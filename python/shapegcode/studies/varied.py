@@ -6,10 +6,13 @@ times. A value that only the converter reads, such as `shaping.family`, needs an
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +20,7 @@ import numpy.typing as npt
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine import Machine
 from shapegcode.settings.change import missing_row
-from shapegcode.studies.distributions import Distribution, listed
-
-__all__ = ["Varied", "Vary", "check_keys", "drawn_machine", "varied_values"]
+from shapegcode.studies.distributions import Distribution, Listed, listed
 
 Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]
 """What each key is drawn from."""
@@ -40,21 +41,13 @@ _TICK = "controller.interpolation_period_s"
 
 @dataclass(frozen=True)
 class Varied:
-    """A key of the machine file and what its values are drawn from.
+    """A key of the machine file and what its values are drawn from."""
 
-    Attributes:
-        key: dotted name.
-        distribution: of the values.
-        known: the converter knows each value; else only the machine that plays the text has it.
-        value: what the file says, as TOML.
-        unit: of the values.
-    """
-
-    key: str
-    distribution: Distribution
-    known: bool
-    value: str
-    unit: str
+    key: str  # dotted name
+    distribution: Distribution  # of the values
+    known: bool  # the converter knows each value; else only the machine that plays the text has it
+    value: str  # what the file says, as TOML
+    unit: str  # of the values
 
     @property
     def changes_times(self) -> bool:
@@ -100,3 +93,71 @@ def drawn_machine(machine: Machine, values: Mapping[str, object], source: str) -
     # A control that ticks otherwise plays the same blocks; whether their period is a multiple is the converter's care.
     freed = {"emission.block_period_s": None} if _TICK in values and "emission.block_period_s" not in values else {}
     return machine.with_values({**freed, **values}, source=source)
+
+
+Sampling = Literal["sobol", "lhs", "grid"]
+SAMPLINGS: tuple[Sampling, ...] = ("sobol", "lhs", "grid")
+
+MOST_DRAWS = 1_000_000
+"""Of a study: further ones say nothing more, and fill the memory."""
+
+Columns = list[list[object]]
+
+
+def drawn(varied: Sequence[Varied], n: int, sampling: str, seed: int, *, indices: bool) -> Columns:
+    """The values of all draws."""
+    if sampling not in SAMPLINGS:
+        raise ArgumentError(f"sampling = {sampling!r}: must be one of {', '.join(SAMPLINGS)}")
+    if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_DRAWS:
+        raise ArgumentError(f"n = {n!r}: must be a whole number of draws, 1 or more and at most {MOST_DRAWS}")
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise ArgumentError(f"seed = {seed!r}: must be a whole number, 0 or more")
+    if indices and sampling != "sobol":
+        raise ArgumentError(f'indices: need sampling = "sobol", not {sampling!r}')
+    if sampling == "grid":
+        return _grid(varied, n)
+    shares = _saltelli(varied, n, seed) if indices else _sequence(len(varied), n, sampling, seed)
+    return [each.distribution.at(column) for each, column in zip(varied, shares.T, strict=True)]
+
+
+def _sequence(dimensions: int, n: int, sampling: str, seed: int) -> npt.NDArray[np.float64]:
+    from scipy.stats import qmc
+
+    if sampling == "lhs":
+        return np.asarray(qmc.LatinHypercube(dimensions, rng=np.random.default_rng(seed)).random(n))
+    # The beginning of a sequence of a power of two, which is what SciPy asks for.
+    power = math.ceil(math.log2(n)) if n > 1 else 0
+    return np.asarray(qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(power))[:n]
+
+
+def _grid(varied: Sequence[Varied], n: int) -> Columns:
+    listed = math.prod(len(each.distribution.values) for each in varied if isinstance(each.distribution, Listed))
+    free = sum(not isinstance(each.distribution, Listed) for each in varied)
+    if listed > n:
+        raise ArgumentError(f"n = {n}: the lists alone have {listed} combinations: give n = {listed} or more")
+    # The root by counting: floating point would make 2 of the cube root of 27.
+    level = 1
+    while free and listed * (level + 1) ** free <= n:
+        level += 1
+    rows = itertools.product(*(each.distribution.levels(level) for each in varied))
+    return [list(column) for column in zip(*rows, strict=True)]
+
+
+def index_problem(varied: Sequence[Varied]) -> dict[str, Any]:
+    """What SALib calls a problem: the unit cube."""
+    count = len(varied)
+    return {"num_vars": count, "names": [each.key for each in varied], "bounds": [[0.0, 1.0]] * count}
+
+
+def _saltelli(varied: Sequence[Varied], n: int, seed: int) -> npt.NDArray[np.float64]:
+    try:
+        from SALib.sample import sobol
+    except ModuleNotFoundError as error:
+        raise ArgumentError(f"indices: need {error.name}: pip install 'shapegcode[study]'") from None
+    per_point = len(varied) + 2
+    if n < 2 * per_point:
+        raise ArgumentError(f"n = {n}: indices of {len(varied)} keys need n = {2 * per_point} or more")
+    base = 2 ** int(math.log2(n // per_point))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return np.asarray(sobol.sample(index_problem(varied), base, calc_second_order=False, seed=seed))

@@ -22,8 +22,6 @@ from shapegcode.results.page.markup import json_script, light_sign, prose, secti
 from shapegcode.results.page.model import Page, Script
 from shapegcode.results.page.scene import packed
 
-__all__ = ["SCRIPTS", "STYLES", "is_shared", "plotly_name", "save", "to_html"]
-
 SCRIPTS = tuple(
     f"{name}.js"
     for name in ("page", "cuts", "decode", "view", "pixels", "axes", "stage", "programs", "charts", "scene")

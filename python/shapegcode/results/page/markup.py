@@ -31,8 +31,6 @@ from shapegcode.results.page.model import (
 )
 from shapegcode.results.table import NO_BREAK, Column, Table
 
-__all__ = ["LIGHT_WORDS", "json_script", "light_sign", "number", "prose", "section_of"]
-
 LIGHT_WORDS: dict[Light, str] = {
     "green": "Go ahead", "calm": "Nothing to do", "amber": "Check first", "red": "Do not use"
 }  # fmt: skip

@@ -15,24 +15,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["CHANNELS", "Channel", "ModeLine", "Scene", "SceneSpectrum", "Variant", "packed"]
-
 FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A value along the path.
+    """A value along the path."""
 
-    Attributes:
-        label: what it is.
-        unit: of it.
-        how: one line: how to read a picture of it.
-    """
-
-    label: str
+    label: str  # what it is
     unit: str
-    how: str
+    how: str  # one line: how to read a picture of it
 
 
 CHANNELS: Mapping[str, Channel] = {
@@ -52,68 +44,40 @@ CHANNELS: Mapping[str, Channel] = {
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """A program in time.
+    """A program in time."""
 
-    Attributes:
-        key: "original" or "emitted", or another name of small letters.
-        label: for people.
-        file: name of the program.
-        text: of the program.
-        sample: which interpolation periods are kept, (n,), rising.
-        line: of the text, of the block that is interpolated, (n,), from 1.
-        block: rank of that block among the motion blocks, (n,), from 0.
-        command_mm: set-points, (n, 3).
-        deviation_um: of the table from the path, or where that is not known from its command, (n, 3).
-        channels: values along the path by the names of `CHANNELS`, each (n,).
-        samples: how many periods were simulated.
-        cut_lines: first and last line of each cut, (k, 2): there the largest deviation is looked for;
-            empty: everywhere.
-    """
-
-    key: str
-    label: str
-    file: str
-    text: str
-    sample: npt.NDArray[np.int64]
-    line: npt.NDArray[np.int64]
-    block: npt.NDArray[np.int64]
-    command_mm: FloatArray
-    deviation_um: FloatArray
-    channels: Mapping[str, FloatArray]
-    samples: int
+    key: str  # "original" or "emitted", or another name of small letters
+    label: str  # for people
+    file: str  # name of the program
+    text: str  # of the program
+    sample: npt.NDArray[np.int64]  # which interpolation periods are kept, (n,), rising
+    line: npt.NDArray[np.int64]  # of the text, of the block that is interpolated, (n,), from 1
+    block: npt.NDArray[np.int64]  # rank of that block among the motion blocks, (n,), from 0
+    command_mm: FloatArray  # set-points, (n, 3)
+    deviation_um: FloatArray  # of the table from the path, or where that is not known from its command, (n, 3)
+    channels: Mapping[str, FloatArray]  # values along the path by the names of `CHANNELS`, each (n,)
+    samples: int  # how many periods were simulated
+    # first and last line of each cut, (k, 2): there the largest deviation is looked for; empty: everywhere
     cut_lines: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
 class ModeLine:
-    """A mode of the machine in a spectrum.
+    """A mode of the machine in a spectrum."""
 
-    Attributes:
-        axis: "x", "y" or "z".
-        frequency_hz: of it.
-        label: for example "X 46 Hz (assumed)".
-    """
-
-    axis: str
+    axis: str  # "x", "y" or "z"
     frequency_hz: float
-    label: str
+    label: str  # for example "X 46 Hz (assumed)"
 
 
 @dataclass(frozen=True, eq=False)
 class SceneSpectrum:
-    """SceneSpectrum of the acceleration of the command along an axis.
+    """SceneSpectrum of the acceleration of the command along an axis."""
 
-    Attributes:
-        axis: "x", "y" or "z".
-        variant: key of its variant.
-        frequency_hz: (m,).
-        amplitude: (m,), m/s² per line.
-    """
-
-    axis: str
-    variant: str
-    frequency_hz: FloatArray
-    amplitude: FloatArray
+    axis: str  # "x", "y" or "z"
+    variant: str  # key of its variant
+    frequency_hz: FloatArray  # (m,)
+    amplitude: FloatArray  # (m,), m/s² per line
 
 
 @dataclass(frozen=True, eq=False)
