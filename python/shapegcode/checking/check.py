@@ -33,8 +33,6 @@ from shapegcode.program.reading import is_program_text, program_bytes
 from shapegcode.program.several import index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN
 
-__all__ = ["MOST_FINDINGS", "check", "check_text"]
-
 MOST_FINDINGS = 1000
 """Findings of one code that are listed; the counts hold them all."""
 

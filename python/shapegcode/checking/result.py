@@ -15,8 +15,6 @@ from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-__all__ = ["Check", "Finding", "FindingCounts", "SerialLine", "ShortBlocks", "ShortRun", "StarvedRun"]
-
 _SHOWN_ALIKE = 5
 _SHOWN_ALARMS = 20  # with one number
 _STYLES = {"alarm": "bold red", "warning": "yellow", "note": "dim"}

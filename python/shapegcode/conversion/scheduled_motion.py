@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.write import filter_tolerance
-from shapegcode.feed.travel import Travelled
+from shapegcode.feed.plan import Travelled
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import Grid
