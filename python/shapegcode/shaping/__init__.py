@@ -13,7 +13,8 @@ from importlib.util import find_spec
 from typing import Any
 
 _MODULES = (
-    "bands", "designs", "registry", "robust", "block_period", "ranking", "result", "comparison", "track", "grid", "plots",
+    "bands", "designs", "registry", "robust", "block_period", "ranking", "result", "comparison", "track", "grid",
+    "plots",
 )  # fmt: skip
 
 
