@@ -195,14 +195,11 @@ from shapegcode.results.table import Column as Column, Table as Table
 from shapegcode.setup.answers import Answers as Answers, AnswersError as AnswersError, read_answers as read_answers
 from shapegcode.setup.build import set_up as set_up
 from shapegcode.setup.result import MachineSetup as MachineSetup
-from shapegcode.shaping import (
-    ModeBand as ModeBand,
-    Recommendation as Recommendation,
-    choose_block_period as choose_block_period,
-    choose_shaper as choose_shaper,
-    shortest_non_negative as shortest_non_negative,
-)
+from shapegcode.shaping.bands import ModeBand as ModeBand
+from shapegcode.shaping.block_period import choose_block_period as choose_block_period
+from shapegcode.shaping.comparison import choose_shaper as choose_shaper
 from shapegcode.shaping.grid import choose_grid as choose_grid
+from shapegcode.shaping.grid_designs import shortest_non_negative as shortest_non_negative
 from shapegcode.shaping.plots import (
     plot_branches as plot_branches,
     plot_impulses as plot_impulses,
@@ -210,6 +207,7 @@ from shapegcode.shaping.plots import (
     plot_sensitivity as plot_sensitivity,
     plot_steps as plot_steps,
 )
+from shapegcode.shaping.result import Recommendation as Recommendation
 from shapegcode.simulation.plots import plot_motion as plot_motion
 from shapegcode.simulation.result import (
     Motion as Motion,

@@ -24,12 +24,10 @@ from table import markdown
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.plan import limits_of
+from shapegcode.feed.plan import OrdinaryMotion, limits_of
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, schedule_feed
-from shapegcode.feed.survey import survey
-from shapegcode.feed.travel import OrdinaryMotion
-from shapegcode.feed.walk import SurveyedRegion
+from shapegcode.feed.survey import SurveyedRegion, survey
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.timing.cycle_time import cycle_time

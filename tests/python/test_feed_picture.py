@@ -13,11 +13,10 @@ import pytest
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.load import LOADS
+from shapegcode.feed.load import LOADS, envelope, groups
 from shapegcode.feed.plots import plot_feed_along_path, plot_force_path, plot_wall_error, plots_of
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import schedule_feed
-from shapegcode.feed.traces import envelope, groups
 from shapegcode.machine import Machine
 from shapegcode.results import plot
 

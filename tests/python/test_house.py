@@ -267,8 +267,8 @@ def test_only_shapes_of_the_stock_import_shapely() -> None:
     users = {
         file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "shapely" in imported_modules(file)
     }
-    assert users == {"cutting/offset_shapes.py", "cutting/stock_shape.py"}
-    assert "shapely" not in loaded_after("import shapegcode.cutting.stock_material, shapegcode.cutting.stock_shape")
+    assert users == {"cutting/stock_shape.py"}
+    assert "shapely" not in loaded_after("import shapegcode.cutting.stock_shape")
 
 
 def loaded_after(statement: str) -> set[str]:

@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 import shapegcode as sg
 from acceptance import check_figures, convert, machine_with
 from shapegcode._core import Fir, Mode
-from shapegcode.shaping.per_axis import design_per_axis
+from shapegcode.shaping.track import design_per_axis
 
 PART = "%\nO1\nG21G17G90G94\nG54G00X0.Y0.\nG01X20.F12000\nG03X40.Y20.R20.\nG01Y40.\nG00X0.\nM30\n%\n"
 MODES = (

@@ -24,8 +24,8 @@ from shapegcode.shaping import (
     robust_candidate,
     shortest_non_negative,
 )
+from shapegcode.shaping.cutting_planes import proven_worst
 from shapegcode.shaping.grid_designs import lower_hull
-from shapegcode.shaping.robust.cutting_planes import proven_worst
 
 FloatArray = NDArray[np.float64]
 

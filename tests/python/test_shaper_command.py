@@ -17,9 +17,7 @@ from shapegcode.cli import main
 from shapegcode.results import plot as canvas
 from shapegcode.results.json import schema
 from shapegcode.shaping import FAMILIES, Design, Recommendation, choose_shaper, families_table
-from shapegcode.shaping.modal_run import respond, shaped_step
-from shapegcode.shaping.plots import plots_of, selected
-from shapegcode.shaping.shaper_plots import residual_curve
+from shapegcode.shaping.plots import plots_of, residual_curve, respond, selected, shaped_step
 
 FEW = ("--family", "zv", "mzv", "minimal", "polynomial", "non-negative", "robust")  # quick ones
 PAPER = ("--mode", "46:0.02±5%", "--mode", "131:0.02")

@@ -34,11 +34,10 @@ from shapegcode.shaping import (
     parse_mode_band,
     shortest_non_negative,
 )
-from shapegcode.shaping.families.conditions import Conditions, ResidualLimit, Zero
-from shapegcode.shaping.families.on_grid import shortest_on_grid
-from shapegcode.shaping.families.simultaneous import simultaneous_zv
+from shapegcode.shaping.designs import parse_taps
+from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid
 from shapegcode.shaping.registry import distinct
-from shapegcode.shaping.taps import parse_taps
+from shapegcode.shaping.solvers import simultaneous_zv
 
 SLOW = parse_mode_band("46:0.02±5%")
 FAST = parse_mode_band("131:0.02±5%")

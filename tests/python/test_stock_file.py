@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from tool_files_page import STOCK_EXAMPLES
 
 from shapegcode import _core
-from shapegcode.cutting.documentation import STOCK_EXAMPLES
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.stock_shape import StockPiece, stock_polygons
 from shapegcode.errors import FileError, StockError

@@ -12,8 +12,7 @@ import shapely
 
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
-from shapegcode.cutting.stock_material import build_material
-from shapegcode.cutting.stock_shape import stock_polygons
+from shapegcode.cutting.stock_shape import build_material, stock_polygons
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import StockError
 from shapegcode.machine import Machine

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tool_files_page import STEEL_TOOL
 
 from shapegcode import _core
-from shapegcode.cutting.documentation import STEEL_TOOL
 from shapegcode.cutting.materials import materials
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import FileError, ToolError

@@ -224,7 +224,7 @@ def test_a_region_whose_blocks_have_no_room_keeps_its_text_and_is_named() -> Non
 
 
 def test_of_very_many_sections_short_runs_are_measured_together_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    from shapegcode.metrology import jobs
+    from shapegcode.metrology import measure
 
     zigzag = "".join(f"X{k % 2}.Y{k}.\n" for k in range(1, 61))
     machine = sg.Machine.load("vx500")
@@ -232,7 +232,7 @@ def test_of_very_many_sections_short_runs_are_measured_together_and_it_is_said(m
     each = sg.measure(program, machine, 6.0)
     assert len(each.programs[0].regions[0].sections) == 60
     assert not any("measured together" in warning for warning in each.warnings)
-    monkeypatch.setattr(jobs, "_MOST_SECTIONS", 20)
+    monkeypatch.setattr(measure, "_MOST_SECTIONS", 20)
     joined = sg.measure(program, machine, 6.0)
     assert len(joined.programs[0].regions[0].sections) <= 20
     assert any("measured together as curves" in warning for warning in joined.warnings)

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import write_schemas
+from tool_files_page import file_documentation
 
 import shapegcode as sg
-from shapegcode.cutting.documentation import file_documentation
 from shapegcode.machine import key_documentation
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs"

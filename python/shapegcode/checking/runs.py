@@ -46,85 +46,51 @@ _COMMENT = re.compile(rb"\([^()\r\n]*\)?")
 
 @dataclass(frozen=True)
 class CuttingRun:
-    """Cutting blocks with nothing between them.
+    """Cutting blocks with nothing between them."""
 
-    Attributes:
-        first_line: line of the first block.
-        last_line: line of the last one.
-        bytes: of these lines, line ends included.
-        needed_per_s: characters per second that they ask for: of shaped blocks in their busiest stretch as long as the
-            shaper, of all others on average.
-        blocks: blocks that move.
-        time_s: at their feed, axis limits included, without acceleration.
-        taken_s: the same if no block takes less than the block time.
-        short_blocks: blocks below the block time.
-        shortest_s: shortest block.
-        first_short_line: line of the first short block, 0: none.
-    """
-
-    first_line: int
-    last_line: int
-    bytes: int
+    first_line: int  # line of the first block
+    last_line: int  # line of the last one
+    bytes: int  # of these lines, line ends included
+    # characters per second that they ask for: of shaped blocks in their busiest stretch as long as the shaper, of all
+    # others on average
     needed_per_s: float
-    blocks: int
-    time_s: float
-    taken_s: float
-    short_blocks: int
-    shortest_s: float
-    first_short_line: int
+    blocks: int  # blocks that move
+    time_s: float  # at their feed, axis limits included, without acceleration
+    taken_s: float  # the same if no block takes less than the block time
+    short_blocks: int  # blocks below the block time
+    shortest_s: float  # shortest block
+    first_short_line: int  # line of the first short block, 0: none
 
 
 @dataclass(frozen=True)
 class ClampedFeed:
-    """An F that the axes cannot follow, all its blocks together.
+    """An F that the axes cannot follow, all its blocks together."""
 
-    Attributes:
-        feed_mm_per_min: as programmed.
-        first_line: line of its first block that is slowed.
-        blocks: how many are.
-        least_mm_per_min: feed along the path in the slowest of them.
-    """
-
-    feed_mm_per_min: float
-    first_line: int
-    blocks: int
-    least_mm_per_min: float
+    feed_mm_per_min: float  # as programmed
+    first_line: int  # line of its first block that is slowed
+    blocks: int  # how many are
+    least_mm_per_min: float  # feed along the path in the slowest of them
 
 
 @dataclass(frozen=True)
 class BlockTable:
-    """The blocks of a program.
+    """The blocks of a program."""
 
-    Attributes:
-        runs: its cutting runs in order.
-        cutting_lines: ascending line of every cutting block.
-        rapid_lines: ascending line of every rapid.
-        dwell_lines: ascending line of every dwell.
-        first_short_lines: lines of the first short blocks.
-        clamped_feeds: by feed, ascending.
-    """
-
-    runs: tuple[CuttingRun, ...]
-    cutting_lines: npt.NDArray[np.int64]
-    rapid_lines: npt.NDArray[np.int64]
-    dwell_lines: npt.NDArray[np.int64]
-    first_short_lines: tuple[int, ...]
-    clamped_feeds: tuple[ClampedFeed, ...]
+    runs: tuple[CuttingRun, ...]  # its cutting runs in order
+    cutting_lines: npt.NDArray[np.int64]  # ascending line of every cutting block
+    rapid_lines: npt.NDArray[np.int64]  # ascending line of every rapid
+    dwell_lines: npt.NDArray[np.int64]  # ascending line of every dwell
+    first_short_lines: tuple[int, ...]  # lines of the first short blocks
+    clamped_feeds: tuple[ClampedFeed, ...]  # by feed, ascending
 
 
 @dataclass(frozen=True)
 class Breaker:
-    """What stops the reading ahead between two cutting moves.
+    """What stops the reading ahead between two cutting moves."""
 
-    Attributes:
-        line: where it stands.
-        message: in words.
-        unasked: the program does not say that it wants to stand still there.
-    """
-
-    line: int
-    message: str
-    unasked: bool
+    line: int  # where it stands
+    message: str  # in words
+    unasked: bool  # the program does not say that it wants to stand still there
 
 
 def block_table(program: Program, machine: Machine) -> BlockTable:

@@ -88,7 +88,8 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode._core import ArgumentError
     from shapegcode.cli import runner
     from shapegcode.cli.console import output_console
-    from shapegcode.shaping import choose_shaper, families_table
+    from shapegcode.shaping.comparison import choose_shaper
+    from shapegcode.shaping.result import families_table
 
     if args.list_families:
         output_console(args.json).print(families_table())

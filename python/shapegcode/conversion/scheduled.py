@@ -18,10 +18,10 @@ from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.feed.figures import feed_figures
 from shapegcode.feed.load import PathLoad, load_of
+from shapegcode.feed.plan import OrdinaryMotion, Travelled, travel_emitted
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, schedule_survey
 from shapegcode.feed.survey import survey
-from shapegcode.feed.travel import OrdinaryMotion, Travelled, travel_emitted
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program

@@ -15,8 +15,6 @@ from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTab
 from shapegcode.settings.load import parsed, validated
 from shapegcode.settings.problems import KeyProblem
 
-__all__ = ["Cutting", "WorkMaterial", "materials"]
-
 _LIBRARY = "materials.toml"
 
 Exponent = Annotated[Float, Field(gt=-1, lt=1)]

@@ -17,8 +17,6 @@ from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTab
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem, line_of
 
-__all__ = ["Allowance", "Box", "Polygon", "Rough", "Solid", "Stock"]
-
 Range = tuple[Float, Float]
 Point = tuple[Float, Float]
 Ring = Annotated[tuple[Point, ...], Field(min_length=3)]

@@ -1,4 +1,4 @@
-"""The stock of a stock file as prisms over polygons; an allowance is computed from the path of the finishing tool."""
+"""What a stock file describes: its polygons, offset where roughing left something, and the material of the core."""
 
 from __future__ import annotations
 
@@ -11,37 +11,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode import _core
-from shapegcode.cutting.offset_shapes import chord_angle_rad, grown, swept
-from shapegcode.cutting.stock import Allowance, Box, Polygon, Solid, Stock
+from shapegcode.cutting.stock import Allowance, Box, Polygon, Rough, Solid, Stock
+from shapegcode.cutting.tool import Tool
 from shapegcode.errors import StockError
+from shapegcode.program import Program
 from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:
-    from shapely import MultiPolygon, Polygon as Area
+    from shapely import Geometry, MultiPolygon, Polygon as Area, STRtree
 
-__all__ = ["StockPiece", "stock_polygons"]
+    from shapegcode.machine import Machine
 
 Points = NDArray[np.float64]
-
 # Points of a program nearer than this are the same.
 _SAME_MM = 2e-3
 # A run is a closed contour with its lead-in and lead-out if so much of its length closes upon itself.
 _CLOSED_RATIO = 0.5
+# Chords leave the arcs that they stand for by less than this.
+_SAGITTA_MM = 4e-5
+# GEOS takes corners nearer than this, relative to the distance, for one; so far may they be off.
+_SNAP = 2e-3
+_ROUNDS = 3
+# A corner, not two chords of an arc.
+_TURN_RAD = 0.1
+# Height of the layers on ramps and helices.
+_RAMP_STEP_RATIO = 0.1  # of the tool's diameter
+_MOST_LAYERS = 200  # sweeping one costs time in every layer above the tip
 
 
 @dataclass(frozen=True)
 class StockPiece:
-    """A prism.
+    """A prism."""
 
-    Attributes:
-        rings: corners, (n, 2), mm, first not repeated: the outline, counter-clockwise, then holes, clockwise.
-        bottom_mm: its lower end.
-        top_mm: its upper end.
-    """
-
+    # corners, (n, 2), mm, first not repeated: the outline, counter-clockwise, then holes, clockwise
     rings: tuple[Points, ...]
-    bottom_mm: float
-    top_mm: float
+    bottom_mm: float  # its lower end
+    top_mm: float  # its upper end
 
 
 def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
@@ -295,3 +300,180 @@ def _loops(points: Points) -> tuple[list[Points], Points]:
         seen[column, row] = len(line)
         line.append(index)
     return loops, points[line]
+
+
+def chord_angle_rad(radius_mm: float) -> float:
+    """Angle of a chord that leaves its arc by 0.04 µm; at most some 80 degrees."""
+    return 2 * math.acos(1 - _SAGITTA_MM / max(radius_mm, 4 * _SAGITTA_MM))
+
+
+def grown(area: Geometry, distance_mm: float) -> Geometry:
+    """An area with all points within a distance of it; below 0: without those that near to its boundary."""
+    if distance_mm == 0:
+        return area
+    return _placed(area.buffer(distance_mm, quad_segs=_quarter(distance_mm)), area.boundary, abs(distance_mm))
+
+
+def swept(points: Points, distance_mm: float, *, round_ends: bool = True) -> Geometry:
+    """All points within a distance of a line; without round ends only those beside it."""
+    import shapely
+
+    line = shapely.LineString(points)
+    caps = "round" if round_ends else "flat"
+    return _placed(line.buffer(distance_mm, quad_segs=_quarter(distance_mm), cap_style=caps), line, distance_mm)
+
+
+def _quarter(distance_mm: float) -> int:
+    """Chords of a quarter of a circle."""
+    return math.ceil(0.5 * math.pi / chord_angle_rad(abs(distance_mm)))
+
+
+def _placed(shape: Geometry, source: Geometry, distance_mm: float) -> Geometry:
+    """A shape with its corners moved to the distance from the line that it was offset from."""
+    import shapely
+
+    if shape.is_empty:
+        return shape
+    ends = [shapely.get_coordinates(part) for part in shapely.get_parts(source)]
+    pieces = shapely.linestrings(np.vstack([np.stack([part[:-1], part[1:]], axis=1) for part in ends]))
+    tree = shapely.STRtree(pieces)
+    before = shapely.get_coordinates(shape)
+    corners, restless = before.copy(), np.arange(len(before))
+    for _ in range(_ROUNDS):
+        points = shapely.points(corners[restless])
+        reach = (1 + _SNAP) * distance_mm
+        at, nearest = tree.query_nearest(points, max_distance=reach, all_matches=False)
+        foot = shapely.get_coordinates(shapely.shortest_line(pieces[nearest], points[at]))[::2]
+        away = corners[restless[at]] - foot
+        length = np.hypot(*away.T)
+        # What is nearer than that is a flat end; what is in place already may stay.
+        error = np.abs(length - distance_mm)
+        is_off = (error < _SNAP * distance_mm) & (error > 1e-9)
+        restless = restless[at[is_off]]
+        corners[restless] = (foot + away * (distance_mm / length)[:, None])[is_off]
+        if not restless.size:
+            break
+    for index in _turns(shape, corners):
+        corners[index] = _meeting(corners[index], pieces, tree, distance_mm)
+    placed = shapely.set_coordinates(shapely.force_2d(shape), corners)
+    return placed if placed.is_valid else shape
+
+
+def _turns(shape: Geometry, corners: Points) -> NDArray[np.intp]:
+    """Where the outline of a shape, with these corners, really turns: not between two chords of an arc."""
+    import shapely
+
+    begin, turns = 0, []
+    for ring in shapely.get_rings(shape):
+        count = shapely.get_num_coordinates(ring)
+        points = corners[begin : begin + count - 1]
+        along = np.roll(points, -1, axis=0) - points
+        before = np.roll(along, 1, axis=0)
+        cross = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
+        angle = np.abs(np.arctan2(cross, np.sum(before * along, axis=1)))
+        found = begin + np.flatnonzero(angle > _TURN_RAD)
+        # The first corner of a ring stands at its end once more.
+        turns += [found, found[found == begin] + count - 1]
+        begin += count
+    return np.concatenate(turns)
+
+
+def _meeting(corner: Points, pieces: NDArray[np.object_], tree: STRtree, distance_mm: float) -> Points:
+    """A corner moved to the distance from both lines that it lies between; as it was where there is only one."""
+    import shapely
+
+    moved = corner
+    for _ in range(_ROUNDS):
+        point = shapely.Point(moved)
+        near = pieces[tree.query(point, predicate="dwithin", distance=(1 + _SNAP) * distance_mm)]
+        if not near.size:
+            return corner
+        away = moved - shapely.get_coordinates(shapely.shortest_line(near, point))[::2]
+        length = np.hypot(*away.T)
+        direction = away / length[:, None]
+        first = int(np.argmin(length))
+        second = int(np.argmin(direction @ direction[first]))
+        pair = direction[[first, second]]
+        if abs(np.linalg.det(pair)) < math.sin(_TURN_RAD):
+            return corner
+        moved = moved + np.linalg.solve(pair, distance_mm - length[[first, second]])
+    return moved if np.hypot(*(moved - corner)) < 5 * _SNAP * distance_mm else corner
+
+
+def build_material(
+    stock: Stock,
+    paths: Sequence[_core.Path],
+    tool: Tool,
+    resolution_mm: float,
+    machine: Machine,
+    *,
+    others: Sequence[_core.Path] = (),
+) -> _core.Material:
+    """The material before the first block of a program.
+
+    What a roughing program leaves is computed by sweeping its tool through what was there before.
+    """
+    pieces = stock_polygons(stock, paths, tool.radius_mm)
+    bottom, top = pieces[0].bottom_mm, pieces[0].top_mm
+    rings = [ring for piece in pieces for ring in piece.rings]
+    step = _RAMP_STEP_RATIO * tool.tool.diameter_mm
+    if stock.program is None:
+        return _core.Material(rings, _fewer(_core.layer_borders([*paths, *others], bottom, top, step)), resolution_mm)
+    rough = Tool.load(stock.beside(stock.program.tool))
+    moves = _moves(stock, stock.program, machine)
+    borders = _fewer(_core.layer_borders([*moves, *paths, *others], bottom, top, step))
+    material = _core.Material(rings, borders, resolution_mm)
+    for path in moves:
+        _core.sweep(material, path, rough.tool.diameter_mm)
+    return material
+
+
+def _fewer(borders_mm: Sequence[float]) -> list[float]:
+    """At most so many heights: those that lie closest together become one, as in a surface that is milled in 3-D."""
+    borders = list(borders_mm)
+    least_mm = (borders[-1] - borders[0]) / (4.0 * _MOST_LAYERS)
+    while len(borders) > _MOST_LAYERS + 1:
+        kept = borders[:1]
+        for border in borders[1:-1]:
+            if border - kept[-1] >= least_mm:
+                kept.append(border)
+        borders = [*kept, borders[-1]]
+        least_mm *= 1.5
+    return borders
+
+
+def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
+    """The moves of the roughing program in order, each run of cutting moves as one path."""
+    program = Program.read(stock.beside(rough.file), machine)
+
+    def refuse(line: int, reason: str) -> StockError:
+        return stock.error("program.file", toml(rough.file), f"{program.place(line)}: {reason}")
+
+    tools = sorted({tool for _, tool, _ in program.core.functions if tool > 0})
+    if len(tools) > 1:
+        names = ", ".join(f"T{tool}" for tool in tools)
+        raise stock.error(
+            "program.file", toml(rough.file), f"uses the tools {names}: must use one, as program.tool says"
+        )
+    systems = {(region.exit.coordinate_system, region.exit.coordinate_number) for region in program.regions}
+    if len(systems) > 1:
+        names = ", ".join(f"G{system}" for system, _ in sorted(systems))
+        raise stock.error("program.file", toml(rough.file), f"cuts in the work coordinates {names}: must cut in one")
+    paths, moves = [], program.core.other_moves
+    for kind, index, line in program.core.steps:
+        if kind == _core.StepKind.region:
+            region = program.regions[index]
+            if region.incremental:
+                raise refuse(line, "the place of these moves is not known")
+            paths.append(region.path)
+        elif kind == _core.StepKind.move:
+            segment, dwell_s = moves[index]
+            if dwell_s == 0 and segment.length_mm > 0:
+                paths.append(_core.Path([segment]))
+    for path in paths:
+        for index in range(len(path)):
+            if path[index].kind == _core.SegmentKind.arc and path[index].normal != 2:
+                raise refuse(path[index].line_number, "an arc that is not in the XY plane (G17)")
+    if not program.regions:
+        raise stock.error("program.file", toml(rough.file), "holds no cutting moves")
+    return paths

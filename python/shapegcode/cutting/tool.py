@@ -18,8 +18,6 @@ from shapegcode.settings.keys import Float, NonNegative, Positive, TomlTable, ke
 from shapegcode.settings.load import loaded, parsed, validated
 from shapegcode.settings.problems import KeyProblem
 
-__all__ = ["Cutter", "Cutting", "Feed", "Limits", "Tool"]
-
 
 class Cutter(TomlTable):
     """The end mill: flat end, cylindrical."""

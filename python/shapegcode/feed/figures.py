@@ -21,14 +21,11 @@ from shapegcode.feed.result import (
     ResultantForce,
     ScheduledRegion,
 )
-from shapegcode.feed.survey import Survey
-from shapegcode.feed.walk import SurveyedMove, SurveyedRegion
+from shapegcode.feed.survey import Survey, SurveyedMove, SurveyedRegion
 from shapegcode.machine import Machine
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.results.result import Pair
-
-__all__ = ["feed_figures"]
 
 _AIR_N = 1e-9
 _SHOWN_ALIKE = 4

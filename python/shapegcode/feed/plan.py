@@ -4,27 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.travel import Mover, Vector
-from shapegcode.feed.walk import SurveyedRegion
+from shapegcode.feed.survey import SurveyedRegion
 from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
 
-__all__ = [
-    "AIR",
-    "KEPT",
-    "MINIMUM",
-    "PROGRAMMED",
-    "FeedPlan",
-    "goes_on",
-    "limits_of",
-    "plan_region",
-]
-
+Vector = npt.NDArray[np.float64]
 _ATTEMPTS = 12
 _LONGEST_REACH = 2.0  # of the lag, beyond which waiting longer changes nothing
 _LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered too
@@ -40,32 +31,73 @@ _LIMIT_NAMES = np.array(
     [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
     dtype="<U16",
 )
-
 PROGRAMMED, MAX_FEED, AIR, KEPT, MINIMUM = "programmed", "max_feed", "air", "kept", "minimum"
 """What holds a feed where no limit does: the program, the largest feed, no material, a block left alone, the least."""
 
 
 @dataclass(frozen=True)
+class Travelled:
+    """Travel along a path, one value per station."""
+
+    feed_mm_per_min: Vector  # largest feed per tooth on the stretch before the station, as a feed
+    time_s: Vector  # time on that stretch
+
+    @classmethod
+    def of(cls, travel: _core.Travel) -> Travelled:
+        """What the core found."""
+        return cls(np.asarray(travel.highest_mm_per_s) * 60.0, np.asarray(travel.time_s))
+
+
+class Mover(Protocol):
+    """What makes a motion of the blocks of a region."""
+
+    @property
+    def reach_s(self) -> float:
+        """Time by which the travel lags behind a change of the commanded feed."""
+
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+        """Travel of a path made of `along`, to whose length the stations ascend; feeds are over the window."""
+
+
+class OrdinaryMotion:
+    """The controller's own motion, as it plays an ordinary program."""
+
+    def __init__(self, machine: Machine) -> None:
+        self._controller = MachineModel(machine).ordinary
+
+    @property
+    def reach_s(self) -> float:
+        """Half of what the filters behind the interpolation last."""
+        period_s = self._controller.model.period_s
+        return 0.5 * period_s * sum(filter_.duration_samples for filter_ in self._controller.filters)
+
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+        """See `Mover`."""
+        return Travelled.of(self._controller.travel(path, along, stations_mm, window_s))
+
+
+def travel_emitted(
+    blocks: _core.Path, path: _core.Path, machine: Machine, stations_mm: Vector, window_s: float
+) -> Travelled:
+    """Travel of shaped blocks as the controller plays them, along the programmed path; else as `Mover.travel`."""
+    model = MachineModel(machine)
+    return Travelled.of(
+        _core.travel_blocks(blocks, path, model.own_rule, stations_mm, model.period_s, model.shaped.filters, window_s)
+    )
+
+
+@dataclass(frozen=True)
 class FeedPlan:
-    """Feeds of a region.
+    """Feeds of a region."""
 
-    Attributes:
-        surveyed: the region, and what the tool meets on it.
-        limit_mm_per_min: largest feed allowed on the stretch before each station, (n,).
-        holds: what holds it there, (n,) of names.
-        kept: per segment why its feed stays, empty where it may change.
-        stretches: the feeds, as they are written.
-        held_at_minimum: stations at which the least feed per tooth is more than the limits allow, (n,) of bool.
-        window_s: time between two teeth, over which feeds are taken.
-    """
-
-    surveyed: SurveyedRegion
-    limit_mm_per_min: Vector
-    holds: npt.NDArray[np.str_]
-    kept: tuple[str, ...]
-    stretches: tuple[_core.FeedStretch, ...]
+    surveyed: SurveyedRegion  # the region, and what the tool meets on it
+    limit_mm_per_min: Vector  # largest feed allowed on the stretch before each station, (n,)
+    holds: npt.NDArray[np.str_]  # what holds it there, (n,) of names
+    kept: tuple[str, ...]  # per segment why its feed stays, empty where it may change
+    stretches: tuple[_core.FeedStretch, ...]  # the feeds, as they are written
+    # stations at which the least feed per tooth is more than the limits allow, (n,) of bool
     held_at_minimum: npt.NDArray[np.bool_]
-    window_s: float
+    window_s: float  # time between two teeth, over which feeds are taken
 
 
 def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,19 +12,18 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode._core import Region
+from shapegcode.feed.load import FeedTraces, envelope, groups
 from shapegcode.feed.result import FeedSchedule
-from shapegcode.feed.traces import FeedTraces, envelope, groups
-from shapegcode.feed.wall_plot import draw_walls
 from shapegcode.results import plot
+from shapegcode.results.page.scene import Scene, Variant
 from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["plot_feed_along_path", "plot_force_path", "plot_wall_error", "plots_of"]
+    from matplotlib.colors import Colormap
 
 Vector = npt.NDArray[np.float64]
-
 _BEFORE, _AFTER = plot.COLOURS[0], plot.COLOURS[1]
 _LIMIT = "#000000"
 _BEYOND = plot.COLOURS[0]
@@ -42,6 +43,8 @@ _LOADS = (
     ("mean_power_w", "power in W", "W"),
 )
 _ALWAYS = ("peak_resultant_n", "mean_resultant_n")
+_NO_WALL = "#c9c9c9"
+FloatArray = npt.NDArray[np.float64]
 
 
 def plots_of(schedule: FeedSchedule) -> dict[str, Plot]:
@@ -277,3 +280,87 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
         (_BEFORE, _AFTER), along="distance along the cutting path in mm",
         title="Form error of the wall; +: material is left standing", part=_summary(schedule),
     )  # fmt: skip
+
+
+def draw_walls(
+    ax: Axes | None, edges_mm: Vector, height_mm: Vector, maps: Mapping[str, Vector], colours: Sequence[str], *,
+    along: str, title: str, part: str,
+) -> Axes:  # fmt: skip
+    """Maps of the wall's error below each other in one scale, and in the last panel the largest of each column."""
+    everything = np.concatenate([each[np.isfinite(each)] for each in maps.values()])
+    low, high = min(float(everything.min()), 0.0), max(float(everything.max()), 0.0)
+    high = high if high > low else low + 1e-3
+    both = _both_sides(low, high)
+    rows = plot.grid(
+        ax, len(maps) + 1, 1, size_inch=(11.0, 1.3 + 1.9 * (len(maps) + 1)), sharex=True, title=title, part=part,
+    )  # fmt: skip
+    panels = [row[0] for row in rows]
+    step = height_mm[1] - height_mm[0]
+    levels = np.concatenate([height_mm - 0.5 * step, height_mm[-1:] + 0.5 * step])
+    for panel, (name, values) in zip(panels, maps.items(), strict=False):
+        panel.grid(False)
+        panel.spines[["top", "right"]].set_visible(True)
+        panel.set_facecolor(_NO_WALL)
+        mesh = panel.pcolormesh(
+            edges_mm, levels, np.ma.masked_invalid(values.T), cmap=both, vmin=low, vmax=high, rasterized=True,
+        )  # fmt: skip
+        panel.set_ylim(levels[0], levels[-1])
+        panel.set_ylabel("height above\nthe tip in mm")
+        worst = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
+        panel.set_title(f"{name}: up to {plot.number(worst)} µm", loc="left", fontsize=10)
+    whole: Any = panels[0].figure
+    whole.colorbar(
+        mesh, ax=panels[:-1], pad=0.01, label="error of the wall in µm\nred: left standing, blue: cut too far"
+    )
+    last = panels[-1]
+    for (name, values), colour in zip(maps.items(), colours, strict=True):
+        made = np.isfinite(values).any(axis=1)
+        largest = np.full(len(values), np.nan)
+        largest[made] = np.nanmax(np.abs(values[made]), axis=1)
+        last.stairs(largest, edges_mm, baseline=None, color=colour, linewidth=1.1, label=name)
+    last.set_ylim(bottom=0.0)
+    last.margins(x=0.0)
+    last.set_ylabel("largest over\nthe height in µm")
+    last.set_xlabel(along)
+    plot.legend_above(last)
+    return plot.aligned(panels)
+
+
+def _both_sides(low: float, high: float) -> Colormap:
+    """Colours from `low` to `high`, white at 0 and as strong on one side as on the other; `low` <= 0 <= `high`."""
+    from matplotlib import colormaps
+    from matplotlib.colors import LinearSegmentedColormap
+
+    reach = 2.0 * max(-low, high)
+    places = np.linspace(0.5 + low / reach, 0.5 + high / reach, 257)
+    return LinearSegmentedColormap.from_list("both sides", colormaps["RdBu_r"](places))
+
+
+def with_forces(scene: Scene, schedule: FeedSchedule) -> Scene:
+    """The motion with the largest resultant in a revolution, by place along each region."""
+    loads = schedule.loads
+    regions = [[part.region for part in schedule.survey.regions], list(schedule.written.regions)]
+    variants = []
+    for variant, own, side in zip(scene.variants, regions, ("original", "emitted"), strict=True):
+        known = [
+            (region, load.s_mm, getattr(load, side).peak_resultant_n)
+            for region, load in zip(own, loads, strict=True)
+            if load is not None
+        ]
+        force = _along(variant, known)
+        variants.append(replace(variant, channels=dict(variant.channels) | {"force": force}))
+    return replace(scene, variants=tuple(variants))
+
+
+def _along(variant: Variant, known: Sequence[tuple[Region, FloatArray, FloatArray]]) -> FloatArray:
+    """Force at each kept sample: by its share of the way through its region."""
+    force = np.zeros(len(variant.sample))
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(variant.command_mm, axis=0), axis=1))])
+    for region, stations_mm, values_n in known:
+        rows = np.flatnonzero((variant.line >= region.first_line) & (variant.line <= region.last_line))
+        if len(rows) < 2 or not len(stations_mm) or way[rows[-1]] <= way[rows[0]]:
+            continue
+        # The thinned way is a little shorter than the path: both are taken from their beginning to their end.
+        share = (way[rows] - way[rows[0]]) / (way[rows[-1]] - way[rows[0]])
+        force[rows] = np.interp(share * stations_mm[-1], stations_mm, values_n)
+    return force

@@ -8,10 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from shapegcode.feed.load import PathLoad
+from shapegcode.feed.load import FeedTraces, PathLoad, WallMaps, feed_traces, wall_maps
 from shapegcode.feed.plan import FeedPlan
 from shapegcode.feed.survey import Survey
-from shapegcode.feed.traces import FeedTraces, WallMaps, feed_traces, wall_maps
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.results.json import hidden
@@ -19,10 +18,6 @@ from shapegcode.results.page.model import Figure, Page
 from shapegcode.results.page.scene import Scene
 from shapegcode.results.result import Pair, Plot, Result
 from shapegcode.results.table import Column, Table
-
-__all__ = [
-    "FeedRange", "FeedSchedule", "HeldLines", "KeptMove", "PeakLoad", "PeakLoads", "ResultantForce", "ScheduledRegion",
-]  # fmt: skip
 
 _PEAKS = (
     ("peak_resultant_n", "resultant, peak", "N", 1),
@@ -272,7 +267,7 @@ class FeedSchedule(Result):
         page = super().page(**options)
         if page.scene is None or self.from_json:
             return page
-        scene: Scene = self._beside("page").with_forces(page.scene, self)
+        scene: Scene = self._beside("plots").with_forces(page.scene, self)
         return replace(page, scene=scene)
 
     def key_figures(self) -> tuple[Figure, ...]:

@@ -15,16 +15,13 @@ from shapegcode.cutting.tool import Tool
 from shapegcode.errors import RoundTripError
 from shapegcode.feed.figures import feed_figures
 from shapegcode.feed.load import PathLoad, region_load
-from shapegcode.feed.plan import FeedPlan, plan_region
+from shapegcode.feed.plan import FeedPlan, Mover, OrdinaryMotion, plan_region
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.survey import Survey, survey
-from shapegcode.feed.travel import Mover, OrdinaryMotion
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.results.result import Pair
-
-__all__ = ["MARGIN", "schedule_feed", "schedule_survey"]
 
 MARGIN = 0.015
 """Share of each limit that a schedule leaves free: for what model and position of the load are off by."""

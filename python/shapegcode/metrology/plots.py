@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from shapegcode.metrology.figures import WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
-from shapegcode.metrology.section import WallProfile
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["plot_part", "plot_walls", "plots_of"]
 
 FloatArray = npt.NDArray[np.float64]
 _SHARE_OF_TOOL = 0.8  # of the tool's radius that the largest deviation takes in the drawing

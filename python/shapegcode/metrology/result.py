@@ -7,16 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shapegcode import _core
-from shapegcode.metrology.figures import SidedError
-from shapegcode.metrology.section import MeasuredSection
+from shapegcode.metrology.figures import MeasuredSection, SidedError
 from shapegcode.metrology.tables import section_table, summary_table
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.results.figures import Tracks, largest_xyz_um
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result, Xyz
 from shapegcode.results.table import Table
-
-__all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement"]
 
 
 @dataclass(frozen=True, eq=False)

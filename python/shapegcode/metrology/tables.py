@@ -7,12 +7,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from shapegcode.metrology.figures import FittedCircle, MeasuredArc, SidedError, WallDeviation
-from shapegcode.metrology.section import MeasuredSection
+from shapegcode.metrology.figures import FittedCircle, MeasuredArc, MeasuredSection, SidedError, WallDeviation
 from shapegcode.results.result import Xyz
 from shapegcode.results.table import Column, Table
-
-__all__ = ["section_table", "summary_table"]
 
 _MOST_SECTIONS = 12
 _SHOWN_UM = 0.005  # less is shown as 0.00

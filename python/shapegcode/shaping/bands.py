@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,8 +14,6 @@ from shapegcode.results.json import hidden
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["NARROW_PERCENT", "NO_MODE", "ModeBand", "machine_bands", "mode_band", "parse_mode_band"]
-
 NO_MODE = (
     "the machine file gives no vibration mode (axes.x.modes): nothing to shape for; `shapegcode identify --tap-plan` "
     "says how to find them"
@@ -22,7 +21,6 @@ NO_MODE = (
 """Why there is no shaper."""
 NARROW_PERCENT = 0.2
 """A band of a mode of a machine is designed for if it is wider than this, either way."""
-
 _SLOWEST_HZ = 0.1  # the swing of a load on 25 m of rope; no machine tool has a slower mode
 _FASTEST_HZ = 10_000.0  # as in a machine file
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -30,6 +28,8 @@ _SIZE = r"(?:\d+\.?\d*|\.\d+)"
 _TEXT = re.compile(
     rf"({_NUMBER})(?::({_NUMBER}))?(?:(?:±|\+-|\+/-)({_NUMBER})(%|Hz)?|[-−]({_SIZE})(%|Hz)/?\+({_SIZE})(%|Hz))?"
 )
+ON_GRID = 1e-9
+"""Periods; forgives the rounding of a quotient."""
 
 
 @dataclass(frozen=True)
@@ -155,3 +155,47 @@ def mode_band(given: float | str | Mode | ModeBand, uncertainty: float = 0.0) ->
     if isinstance(given, ModeBand):
         return given
     return parse_mode_band(given if isinstance(given, str) else f"{float(given):.17g}", uncertainty)
+
+
+def ms(time_s: float) -> str:
+    """A time, s, in ms."""
+    return f"{time_s * 1e3:.6g} ms"
+
+
+def mode_names(modes: Sequence[Mode]) -> str:
+    """Modes by frequency and damping ratio."""
+    return ", ".join(f"{mode.frequency_hz:g} Hz (zeta {mode.damping_ratio:g})" for mode in modes)
+
+
+def band_names(bands: Sequence[ModeBand]) -> str:
+    """Modes with their bands, as they are typed."""
+    return ", ".join(f"{band} Hz" for band in bands)
+
+
+def spoken(bands: Sequence[ModeBand]) -> str:
+    """Modes with their bands in a sentence."""
+
+    def one(band: ModeBand) -> str:
+        text = f"{band.mode.frequency_hz:g} Hz"
+        return f"{text} ±{100.0 * band.uncertainty:g} %" if band.uncertainty else text
+
+    return " and ".join(map(one, bands))
+
+
+def check_times(**times_s: float) -> None:
+    """Refuse times that are not finite and above 0."""
+    for name, value in times_s.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise ArgumentError(f"{name} is {value} s: it must be finite and above 0")
+
+
+def check_modes_and_times(modes: Sequence[Mode | ModeBand], **times_s: float) -> None:
+    """Refuse no mode, and times that are not finite and above 0."""
+    if not modes:
+        raise ArgumentError("a shaper needs at least one mode: 0 given")
+    check_times(**times_s)
+
+
+def whole_periods(duration_s: float, period_s: float) -> int:
+    """How many periods fit into a duration."""
+    return math.floor(duration_s / period_s + ON_GRID)

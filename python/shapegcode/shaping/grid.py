@@ -2,52 +2,47 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import axis_modes, mode_tables, moving_axis, numbered_modes, still_mode
 from shapegcode.shaping.bands import NO_MODE, ModeBand, machine_bands
 from shapegcode.shaping.block_period import (
     BlockPeriodCandidate,
     BlockPeriodChoice,
+    candidate_periods,
+    check_block_period,
     choose_block_period,
     robust_candidate,
 )
-from shapegcode.shaping.dial import best_for_dial
-from shapegcode.shaping.options import DesignOptions
-from shapegcode.shaping.per_axis import design_per_axis
-from shapegcode.shaping.periods import candidate_periods, check_block_period
+from shapegcode.shaping.designs import DesignOptions
 from shapegcode.shaping.registry import design
-from shapegcode.shaping.track import MovingMode, ShaperTrack, design_track
+from shapegcode.shaping.track import MovingMode, ShaperTrack, design_per_axis, design_track
 
-__all__ = ["Grid", "choose_grid", "make_grid", "shaper_track"]
+_STROKES_S = (0.25, 0.4, 0.7)  # at the feed: how a ripple meets a mode's own motion depends on the length
 
 
 @dataclass(frozen=True)
 class Grid:
-    """On what a conversion is written: block period and the shaper on it.
+    """On what a conversion is written: block period and the shaper on it."""
 
-    Attributes:
-        block_period_s: T_B.
-        shaper: the design, times on the block grid.
-        fir: the same in whole block periods.
-        track: shapers along an axis, used instead where its position is known; None: no mode varies with position.
-        family: name of the design's row in the registry of families.
-        note: what a user should know of the choice; empty: nothing.
-        axis_firs: a shaper for each of X, Y, Z in whole block periods, used instead; empty: the one for all.
-        per_axis_duration_s: how long such shapers would be, s; None: not looked for, or not shorter.
-    """
-
-    block_period_s: float
-    shaper: _core.Shaper
-    fir: _core.Fir
+    block_period_s: float  # T_B
+    shaper: _core.Shaper  # the design, times on the block grid
+    fir: _core.Fir  # the same in whole block periods
+    # shapers along an axis, used instead where its position is known; None: no mode varies with position
     track: ShaperTrack | None = None
-    family: str = ""
-    note: str = ""
+    family: str = ""  # name of the design's row in the registry of families
+    note: str = ""  # what a user should know of the choice; empty: nothing
+    # a shaper for each of X, Y, Z in whole block periods, used instead; empty: the one for all
     axis_firs: tuple[_core.Fir, ...] = ()
-    per_axis_duration_s: float | None = None
+    per_axis_duration_s: float | None = None  # how long such shapers would be, s; None: not looked for, or not shorter
 
     @property
     def shapers(self) -> tuple[_core.Shaper, ...]:
@@ -207,3 +202,44 @@ def shaper_track(
     longest = machine.shaping.max_duration_s if max_duration_s is None else max_duration_s
     span = (min(reached), max(reached))
     return design_track(modes, axis, span, period_s, longest, residual_limit=residual_limit)
+
+
+def dial_vibration_um(block_period_s: float, shaper: _core.Shaper, model: MachineModel, feed_mm_per_s: float) -> float:
+    """Largest residual vibration of straight strokes in equal blocks, over the positions of the dial."""
+    moves = np.array([float(bool(axis.modes)) for axis in model.machine.axes.as_tuple()])
+    speed = feed_mm_per_s * math.sqrt(moves.sum())
+    fir = _core.Fir([round(t / block_period_s) for t in shaper.times_s], list(shaper.amplitudes))
+    worst_mm = 0.0
+    for stroke_s in _STROKES_S:
+        path = _core.Path([_core.Segment.line(np.zeros(3), moves * feed_mm_per_s * stroke_s, speed)])
+        samples = fir.apply(_core.interpolate(path, _core.plan_speed(path, model.limits()), block_period_s))
+        ways = np.linalg.norm(np.diff(samples, axis=0), axis=1)
+        blocks = _core.Path(
+            [
+                _core.Segment.line(start, end, way / block_period_s)
+                for start, end, way in zip(samples[:-1], samples[1:], ways, strict=True)
+                if way > 0.0
+            ]
+        )
+        for ratio in model.machine.dial_positions:
+            played = model.play_emitted(blocks, path, override=ratio, contour=False)
+            worst_mm = max(worst_mm, float(played.residual_mm.max()))
+    return worst_mm * 1e3
+
+
+def best_for_dial(
+    designs: Iterable[tuple[float, _core.Shaper]], machine: Machine, feed_mm_per_s: float
+) -> tuple[float, _core.Shaper]:
+    """The block period with the best of both: a short shaper, and little vibration with the dial turned.
+
+    What stays below `tolerance.residual_floor_um` counts as that. Above it twice the vibration weighs as much as a
+    shaper of twice the duration.
+    """
+    model = MachineModel(machine)
+    floor_um = max(machine.tolerance.residual_floor_um, 1e-3)
+
+    def cost(design: tuple[float, _core.Shaper]) -> float:
+        period_s, shaper = design
+        return shaper.duration_s * max(floor_um, dial_vibration_um(period_s, shaper, model, feed_mm_per_s))
+
+    return min(designs, key=cost)

@@ -15,14 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
-from shapegcode.shaping.bands import ModeBand
+from shapegcode._core import DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
+from shapegcode.shaping.bands import check_modes_and_times, mode_names, ms, whole_periods
 from shapegcode.shaping.linear_program import LinearProgram, non_negative_least_squares
-from shapegcode.shaping.words import mode_names, ms, whole_periods
-
-__all__ = [
-    "RESIDUAL_LIMIT", "Vertices", "check_modes_and_times", "exact_conditions", "lower_hull", "shortest_non_negative",
-]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
 
@@ -72,15 +67,6 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
     raise DesignError(_none_exists(modes, period_s, max_duration_s))
 
 
-def check_modes_and_times(modes: Sequence[Mode | ModeBand], **times_s: float) -> None:
-    """Refuse no mode, and times that are not finite and positive."""
-    if not modes:
-        raise ArgumentError("a shaper needs at least one mode: 0 given")
-    for name, value in times_s.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise ArgumentError(f"{name} is {value} s: it must be finite and above 0")
-
-
 def exact_conditions(modes: Sequence[Mode], period_s: float, last: int) -> tuple[FloatArray, FloatArray]:
     """Matrix and right-hand side of the equality conditions on the taps at 0, 1 ... `last` periods.
 
@@ -98,6 +84,24 @@ def exact_conditions(modes: Sequence[Mode], period_s: float, last: int) -> tuple
     kept = basis[strength > _SAME_CONDITION * strength[0]] * math.sqrt(last + 1)
     matrix = np.vstack([kept, np.ones(last + 1)])
     return matrix, np.eye(len(matrix))[-1]
+
+
+def halved(is_enough: Callable[[int], bool], too_few: int, enough: int, precision: float = 0.0) -> int:
+    """The smallest number that is enough, by halving; to a relative precision it may exceed the smallest."""
+    while enough - too_few > max(1, math.floor(precision * enough)):
+        middle = (too_few + enough) // 2
+        if is_enough(middle):
+            enough = middle
+        else:
+            too_few = middle
+    return enough
+
+
+def refined(columns: FloatArray, right: FloatArray, taps: FloatArray) -> FloatArray:
+    """Taps that meet ``columns @ taps == right`` to rounding, from such that nearly do."""
+    for _ in range(3):  # the second removes what the first one's rounding left, the third nothing
+        taps = taps + np.linalg.lstsq(columns, right - columns @ taps, rcond=1e-14)[0]
+    return taps
 
 
 def _non_negative_solution(modes: Sequence[Mode], period_s: float, last: int) -> FloatArray | None:
@@ -124,13 +128,7 @@ def _smallest_feasible(modes: Sequence[Mode], period_s: float, most: int) -> int
     enough = min(enough, most)
     if enough <= too_few or _non_negative_solution(modes, period_s, enough) is None:
         return None
-    while enough - too_few > 1:
-        middle = (too_few + enough) // 2
-        if _non_negative_solution(modes, period_s, middle) is None:
-            too_few = middle
-        else:
-            enough = middle
-    return enough
+    return halved(lambda last: _non_negative_solution(modes, period_s, last) is not None, too_few, enough)
 
 
 class Vertices:
@@ -230,8 +228,7 @@ def _polished(vertex: FloatArray, modes: Sequence[Mode], period_s: float) -> Sha
         support = np.flatnonzero(vertex > threshold)
         columns = matrix[:, support]
         taps = vertex[support]
-        for _ in range(3):  # the second removes what the first one's rounding left, the third nothing
-            taps = taps + np.linalg.lstsq(columns, right - columns @ taps, rcond=1e-14)[0]
+        taps = refined(columns, right, taps)
         if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT):
             continue
         shaper = Shaper(((support - support[0]) * period_s).tolist(), (taps / taps.sum()).tolist())

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from shapegcode._core import DesignError
 
-__all__ = ["LinearProgram", "non_negative_least_squares"]
-
 FloatArray = NDArray[np.float64]
 
 # Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from shapegcode import _core
 from shapegcode._core import MinimalBranches, Mode, Shaper, minimal_branches
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 from shapegcode.shaping.bands import ModeBand, mode_band
 from shapegcode.shaping.designs import Design
 from shapegcode.shaping.result import Recommendation, times_name
-from shapegcode.shaping.shaper_plots import draw_branches, draw_impulses, draw_sensitivity, draw_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = [
-    "plot_branches", "plot_impulses", "plot_pareto", "plot_sensitivity", "plot_steps", "plots_of", "selected",
-]  # fmt: skip
 
 _CURVES = 6
 _LEAST_RATIO = 1.02
 _RATIO_STEP = 0.02
 _BRANCH_SWINGS = 1.0  # of the slower mode: minimal shapers of interest are shorter
+_FREQUENCIES = 601
+_PERIODS_IN_DURATION = 2.0
+_SAMPLES_OF_A_STEP = 3000
+_SWINGS_SHOWN = 3.0  # of the slowest mode, behind the longest shaper
+FloatArray = NDArray[np.float64]
+_AXES = 3  # modes per run of the plant: one on each axis
 
 
 def plots_of(result: Recommendation) -> dict[str, Plot]:
@@ -211,3 +215,174 @@ def _branches(result: Recommendation) -> MinimalBranches | None:
     longest_s = min(result.max_duration_s, _BRANCH_SWINGS / slow.frequency_hz, 99.0 / (ratios[-1] * slow.frequency_hz))
     branches = minimal_branches(slow, fast.damping_ratio, ratios.tolist(), longest_s)
     return branches if np.isfinite(branches.times_s).any() else None
+
+
+def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: Sequence[Mode]) -> NDArray[np.float64]:
+    """Residual ratio over frequency, with the damping ratios of the modes and between them what lies between."""
+    known = sorted((mode.frequency_hz, mode.damping_ratio) for mode in modes) or [(0.0, 0.0)]
+    damping = np.interp(frequencies_hz, [frequency for frequency, _ in known], [ratio for _, ratio in known])
+    return np.asarray(shaper.residual(frequencies_hz, damping))
+
+
+def draw_sensitivity(
+    shapers: Mapping[str, Shaper],
+    bands: Sequence[ModeBand],
+    vibration_limit: float | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """What is left if the frequency is another one? Residual ratio over frequency, the bands of the modes shaded."""
+    panel = plot.axes(ax, size_inch=(9.0, 5.4), title="What is left if the frequency is another one")
+    panel.text(
+        1.0, 1.01, "a curve that comes down to 0 turns there: an amplitude has no sign", ha="right", fontsize=8,
+        color="#555555", transform=panel.transAxes,
+    )  # fmt: skip
+    longest_s = max(shaper.duration_s for shaper in shapers.values())
+    highest = max(
+        (band.mode.frequency_hz * (1.0 + band.uncertainty) for band in bands),
+        default=_PERIODS_IN_DURATION / longest_s if longest_s > 0.0 else 1.0,
+    )
+    frequencies_hz = np.linspace(0.0, 1.25 * highest, _FREQUENCIES)[1:]
+    modes = [band.mode for band in bands]
+    for number, (label, shaper) in enumerate(shapers.items()):
+        panel.plot(
+            frequencies_hz, 100.0 * residual_curve(shaper, frequencies_hz, modes), label=label,
+            color=plot.COLOURS[number % len(plot.COLOURS)], linewidth=1.6,
+        )  # fmt: skip
+    for band in bands:
+        frequency, width = band.mode.frequency_hz, band.mode.frequency_hz * band.uncertainty
+        panel.axvspan(frequency - width, frequency + width, color="#e4e4e4", zorder=0)
+        panel.axvline(frequency, color=plot.GREY, linewidth=0.8, zorder=0)
+        panel.annotate(
+            f" mode {frequency:g} Hz" + (f" ±{100.0 * band.uncertainty:g} %" if width else ""), (frequency, 0.97),
+            xycoords=panel.get_xaxis_transform(), fontsize=8, color="#555555", va="top",
+        )  # fmt: skip
+    if vibration_limit is not None:
+        panel.axhline(
+            100.0 * vibration_limit, color="black", linewidth=1.0, linestyle="--", zorder=1,
+            label=f"limit {100.0 * vibration_limit:g} %",
+        )  # fmt: skip
+    panel.set_ylim(bottom=0.0)
+    panel.margins(x=0.01)
+    panel.set_xlabel("natural frequency in Hz")
+    panel.set_ylabel("residual vibration in %")
+    plot.legend_below(panel, columns=3)
+    return panel
+
+
+def draw_impulses(shapers: Mapping[str, Shaper], ax: Axes | None = None) -> Axes:
+    """The taps of each shaper, one panel each."""
+    rows = plot.grid(
+        ax, len(shapers), 1, size_inch=(9.0, 1.2 + 1.35 * len(shapers)), title="Taps", sharex="col"
+    )  # fmt: skip
+    panels = [row[0] for row in rows]
+    unit, scale = _time_unit(max(shaper.duration_s for shaper in shapers.values()))
+    for number, (panel, (label, shaper)) in enumerate(zip(panels, shapers.items(), strict=True)):
+        colour = plot.COLOURS[number % len(plot.COLOURS)]
+        panel.vlines(shaper.times_s * scale, 0.0, shaper.amplitudes, color=colour, linewidth=2.5)
+        panel.plot(shaper.times_s * scale, shaper.amplitudes, "o", color=colour, markersize=4)
+        panel.axhline(0.0, color="black", linewidth=0.8)
+        panel.set_title(label, loc="left", fontsize=9)
+        panel.margins(x=0.03, y=0.15)
+    panels[-1].set_xlabel(f"time in {unit}")
+    return panels[0]
+
+
+def draw_steps(
+    shapers: Mapping[str, Shaper], modes: Sequence[Mode], ax: Axes | None = None, *, unshaped: bool = True
+) -> Axes:
+    """A shaped unit step (the staircase), and how each mode follows it; grey: unshaped."""
+    slowest_s = 1.0 / min(mode.frequency_hz for mode in modes)
+    until_s = max(shaper.duration_s for shaper in shapers.values()) + _SWINGS_SHOWN * slowest_s
+    period_s = until_s / _SAMPLES_OF_A_STEP
+    unit, scale = _time_unit(until_s)
+    rows = plot.grid(
+        ax, 1 + len(modes), 1, size_inch=(9.0, 2.2 + 1.9 * (1 + len(modes))), sharex="col",
+        title="A step behind each shaper, and how the modes follow" + " (grey: unshaped)" * unshaped,
+    )  # fmt: skip
+    panels = [row[0] for row in rows]
+    drawn = [("", Shaper([0.0], [1.0]), plot.GREY)] if unshaped else []
+    for number, (label, shaper) in enumerate(shapers.items()):
+        drawn.append((label, shaper, plot.COLOURS[number % len(plot.COLOURS)]))
+    for label, shaper, colour in drawn:
+        run = respond(modes, shaped_step(shaper, period_s, until_s), period_s)
+        if label:
+            panels[0].plot(run.times_s * scale, run.command, color=colour, linewidth=1.6, label=label)
+        for place, panel in enumerate(panels[1:]):
+            panel.plot(run.times_s * scale, run.responses[:, place], color=colour, linewidth=1.4 if label else 0.8)
+    panels[0].set_ylabel("command")
+    for panel, mode in zip(panels[1:], modes, strict=True):
+        panel.set_ylabel(f"{mode.frequency_hz:g} Hz")
+    panels[-1].set_xlabel(f"time in {unit}")
+    panels[-1].margins(x=0.01)
+    plot.legend_below(panels[-1], of=panels[0], columns=3)
+    return panels[0]
+
+
+def draw_branches(branches: MinimalBranches, modes: Sequence[Mode], ax: Axes | None = None) -> Axes:
+    """Durations of all minimal shapers of two modes over the frequency of the faster one, which a line marks."""
+    slow, fast = sorted(mode.frequency_hz for mode in modes)
+    panel = plot.axes(ax, size_inch=(9.0, 5.0), title=f"Minimal shapers of two modes, the slower one at {slow:g} Hz")
+    negative = (branches.amplitudes < 0.0).any(axis=2)
+    durations_s = branches.times_s[..., 2]
+    unit, scale = _time_unit(float(np.nanmax(durations_s)))
+    for has, colour, label in ((True, plot.COLOURS[0], "a negative tap"), (False, plot.COLOURS[1], "none")):
+        curves = np.where(negative == has, durations_s, np.nan)
+        panel.plot(branches.ratios * slow, curves.T * scale, color=colour, linewidth=1.4)
+        panel.plot([], [], color=colour, label=label)
+    panel.axvline(fast, color=plot.GREY, linewidth=0.8, linestyle="--", label=f"the faster mode, {fast:g} Hz")
+    panel.set_ylim(bottom=0.0)
+    panel.margins(x=0.01)
+    panel.set_xlabel("frequency of the faster mode in Hz")
+    panel.set_ylabel(f"duration in {unit}")
+    plot.legend_below(panel, columns=3)
+    return panel
+
+
+def _time_unit(longest_s: float) -> tuple[str, float]:
+    return ("s", 1.0) if longest_s >= 1.0 else ("ms", 1e3)
+
+
+@dataclass(frozen=True)
+class ModalRun:
+    """A command and what each mode makes of it."""
+
+    times_s: FloatArray  # instants, (n,), s
+    command: FloatArray  # the command at them, (n,); unit of the user
+    responses: FloatArray  # position of each mode's mass at them, (n, n_modes), same unit
+    # largest |response - command| of each mode from the instant at which the command rests, (n_modes,)
+    residuals: FloatArray
+
+
+def respond(modes: Sequence[_core.Mode], command: FloatArray, period_s: float) -> ModalRun:
+    """Base-excited modes, each alone, under a command that is linear between its samples (first-order hold)."""
+    command = np.asarray(command, dtype=np.float64)
+    if not modes or command.ndim != 1 or len(command) < 2:
+        raise _core.ArgumentError(
+            f"a response needs at least one mode and two samples: {len(modes)} modes, samples of shape {command.shape}"
+        )
+    options = _core.PlaybackOptions()
+    options.period_s = period_s
+    options.measure_contour = False
+    options.record_samples = len(command)
+    path = _core.Path([_core.Segment.line([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 1.0)])
+    samples = np.asfortranarray(np.tile(command[:, None], (1, _AXES)))
+    responses, residuals = [], []
+    for first in range(0, len(modes), _AXES):
+        group = modes[first : first + _AXES]
+        options.modes = [[mode] for mode in group] + [[]] * (_AXES - len(group))
+        figures = _core.play_samples(samples, path, options)
+        responses.append(figures.recorded_response[: len(command), : len(group)])
+        residuals.append(np.asarray(figures.residual_mm)[: len(group)])
+    times_s = np.arange(len(command), dtype=np.float64) * period_s
+    return ModalRun(times_s, command, np.hstack(responses, dtype=np.float64), np.hstack(residuals, dtype=np.float64))
+
+
+def shaped_step(shaper: _core.Shaper, period_s: float, until_s: float) -> FloatArray:
+    """A unit step behind a shaper: the staircase of its taps at 0, one period, ... at least `until_s`.
+
+    All is one period late, so that the first sample is at rest. A tap between two samples is shared by both so that
+    its time is kept; its step takes two periods.
+    """
+    times_s = np.arange(round(until_s / period_s) + 2) * period_s
+    after = (times_s[:, None] - shaper.times_s[None, :]) / period_s
+    return np.asarray(np.clip(0.5 * after, 0.0, 1.0) @ shaper.amplitudes, dtype=np.float64)

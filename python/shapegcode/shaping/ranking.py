@@ -12,12 +12,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shapegcode._core import ArgumentError
-from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.bands import ModeBand, ms, spoken
 from shapegcode.shaping.designs import Design
 from shapegcode.shaping.registry import FAMILIES
-from shapegcode.shaping.words import ms, spoken
-
-__all__ = ["NO_RESIDUAL", "OBJECTIVES", "SAME", "is_within", "pareto_front", "reason_for", "recommend"]
 
 NO_RESIDUAL = 1e-9
 """A residual ratio below this is none: what is left is the rounding of the solver."""

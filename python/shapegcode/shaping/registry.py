@@ -6,16 +6,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
-from shapegcode.shaping.bands import NARROW_PERCENT, ModeBand
-from shapegcode.shaping.designs import Design, evaluate
-from shapegcode.shaping.families import solvers
-from shapegcode.shaping.families.minimal import solve_minimal
+from shapegcode.shaping.bands import NARROW_PERCENT, ModeBand, ms
+from shapegcode.shaping.designs import Design, DesignOptions, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
-from shapegcode.shaping.options import DesignOptions
-from shapegcode.shaping.robust.minimax import minimax_robust
-from shapegcode.shaping.words import ms
-
-__all__ = ["FAMILIES", "DesignOptions", "Family", "design", "distinct", "family_named"]
+from shapegcode.shaping.robust import minimax_robust
+from shapegcode.shaping.solvers import (
+    hump_ei,
+    modified,
+    negative,
+    repeated,
+    simultaneous,
+    smooth,
+    solve_minimal,
+    specified,
+    user_taps,
+)
 
 _SAME_POLE = 1e-9  # relative
 _SLACK = 1e-9  # of a limit: forgives rounding
@@ -23,25 +28,16 @@ _SLACK = 1e-9  # of a limit: forgives rounding
 
 @dataclass(frozen=True)
 class Family:
-    """A row of the registry.
+    """A row of the registry."""
 
-    Attributes:
-        name: short name, as it is typed and as it stands in reports.
-        title: what people call it.
-        source: where it comes from; in full in docs/evidence/references.md.
-        validity: for which modes and on which times it exists, and what it does not do.
-        continuous: whether it can be designed at continuous times.
-        on_grid: whether it can be designed on a grid.
-        solve: all shapers of the family for the bands, the preferred one first; raises DesignError, which says
-            what is nearest, if there is none.
-    """
-
-    name: str
-    title: str
-    source: str
-    validity: str
-    continuous: bool
-    on_grid: bool
+    name: str  # short name, as it is typed and as it stands in reports
+    title: str  # what people call it
+    source: str  # where it comes from; in full in docs/evidence/references.md
+    validity: str  # for which modes and on which times it exists, and what it does not do
+    continuous: bool  # whether it can be designed at continuous times
+    on_grid: bool  # whether it can be designed on a grid
+    # all shapers of the family for the bands, the preferred one first; raises DesignError, which says what is nearest,
+    # if there is none
     solve: Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
 
 
@@ -59,17 +55,13 @@ def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
             f"no mode states a band to design for (of those in a machine file, up to {NARROW_PERCENT:g} % are taken as "
             "exact): a robust design is the non-negative one"
         )
-    found = minimax_robust(
-        bands, options.grid_period_s, vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s,
-        hints=False,
-    )  # fmt: skip
-    return [found.shaper]
+    return _mirrored(bands, options, mirrored=False)
 
 
-def _mirrored(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+def _mirrored(bands: Sequence[ModeBand], options: DesignOptions, *, mirrored: bool = True) -> list[Shaper]:
     found = minimax_robust(
         bands, options.grid_period_s, vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s,
-        mirrored=True, hints=False,
+        mirrored=mirrored, hints=False,
     )  # fmt: skip
     return [found.shaper]
 
@@ -81,50 +73,50 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "zv", "zero vibration, one mode after the other",
         "Smith 1958; Park, Hong and Danielson 2009 (paper 002), eq. 1-3",
-        "any modes, damped or not; exact at the nominal frequencies only", True, True, solvers.repeated("ZV", 1),
+        "any modes, damped or not; exact at the nominal frequencies only", True, True, repeated("ZV", 1),
     ),
     Family(
         "zvd", "zero vibration and derivative", "Singer and Seering 1990",
         "any modes; double zeros at the nominal frequencies, twice as long as ZV", True, True,
-        solvers.repeated("ZVD", 2),
+        repeated("ZVD", 2),
     ),
     Family(
         "zvdd", "zero vibration and two derivatives", "Singer and Seering 1990",
         "any modes; triple zeros at the nominal frequencies, three times as long as ZV", True, True,
-        solvers.repeated("ZVDD", 3),
+        repeated("ZVDD", 3),
     ),
     Family(
         "mzv", "modified zero vibration", "the printer firmware Klipper",
         "any modes; zeros at each mode and at 5/3 of its damped frequency, half as long again as ZV", True, True,
-        solvers.modified,
+        modified,
     ),
     Family(
         "ei", "extra-insensitive, one hump", "Singhose, Seering and Singer 1994; damped: this project",
         "modes damped up to some .7; leaves the vibration limit at the nominal frequency", True, True,
-        solvers.hump_ei("EI", 1),
+        hump_ei("EI", 1),
     ),
     Family(
         "ei2", "extra-insensitive, two humps", "Singhose, Porter, Tuttle and Singer 1997; damped: this project",
         "modes damped up to some .45; zero at the nominal frequency, the vibration limit on both sides", True, True,
-        solvers.hump_ei("two-hump EI", 2),
+        hump_ei("two-hump EI", 2),
     ),
     Family(
         "ei3", "extra-insensitive, three humps", "Singhose, Porter, Tuttle and Singer 1997; damped: this project",
         "modes damped up to some .3; leaves the vibration limit at the nominal frequency", True, True,
-        solvers.hump_ei("three-hump EI", 3),
+        hump_ei("three-hump EI", 3),
     ),
     Family(
         "si", "specified insensitivity", "Singhose, Seering and Singer 1996; linear programs: this project",
         "any modes with their bands, all at once; leaves up to the vibration limit; without a grid its times lie "
-        "1/64 of the fastest period apart", True, True, solvers.specified,
+        "1/64 of the fastest period apart", True, True, specified,
     ),
     Family(
         "negative-zv", "unity-magnitude ZV with a negative tap", "Singhose, Singer and Seering 1994",
-        "any modes; shorter than ZV, sum |a| 3 for one mode; excites faster modes", True, True, solvers.negative,
+        "any modes; shorter than ZV, sum |a| 3 for one mode; excites faster modes", True, True, negative,
     ),
     Family(
         "simultaneous", "shortest without negative taps, all modes at once", "this project",
-        "any modes at continuous times; on a grid it is the family non-negative", True, False, solvers.simultaneous,
+        "any modes at continuous times; on a grid it is the family non-negative", True, False, simultaneous,
     ),
     Family(
         "minimal", "one tap more than modes",
@@ -152,31 +144,31 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "smooth-zv", "polynomial kernel with a zero at the mode (Kalico's smooth_zv)", _KALICO,
         "any modes, best on a grid of four periods in a swing or more; its samples are the taps, none is negative; "
-        "exact at the nominal frequencies", False, True, solvers.smooth("smooth-zv", (1.0,), 0.8025),
+        "exact at the nominal frequencies", False, True, smooth("smooth-zv", (1.0,), 0.8025),
     ),
     Family(
         "smooth-mzv", "polynomial kernel with zeros at 1 and 5/3 times the mode (smooth_mzv)", _KALICO,
-        _SMOOTH, False, True, solvers.smooth("smooth-mzv", (1.0, 5.0 / 3.0), 0.95625),
+        _SMOOTH, False, True, smooth("smooth-mzv", (1.0, 5.0 / 3.0), 0.95625),
     ),
     Family(
         "smooth-ei", "polynomial kernel with zeros at 1 and 1.414 times the mode (smooth_ei)", _KALICO,
-        _SMOOTH, False, True, solvers.smooth("smooth-ei", (1.0, 1.41375), 1.06625),
+        _SMOOTH, False, True, smooth("smooth-ei", (1.0, 1.41375), 1.06625),
     ),
     Family(
         "smooth-ei2", "polynomial kernel with zeros at 1, 1.525 and 2.159 times the mode (smooth_2hump_ei)", _KALICO,
-        _SMOOTH, False, True, solvers.smooth("smooth-ei2", (1.0, 1.525, 2.159), 1.14875),
+        _SMOOTH, False, True, smooth("smooth-ei2", (1.0, 1.525, 2.159), 1.14875),
     ),
     Family(
         "smooth-si", "polynomial kernel with zeros at 1, 1.55 and 2.33 times the mode (smooth_si)", _KALICO,
-        _SMOOTH, False, True, solvers.smooth("smooth-si", (1.0, 1.5495, 2.32975), 1.245, at_least=True),
+        _SMOOTH, False, True, smooth("smooth-si", (1.0, 1.5495, 2.32975), 1.245, at_least=True),
     ),
     Family(
         "smooth-zvd-ei", "polynomial kernel with a double zero at the mode and one at 1.69 times it (smooth_zvd_ei)",
-        _KALICO, _SMOOTH, False, True, solvers.smooth("smooth-zvd-ei", (1.0, 1.0, 1.6875), 1.475),
+        _KALICO, _SMOOTH, False, True, smooth("smooth-zvd-ei", (1.0, 1.0, 1.6875), 1.475),
     ),
     Family(
         "taps", "taps as given", "the user",
-        "judged as they are; on a grid only if their times lie on it", True, True, solvers.user_taps,
+        "judged as they are; on a grid only if their times lie on it", True, True, user_taps,
     ),
 )  # fmt: skip
 """Every family, in the order of tables."""
@@ -222,23 +214,17 @@ def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None =
     if options.period_s is not None and not row.on_grid:
         raise ArgumentError(f"{name} has no design on a grid: leave the period out ({row.validity})")
     found = row.solve(distinct(bands), options)
-    if row.name != "taps":
-        _require_within(name, found, options)
-        found = [shaper for shaper in found if _is_within(shaper, options)]
-    return [evaluate(name, shaper, bands, options.period_s) for shaper in found]
-
-
-def _is_within(shaper: Shaper, options: DesignOptions) -> bool:
-    return shaper.duration_s <= options.max_duration_s * (1.0 + _SLACK) and shaper.abs_sum <= options.max_abs_sum * (
-        1.0 + _SLACK
-    )
-
-
-def _require_within(name: str, found: Sequence[Shaper], options: DesignOptions) -> None:
-    """Raise DesignError unless one of the shapers is within the limits."""
-    if found and not any(_is_within(shaper, options) for shaper in found):
+    most_s, most_sum = options.max_duration_s, options.max_abs_sum
+    within = [
+        shaper
+        for shaper in found
+        if row.name == "taps"
+        or (shaper.duration_s <= most_s * (1.0 + _SLACK) and shaper.abs_sum <= most_sum * (1.0 + _SLACK))
+    ]
+    if found and not within:
         nearest = min(found, key=lambda shaper: shaper.duration_s)
         raise DesignError(
-            f"{name} lasts {ms(nearest.duration_s)} with sum|a| {nearest.abs_sum:.4g}: the limits are "
-            f"{ms(options.max_duration_s)} and {options.max_abs_sum:.4g}"
+            f"{name} lasts {ms(nearest.duration_s)} with sum|a| {nearest.abs_sum:.4g}: the limits are {ms(most_s)} and "
+            f"{most_sum:.4g}"
         )
+    return [evaluate(name, shaper, bands, options.period_s) for shaper in within]

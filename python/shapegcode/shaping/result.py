@@ -8,13 +8,10 @@ from typing import Any, ClassVar
 
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
-from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.bands import ModeBand, spoken
 from shapegcode.shaping.designs import Design
 from shapegcode.shaping.ranking import NO_RESIDUAL, is_within, recommend
 from shapegcode.shaping.registry import FAMILIES
-from shapegcode.shaping.words import spoken
-
-__all__ = ["Recommendation", "Refusal", "families_table", "times_name"]
 
 _MARK, _GRID_MARK = "=>", "->"
 _PARETO_OF_A_FAMILY = 3  # rows, beside the preferred one

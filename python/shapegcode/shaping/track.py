@@ -18,40 +18,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
-from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, Vertices, shortest_non_negative
-from shapegcode.shaping.words import whole_periods
-
-__all__ = [
-    "MovingMode",
-    "ShaperTrack",
-    "TrackNode",
-    "design_track",
-    "mean_range",
-    "shaper_of_mean",
-    "taps_of_mean",
-]
+from shapegcode.shaping.bands import check_times, whole_periods
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, Vertices, refined, shortest_non_negative
 
 FloatArray = NDArray[np.float64]
-
 _LOOKS = 16  # positions between two nodes at which the residual is looked at
 _SUPPORT = 1e-9  # amplitudes above this are taps
 _LONGER = 1.3  # how much longer shapers may become for a common mean delay
 _SAME_MEAN = 1e-9  # periods
-
 NodeDesign = Callable[[Sequence[Mode]], Shaper]
+_MEANS = 9  # mean delays that are compared
+_POINT = 1e-8  # periods: means that differ by less are one
 
 
 @dataclass(frozen=True)
 class MovingMode:
-    """A mode and how it depends on the position of the axis that is followed.
+    """A mode and how it depends on the position of the axis that is followed."""
 
-    Attributes:
-        mode: nominal frequency and damping.
-        table: over the axis' position; None: the mode stays.
-    """
-
-    mode: Mode
-    table: ModeTable | None = None
+    mode: Mode  # nominal frequency and damping
+    table: ModeTable | None = None  # over the axis' position; None: the mode stays
 
     def at(self, position_mm: float) -> Mode:
         """The mode where the axis stands at `position_mm`."""
@@ -60,34 +45,21 @@ class MovingMode:
 
 @dataclass(frozen=True)
 class TrackNode:
-    """A position of the axis and the shaper for it.
+    """A position of the axis and the shaper for it."""
 
-    Attributes:
-        position_mm: of the axis, in the coordinates of the tables.
-        modes: what the shaper cancels there.
-        shaper: the taps, on the grid.
-    """
-
-    position_mm: float
-    modes: tuple[Mode, ...]
-    shaper: Shaper
+    position_mm: float  # of the axis, in the coordinates of the tables
+    modes: tuple[Mode, ...]  # what the shaper cancels there
+    shaper: Shaper  # the taps, on the grid
 
 
 @dataclass(frozen=True)
 class ShaperTrack:
-    """Shapers along an axis.
+    """Shapers along an axis."""
 
-    Attributes:
-        axis: 0, 1, 2 for X, Y, Z.
-        period_s: grid of all shapers, s.
-        nodes: at ascending positions.
-        worst_residual: largest residual ratio of any mode anywhere on the track.
-    """
-
-    axis: int
-    period_s: float
-    nodes: tuple[TrackNode, ...]
-    worst_residual: float
+    axis: int  # 0, 1, 2 for X, Y, Z
+    period_s: float  # grid of all shapers, s
+    nodes: tuple[TrackNode, ...]  # at ascending positions
+    worst_residual: float  # largest residual ratio of any mode anywhere on the track
 
     @property
     def duration_s(self) -> float:
@@ -196,9 +168,7 @@ def taps_of_mean(
     if taps is None:
         return None
     support = np.flatnonzero(taps > _SUPPORT)
-    taps = taps[support]
-    for _ in range(3):  # the optimiser's tolerance, then rounding
-        taps = taps + np.linalg.lstsq(matrix[:, support], right - matrix[:, support] @ taps, rcond=1e-14)[0]
+    taps = refined(matrix[:, support], right, taps[support])
     if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT):
         return None
     return support, taps / taps.sum()
@@ -255,3 +225,53 @@ def _worst_between(left: TrackNode, right: TrackNode, modes: Sequence[MovingMode
         position = left.position_mm + float(share) * (right.position_mm - left.position_mm)
         worst = max(worst, *(mixed.residual_ratio(moving.at(position)) for moving in modes))
     return worst
+
+
+def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Fir] | None:
+    """Shortest non-negative filters, one for each axis, of one mean delay, that cancel the axis' own modes exactly.
+
+    The longest of them is as short as the grid permits; among the mean delays that all axes can have, the one with
+    the least sum of second central moments is taken. An axis without modes is only delayed.
+
+    Source: this project.
+    """
+    if not any(axis_modes):
+        raise ArgumentError("shapers for each axis need at least one mode: 0 given")
+    check_times(period_s=period_s)
+    shaken = [list(modes) for modes in axis_modes if modes]
+    for periods in range(1, whole_periods(max_duration_s, period_s) + 1):
+        ranges = [mean_range(modes, period_s, periods) for modes in shaken]
+        least, largest = max(low for low, _ in ranges), min(high for _, high in ranges)
+        if least > largest + _POINT:
+            continue
+        if least > largest:  # a single mean, within the rounding of both ends
+            least = largest = 0.5 * (least + largest)
+        found = [
+            filters
+            for mean in np.linspace(least, largest, _MEANS)
+            if (filters := _of_mean(axis_modes, period_s, periods, float(mean))) is not None
+        ]
+        if found:
+            return min(found, key=lambda filters: sum(each.variance_samples2 for each in filters))
+    return None
+
+
+def _of_mean(axis_modes: Sequence[Sequence[Mode]], period_s: float, periods: int, mean: float) -> list[Fir] | None:
+    """One filter per axis with a mean delay of `mean` periods, or None."""
+    filters = []
+    for modes in axis_modes:
+        if not modes:
+            whole = math.floor(mean)
+            share = mean - whole
+            filters.append(Fir([whole, whole + 1], [1.0 - share, share]) if share > 0.0 else Fir([whole], [1.0]))
+            continue
+        found = taps_of_mean(modes, period_s, periods, mean * period_s)
+        if found is None:
+            return None
+        delays, taps = found
+        # What is left of a mode does not depend on when the first tap comes.
+        shaper = Shaper(((delays - delays[0]) * period_s).tolist(), taps.tolist())
+        if max(shaper.residual_ratio(mode) for mode in modes) > RESIDUAL_LIMIT:
+            return None
+        filters.append(Fir(delays.tolist(), taps.tolist()))
+    return filters

@@ -23,8 +23,6 @@ from shapegcode.program import Program, given_program
 from shapegcode.program.operating import OVERRIDE_LOCKED
 from shapegcode.timing.result import PARTS, BlockTime, CycleTime, RegionTime, ToolTime
 
-__all__ = ["cycle_time"]
-
 _KINDS = {value: name for name, value in ((kind.name, kind.value) for kind in _core.BlockKind.__members__.values())}
 _CUTTING, _RAPID = _core.BlockKind.cutting.value, _core.BlockKind.rapid.value
 

@@ -1,4 +1,11 @@
-"""The search for the shortest taps on a grid that meet conditions: linear programs, cut until every limit holds."""
+"""The families of shapers on a sample grid: what defines them, imposed exactly there.
+
+Rounding the times of a continuous design to a grid undoes its zeros. So a family is taken here by the
+conditions that define it, and the shortest taps on the grid that meet them are looked for: zeros, with their
+multiplicity, hold at ``z = e^{s*period}`` to rounding; a tolerated residual holds over its whole band, proven by
+:func:`shapegcode._core.worst_residual`. A zero is linear in the taps. A limit on the residual is linear for each
+frequency and direction, and the ones that matter are found as the linear program breaks them.
+"""
 
 from __future__ import annotations
 
@@ -9,20 +16,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shapegcode._core import DesignError, Mode, Shaper, sensitivity_curve
-from shapegcode.shaping.families.conditions import Conditions, ResidualLimit
+from shapegcode._core import (
+    DesignError,
+    Mode,
+    ShapegcodeError,
+    Shaper,
+    convolve,
+    grid_polynomial,
+    sensitivity_curve,
+    worst_residual,
+)
+from shapegcode.shaping.bands import check_times, ms, whole_periods
+from shapegcode.shaping.grid_designs import halved
 from shapegcode.shaping.linear_program import LinearProgram
 
-__all__ = ["LIMIT_MARGIN", "RESIDUAL_LIMIT", "GridSearch"]
-
+_LONGER = 4  # times the longest duration: how far a refusal looks for what would do
+_HINT_PERIODS = 400  # longest grid that a refusal searches, periods
 FloatArray = NDArray[np.float64]
-
 RESIDUAL_LIMIT = 1e-10
 """Largest residual ratio at a zero of a design that is handed out; the usual one is 1e-16 to 1e-15."""
-
 LIMIT_MARGIN = 1e-3
 """Share of a tolerated residual that the search leaves unused, so that it ends: the shortest is meant with it."""
-
 _SAME_CONDITION = 1e-13  # relative singular value below which two zeros ask for the same thing on this grid
 _SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # magnitudes above one of these are taps
 _FIRST_DIRECTIONS = 8
@@ -32,6 +46,76 @@ _MOST_ROUNDS = 60
 _CENTRES = (0.0, 0.5, 1.0)  # of the duration: starts on the way to the least second central moment
 _CENTRINGS = 4  # steps of that way
 _SAME_CENTRE = 1e-6  # of the duration
+
+
+def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> Shaper:
+    """Shortest shaper with taps at multiples of a period that meets the conditions.
+
+    Among the shapers of the shortest duration, one without negative taps has the least second central moment that
+    was found (the contour cost; a local minimum from three starts), one with them the least sum of magnitudes.
+
+    Source: this project.
+    """
+    check_times(period_s=period_s, max_duration_s=max_duration_s)
+    search = GridSearch(conditions, period_s)
+    most = whole_periods(max_duration_s, period_s)
+    shaper = search.shortest(most)
+    if shaper is not None:
+        return shaper
+    text = f"no {title} within {ms(max_duration_s)} on a {ms(period_s)} grid"
+    further = min(_LONGER * most, _HINT_PERIODS)
+    if further > most:
+        longer = search.shortest(further)
+        if longer is not None:
+            raise DesignError(f"{text}; the shortest lasts {ms(longer.duration_s)}")
+        text += f", nor within {ms(further * period_s)}"
+    raise DesignError(f"{text}; {_polynomial(conditions, period_s)}; try another period")
+
+
+def _polynomial(conditions: Conditions, period_s: float) -> str:
+    """What the polynomial with the same zeros would be."""
+    if not conditions.zeros:
+        return "there is no zero from which a polynomial could be made"
+    try:
+        shaper = Shaper([0.0], [1.0])
+        for zero in conditions.zeros:
+            for _ in range(zero.multiplicity):
+                shaper = convolve(shaper, grid_polynomial([zero.mode], period_s))
+    except ShapegcodeError as error:
+        return f"nor is there a polynomial: {error}"
+    return f"the polynomial with its zeros lasts {ms(shaper.duration_s)} with sum|a| {shaper.abs_sum:.4g}"
+
+
+@dataclass(frozen=True)
+class Zero:
+    """A mode of which nothing may be left: `multiplicity` - 1 derivatives of the residual vanish with it."""
+
+    mode: Mode
+    multiplicity: int = 1
+
+
+@dataclass(frozen=True)
+class ResidualLimit:
+    """The most that may be left of a mode (no unit) whose natural frequency lies anywhere in a band (Hz)."""
+
+    mode: Mode
+    lowest_hz: float
+    highest_hz: float
+    limit: float
+
+    def worst(self, shaper: Shaper) -> tuple[float, float]:
+        """Proven bound on the residual over the band, and the frequency (Hz) where it is largest."""
+        found = worst_residual(shaper, self.mode, self.lowest_hz, self.highest_hz)
+        return found.upper_bound, found.frequency_hz
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What a shaper must satisfy."""
+
+    zeros: tuple[Zero, ...] = ()  # met to rounding
+    limits: tuple[ResidualLimit, ...] = ()  # met over their bands
+    largest_tap: float | None = None  # None: no tap is negative; else: the largest magnitude of a tap, either sign
 
 
 @dataclass(frozen=True)
@@ -93,13 +177,7 @@ class GridSearch:
                     too_few = at
                 else:
                     enough = at
-        while enough - too_few > 1:
-            middle = (too_few + enough) // 2
-            if self._feasible(middle) is None:
-                too_few = middle
-            else:
-                enough = middle
-        return enough
+        return halved(lambda last: self._feasible(last) is not None, too_few, enough)
 
     def _usual_periods(self) -> int:
         """About where the search ends: half a swing for each zero, a whole one for each limit without a zero in it."""

@@ -1,4 +1,12 @@
-"""The search behind the robust designs: the smallest number of periods, and the best taps for it."""
+"""Robust shapers on a sample grid: the least worst residual over frequency bands, and the shortest one below a limit.
+
+A mode's frequency is never known exactly: an identification gives it with an interval, and it moves with the load. The
+designs here bound the residual ratio over a whole band of each mode, on the grid, so that they survive being written as
+blocks. What is best is proven: the cutting planes of :mod:`shapegcode.shaping.cutting_planes` give
+a bound that no other design can beat, and a sweep with a bound on what lies between its samples judges the taps.
+
+A mode without a band (uncertainty 0) is cancelled exactly at its frequency, as the plain grid designs do.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
-from shapegcode.shaping.bands import ModeBand
-from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, lower_hull, shortest_non_negative
-from shapegcode.shaping.robust.cutting_planes import (
+from shapegcode.shaping.bands import (
+    ModeBand,
+    band_names,
+    check_modes_and_times,
+    check_times,
+    mode_names,
+    ms,
+    whole_periods,
+)
+from shapegcode.shaping.cutting_planes import (
     NO_RESIDUAL,
     SAME_RESIDUAL,
     Bounds,
@@ -20,15 +35,22 @@ from shapegcode.shaping.robust.cutting_planes import (
     TapProblem,
     proven_worst,
 )
-from shapegcode.shaping.words import band_names, mode_names, ms, whole_periods
+from shapegcode.shaping.grid_designs import (
+    RESIDUAL_LIMIT,
+    exact_conditions,
+    halved,
+    lower_hull,
+    refined,
+    shortest_non_negative,
+)
 
-__all__ = [
-    "RobustDesign", "Task", "best_within", "check_time", "no_exact", "shortest_below",
-    "smallest_below", "unreachable",
-]  # fmt: skip
-
+VIBRATION_LIMIT = 0.05
+"""Residual ratio that a robust design may leave anywhere in the bands unless another one is asked for."""
+_LONGER = 4  # times the longest duration: how far a refusal looks for what would do
+_OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # of the refused one: what a refusal looks at
+_HINT_PRECISION = 0.05  # relative, of the duration that would do
+_HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 FloatArray = NDArray[np.float64]
-
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's dust
 _GROWTH = 1.4  # of the number of periods while it is searched
 _WHOLE = 1e-3  # swings per period from a whole number
@@ -37,42 +59,130 @@ _LAST_TAP = 1e-3
 _SAME_VARIANCE = 5e-3  # relative
 
 
+def least_worst(
+    bands: Sequence[ModeBand],
+    period_s: float,
+    duration_s: float,
+    *,
+    non_negative: bool = True,
+    max_abs_sum: float = 10.0,
+    zeros_at_nominal: bool = False,
+) -> RobustDesign:
+    """Taps on a grid whose worst residual over the bands is least, for a given duration.
+
+    The optimum is proven to 0.1 %: `worst_residual` is at most that much above `least_possible` (a residual below
+    1e-6 counts as none). The exception is a damped mode on a grid where the best use of the last periods is to wait:
+    the residual counts from the last tap, so the shaper is then shorter, or a last tap of 0.001 marks the end.
+
+    Source: this project.
+    """
+    task = Task.checked(bands, period_s, non_negative, max_abs_sum, zeros_at_nominal)
+    check_times(duration_s=duration_s)
+    if not task.wide:
+        raise ArgumentError(
+            f"no mode states a band ({band_names(bands)}): nothing to make least; ask for the shortest exact design"
+        )
+    last = task.periods(duration_s)
+    found = best_within(task, last)
+    if found is None:
+        reason = unreachable(task)
+        raise DesignError(no_exact(task, last * period_s) + (f"; {reason}" if reason else ""))
+    return found
+
+
+def minimax_robust(
+    bands: Sequence[ModeBand],
+    period_s: float,
+    *,
+    vibration_limit: float = VIBRATION_LIMIT,
+    max_duration_s: float = 0.25,
+    non_negative: bool = True,
+    max_abs_sum: float = 10.0,
+    zeros_at_nominal: bool = False,
+    mirrored: bool = False,
+    hints: bool = True,
+) -> RobustDesign:
+    """Shortest taps on a grid that leave at most a given share of the vibration anywhere in the bands.
+
+    The number of periods is the smallest for which the least worst residual is below the limit (to 0.1 %). Among the
+    non-negative designs of that duration the one with the least second central moment, the contour cost, is taken
+    (to 0.5 %); with negative taps, the one with the least sum of magnitudes.
+
+    Source: this project.
+    """
+    task = Task.checked(bands, period_s, non_negative, max_abs_sum, zeros_at_nominal, mirrored)
+    check_times(max_duration_s=max_duration_s)
+    if not 0.0 < vibration_limit < 1.0:
+        raise ArgumentError(f"vibration_limit is {vibration_limit}: it must be above 0 and below 1")
+    found = shortest_below(task, vibration_limit, max_duration_s)
+    if found is None:
+        text = refusal(task, vibration_limit, max_duration_s)
+        raise DesignError(f"{text}{_hints(task, vibration_limit, max_duration_s)}" if hints else text)
+    return found
+
+
+def _hints(task: Task, limit: float, max_duration_s: float) -> str:
+    """What the longest allowed duration reaches, which one would do, and which other period."""
+    text = ""
+    if not unreachable(task):
+        most = task.periods(max_duration_s)
+        reached = best_within(task, most) if task.wide and most else None
+        if reached is not None:
+            text += f"; the longest allowed reaches {_percent(reached.worst_residual)}"
+        else:
+            text += f"; {no_exact(task, most * task.period_s)}"
+        longest = min(_LONGER * most, max(_HINT_PERIODS, most))
+        enough = smallest_below(task, limit, longest, too_few=most, precision=_HINT_PRECISION)
+        text += f"; {ms(enough * task.period_s)} would do" if enough else f"; nor does {ms(longest * task.period_s)} do"
+    return f"{text}; {_other_period(task, limit, max_duration_s)}"
+
+
+def _other_period(task: Task, limit: float, max_duration_s: float) -> str:
+    """Which of some other periods does best within the duration."""
+    shortest_s, least = math.inf, math.inf
+    shortest_text, least_text = "", "no other period from half to twice as long has a design within that duration"
+    for share in _OTHER_PERIODS:
+        other = task.at_period(share * task.period_s)
+        most = min(other.periods(max_duration_s), _HINT_PERIODS)
+        if not most or unreachable(other):
+            continue
+        enough = smallest_below(other, limit, most)
+        if enough is not None:
+            if enough * other.period_s < shortest_s:
+                shortest_s = enough * other.period_s
+                shortest_text = f"on a period of {ms(other.period_s)} a design of {ms(shortest_s)} would do"
+            continue
+        found = best_within(other, most)
+        if found is not None and found.worst_residual < least:
+            least = found.worst_residual
+            least_text = f"a period of {ms(other.period_s)} reaches {_percent(least)} within that duration"
+    return shortest_text or least_text
+
+
+def _percent(ratio: float) -> str:
+    return f"{100.0 * ratio:.3g} %"
+
+
 @dataclass(frozen=True)
 class RobustDesign:
-    """A shaper on a grid, its worst residual, and how much better any other one could be.
+    """A shaper on a grid, its worst residual, and how much better any other one could be."""
 
-    Attributes:
-        shaper: the taps; times are multiples of `period_s`.
-        period_s: period of the grid, s.
-        worst_residual: largest residual ratio over the bands, proven: at most 0.01 % above the true one.
-        least_possible: no design of this duration or a shorter one has a smaller worst residual.
-    """
-
-    shaper: Shaper
-    period_s: float
-    worst_residual: float
-    least_possible: float
+    shaper: Shaper  # the taps; times are multiples of `period_s`
+    period_s: float  # period of the grid, s
+    worst_residual: float  # largest residual ratio over the bands, proven: at most 0.01 % above the true one
+    least_possible: float  # no design of this duration or a shorter one has a smaller worst residual
 
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked for, whatever the duration.
+    """What is asked for, whatever the duration."""
 
-    Attributes:
-        bands: modes with their bands; one without a band is cancelled exactly.
-        period_s: of the grid, s.
-        max_abs_sum: largest sum of the taps' magnitudes; None: no tap is negative.
-        zeros_at_nominal: every mode is cancelled exactly at its nominal frequency.
-        pool: planes found so far.
-        mirrored: the taps are the same read backwards.
-    """
-
-    bands: tuple[ModeBand, ...]
-    period_s: float
-    max_abs_sum: float | None
-    zeros_at_nominal: bool
-    pool: CutPool
-    mirrored: bool = False
+    bands: tuple[ModeBand, ...]  # modes with their bands; one without a band is cancelled exactly
+    period_s: float  # of the grid, s
+    max_abs_sum: float | None  # largest sum of the taps' magnitudes; None: no tap is negative
+    zeros_at_nominal: bool  # every mode is cancelled exactly at its nominal frequency
+    pool: CutPool  # planes found so far
+    mirrored: bool = False  # the taps are the same read backwards
 
     @classmethod
     def checked(
@@ -85,9 +195,7 @@ class Task:
         mirrored: bool = False,
     ) -> Task:
         """The task, its values checked."""
-        if not bands:
-            raise ArgumentError("a shaper needs at least one mode: 0 given")
-        check_time("period_s", period_s)
+        check_modes_and_times(bands, period_s=period_s)
         if not (math.isfinite(max_abs_sum) and max_abs_sum >= 1.0):
             raise ArgumentError(f"max_abs_sum is {max_abs_sum}: it must be finite and at least 1, the sum of the taps")
         bands = tuple(bands)
@@ -131,9 +239,7 @@ class Task:
             taps = 0.5 * (taps + taps[::-1])
         support = np.flatnonzero(np.abs(taps) > _NO_TAP)
         matrix, right = self.conditions(len(taps) - 1)
-        amplitudes, columns = taps[support], matrix[:, support]
-        for _ in range(3):
-            amplitudes = amplitudes + np.linalg.lstsq(columns, right - columns @ amplitudes, rcond=1e-14)[0]
+        amplitudes = refined(matrix[:, support], right, taps[support])
         total = float(amplitudes.sum())
         if abs(total - 1.0) > RESIDUAL_LIMIT or (self.max_abs_sum is None and np.any(amplitudes <= 0.0)):
             return None
@@ -219,13 +325,7 @@ def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, pre
     enough = min(enough, most)
     if enough <= too_few or _below(task, enough, limit) is None:
         return None
-    while enough - too_few > max(1, math.floor(precision * enough)):
-        middle = (too_few + enough) // 2
-        if _below(task, middle, limit) is None:
-            too_few = middle
-        else:
-            enough = middle
-    return enough
+    return halved(lambda last: _below(task, last, limit) is not None, too_few, enough, precision)
 
 
 def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesign | None:
@@ -250,12 +350,6 @@ def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesi
         if found is not None and found.worst_residual <= limit:
             return found
     return plain
-
-
-def check_time(name: str, value_s: float) -> None:
-    """Refuse a time that is not finite and above 0."""
-    if not (math.isfinite(value_s) and value_s > 0.0):
-        raise ArgumentError(f"{name} is {value_s} s: it must be finite and above 0")
 
 
 def no_exact(task: Task, duration_s: float) -> str:

@@ -21,17 +21,12 @@ from shapegcode._core import DesignError, Shaper
 from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.linear_program import LinearProgram
 
-__all__ = ["NO_RESIDUAL", "SAME_RESIDUAL", "Bounds", "CutPool", "TapProblem", "proven_worst"]
-
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-
 SAME_RESIDUAL = 1e-3
 """Relative gap between the lower bound and the design at which the design counts as optimal."""
-
 NO_RESIDUAL = 1e-6
 """Residual ratio that counts as none: no gap is pursued below it."""
-
 _STEP_RAD = 0.1  # of the sweep, seen from the middle of the shaper; the peaks are refined
 _FEWEST_STEPS = 8
 _MOST_ROUNDS = 60
@@ -118,25 +113,16 @@ class _Band:
 
 @dataclass
 class TapProblem:
-    """Taps at 0, 1 ... `last` periods, sum 1, under conditions on their residual over bands.
+    """Taps at 0, 1 ... `last` periods, sum 1, under conditions on their residual over bands."""
 
-    Attributes:
-        bands: where the residual is bounded; angular frequencies are swept, the damping ratio is the nominal one.
-        period_s: of the grid, s.
-        last: number of periods.
-        equalities: matrix and right-hand side of the linear conditions, the sum among them.
-        max_abs_sum: largest sum of the taps' magnitudes; None: no tap is negative.
-        pool: planes, shared between problems of different duration.
-        last_tap: the tap at `last` periods is at least that.
-    """
-
+    # where the residual is bounded; angular frequencies are swept, the damping ratio is the nominal one
     bands: Sequence[ModeBand]
-    period_s: float
-    last: int
-    equalities: tuple[FloatArray, FloatArray]
-    max_abs_sum: float | None
-    pool: CutPool
-    last_tap: float = 0.0
+    period_s: float  # of the grid, s
+    last: int  # number of periods
+    equalities: tuple[FloatArray, FloatArray]  # matrix and right-hand side of the linear conditions, the sum among them
+    max_abs_sum: float | None  # largest sum of the taps' magnitudes; None: no tap is negative
+    pool: CutPool  # planes, shared between problems of different duration
+    last_tap: float = 0.0  # the tap at `last` periods is at least that
     _bands: list[_Band] = field(init=False)
     _rows: list[list[FloatArray]] = field(init=False)
     _program: LinearProgram | None = field(init=False, default=None)

@@ -10,8 +10,6 @@ from shapegcode.cutting.tool import Tool
 from shapegcode.settings.keys import toml
 from shapegcode.settings.reference import key_tables
 
-__all__ = ["STEEL_TOOL", "STOCK_EXAMPLES", "file_documentation"]
-
 STEEL_TOOL = """\
 [tool]
 name = "12 mm, 4 flutes"

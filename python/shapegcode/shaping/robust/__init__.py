@@ -1,1 +1,0 @@
-"""Shapers that hold over bands of frequency."""

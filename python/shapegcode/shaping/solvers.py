@@ -1,0 +1,333 @@
+"""How each family is designed: at continuous times, and on a grid from the conditions that define it.
+
+Families of one mode serve several by convolution, one mode after the other, on either kind of times.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from shapegcode._core import (
+    ArgumentError,
+    DesignError,
+    MinimalShapers,
+    Mode,
+    Shaper,
+    convolve,
+    convolved_zv,
+    extra_insensitive,
+    minimal_shapers,
+    mzv,
+    mzv_second_zero,
+    negative_zv,
+    repeated_zv,
+)
+from shapegcode.shaping.bands import ModeBand, mode_names, ms
+from shapegcode.shaping.designs import DesignOptions, on_grid
+from shapegcode.shaping.grid_designs import halved
+from shapegcode.shaping.grid_search import RESIDUAL_LIMIT, Conditions, ResidualLimit, Zero, shortest_on_grid
+
+Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
+"""All shapers of a family for some bands, the preferred one first."""
+_STEPS_PER_PERIOD = 64  # of the fastest frequency: time grid of the SI shaper at continuous times
+FloatArray = NDArray[np.float64]
+_PER_PERIOD = (40, 80, 160, 320)  # steps of the time grid in a period of the fastest mode
+_NEIGHBOURS = 2.5  # steps: taps closer than this are one tap between them
+_NEWTON_STEPS = 30
+_RESIDUAL = 1e-13
+_SMALLEST_TAP = 1e-9
+_FIRST = 0.7  # of the usual length: no kernel without negative samples is shorter, so the search begins there
+_FURTHEST = 2.5
+_STRIDES = 40  # of the usual length: how coarsely the first kernel is looked for, before the steps are halved
+_MOST_SAMPLES = 20_000
+_WHOLE = 1e-9
+_CLEARLY = 1e-3  # of the largest sample: a negative one that what rounding left does not lift
+_SINGULAR = 1e-12  # relative singular value below which two conditions ask for the same thing on this grid
+_SPANS = (1.0, 2.0)  # durations of the convolved ZV that are searched, one after the other
+_MOST_PERIODS = 100.0 - 1e-6  # of the fastest mode: the limit of minimal_shapers
+_PROVEN_MODES = 3  # more modes take too many boxes for a proof; the starts alone search them
+
+
+def _one_after_the_other(of_one: Callable[[Mode, DesignOptions], Shaper]) -> Solve:
+    """The design of one mode, convolved over all."""
+
+    def solve(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+        shaper = of_one(bands[0].mode, options)
+        for band in bands[1:]:
+            shaper = convolve(shaper, of_one(band.mode, options))
+        return [shaper]
+
+    return solve
+
+
+def _defined(
+    name: str,
+    continuous: Callable[[Mode, DesignOptions], Shaper],
+    conditions: Callable[[Mode, DesignOptions], Conditions],
+) -> Solve:
+    """A closed form at continuous times; on a grid the shortest taps that meet the conditions that define it."""
+
+    def of_one(mode: Mode, options: DesignOptions) -> Shaper:
+        if options.period_s is None:
+            return continuous(mode, options)
+        return shortest_on_grid(
+            conditions(mode, options),
+            options.period_s,
+            options.max_duration_s,
+            title=f"{name} for {mode_names([mode])}",
+        )
+
+    return _one_after_the_other(of_one)
+
+
+def repeated(name: str, zeros: int) -> Solve:
+    """ZV, ZVD, ZVDD ...: that many zeros at each mode; on a grid the shortest non-negative taps that have them."""
+    return _defined(
+        name,
+        lambda mode, _options: repeated_zv(mode, zeros),
+        lambda mode, _options: Conditions(zeros=(Zero(mode, zeros),)),
+    )
+
+
+def hump_ei(name: str, humps: int) -> Solve:
+    """EI with that many humps; on a grid its zeros, and its residual between the outermost ones."""
+
+    def conditions(mode: Mode, options: DesignOptions) -> Conditions:
+        zeros_hz = extra_insensitive(mode, options.vibration_limit, humps).zeros_hz
+        return Conditions(
+            zeros=tuple(Zero(Mode(frequency_hz, mode.damping_ratio)) for frequency_hz in zeros_hz),
+            limits=(ResidualLimit(mode, zeros_hz[0], zeros_hz[-1], options.vibration_limit),),
+        )
+
+    return _defined(
+        name, lambda mode, options: extra_insensitive(mode, options.vibration_limit, humps).shaper, conditions
+    )
+
+
+modified = _defined(
+    "MZV",
+    lambda mode, _options: mzv(mode),
+    lambda mode, _options: Conditions(zeros=(Zero(mode), Zero(mzv_second_zero(mode)))),
+)
+"""MZV; on a grid the shortest non-negative taps with its two zeros."""
+
+negative = _defined(
+    "negative ZV",
+    lambda mode, _options: negative_zv(mode),
+    lambda mode, _options: Conditions(zeros=(Zero(mode),), largest_tap=1.0),
+)
+"""Unity-magnitude ZV; on a grid the shortest taps between -1 and 1."""
+
+
+def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bool = False) -> Solve:
+    """A polynomial kernel with zeros at these multiples of each mode, see `smooth_kernel`."""
+    return _one_after_the_other(smooth_kernel(name, ratios, periods, at_least=at_least))
+
+
+def specified(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    """SI: the shortest non-negative taps that leave at most the vibration limit over every band."""
+    conditions = Conditions(limits=tuple(_limit(band, options.vibration_limit) for band in bands))
+    period_s = options.period_s
+    if period_s is None:
+        period_s = 1.0 / (_STEPS_PER_PERIOD * max(each.highest_hz for each in conditions.limits))
+    title = f"SI shaper with {options.vibration_limit:.4g} left for {mode_names([band.mode for band in bands])}"
+    return [shortest_on_grid(conditions, period_s, options.max_duration_s, title=title)]
+
+
+def _limit(band: ModeBand, limit: float) -> ResidualLimit:
+    if not 0.0 < limit < 1.0:
+        raise ArgumentError(f"the vibration limit is {limit:.4g}: it must be above 0 and below 1")
+    return ResidualLimit(band.mode, band.shifted(-1.0).frequency_hz, band.shifted(1.0).frequency_hz, limit)
+
+
+def simultaneous(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    """Shortest non-negative taps at continuous times that cancel all modes at once."""
+    return [simultaneous_zv([band.mode for band in bands], options.max_duration_s)]
+
+
+def user_taps(_bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    """The taps that were given, on the grid if there is one."""
+    if options.taps is None:
+        raise ArgumentError("the family taps judges taps that are given: none are")
+    return [options.taps if options.period_s is None else on_grid(options.taps, options.period_s)]
+
+
+def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
+    """Shortest shaper with non-negative taps at continuous times that cancels every mode.
+
+    Source: this project (numerical optimum over all modes at once).
+    """
+    fastest_hz = max(mode.frequency_hz for mode in modes)
+    title = f"simultaneous shaper without negative taps for {mode_names(modes)}"
+    conditions = Conditions(zeros=tuple(Zero(mode) for mode in modes))
+    for per_period in _PER_PERIOD:
+        step_s = 1.0 / (per_period * fastest_hz)
+        # the exact solution may be shorter than that of the grid by a step or two
+        try:
+            start = shortest_on_grid(conditions, step_s, max_duration_s + 2.0 * step_s, title=title)
+        except DesignError as error:
+            one_by_one_s = convolved_zv(modes).duration_s
+            raise DesignError(
+                f"no {title} within {ms(max_duration_s)}; one ZV after the other lasts {ms(one_by_one_s)}"
+            ) from error
+        shaper = _polished(*_merged(start, _NEIGHBOURS * step_s), modes)
+        if shaper is not None and shaper.duration_s <= max_duration_s * (1.0 + 1e-9):
+            return shaper
+    raise DesignError(
+        f"no {title} within {ms(max_duration_s)}: on a grid of {1e3 * step_s:.3g} ms there is one of "
+        f"{ms(start.duration_s)}, but no exact one was found near it"
+    )
+
+
+def _merged(shaper: Shaper, distance_s: float) -> tuple[FloatArray, FloatArray]:
+    """Times and amplitudes with neighbouring taps as one, at their mean time."""
+    groups: list[list[int]] = []
+    for index, time_s in enumerate(shaper.times_s):
+        if groups and time_s - shaper.times_s[groups[-1][-1]] <= distance_s:
+            groups[-1].append(index)
+        else:
+            groups.append([index])
+    amplitudes = np.array([shaper.amplitudes[group].sum() for group in groups])
+    times = np.array([shaper.amplitudes[group] @ shaper.times_s[group] for group in groups]) / amplitudes
+    return times - times[0], amplitudes
+
+
+def _polished(times_s: FloatArray, amplitudes: FloatArray, modes: Sequence[Mode]) -> Shaper | None:
+    """Newton on all amplitudes and times; None if it ends at no non-negative shaper that cancels the modes."""
+    poles = np.array([mode.pole for mode in modes])
+    scale = float(np.abs(poles).max())
+    count = len(times_s)
+    target = np.zeros(2 * len(modes) + 1)
+    target[-1] = 1.0
+    best: tuple[float, FloatArray, FloatArray] = (math.inf, times_s, amplitudes)
+    for _ in range(_NEWTON_STEPS):
+        terms = np.exp(poles[:, None].real * (times_s[-1] - times_s) - 1j * poles[:, None].imag * times_s)
+        by_amplitude = np.vstack([terms.real, terms.imag, np.ones(count)])
+        slopes = -(poles[:, None] / scale) * terms * amplitudes
+        by_time = np.vstack([slopes.real, slopes.imag, np.zeros(count)])[:, 1:]
+        error = by_amplitude @ amplitudes - target
+        size = float(np.abs(error).max())
+        if not math.isfinite(size):
+            return None
+        if size < best[0]:
+            best = (size, times_s, amplitudes)
+        # the last tap's time also scales the sums; that changes no zero, so the Newton steps leave it out
+        change = np.linalg.lstsq(np.hstack([by_amplitude, by_time]), error, rcond=1e-10)[0]
+        amplitudes = amplitudes - change[:count]
+        times_s = times_s - np.concatenate([[0.0], change[count:]]) / scale
+    _, times_s, amplitudes = best
+    if np.any(np.diff(times_s) <= 0.0) or float(amplitudes.min()) < _SMALLEST_TAP:
+        return None
+    shaper = Shaper(times_s.tolist(), (amplitudes / amplitudes.sum()).tolist())
+    return shaper if max(shaper.residual_ratio(mode) for mode in modes) <= _RESIDUAL else None
+
+
+def smooth_kernel(
+    name: str, ratios: tuple[float, ...], periods: float, *, at_least: bool = False
+) -> Callable[[Mode, DesignOptions], Shaper]:
+    """The design of one mode by a polynomial kernel.
+
+    Source: D. Butyugin's smoothers of the printer firmware Kalico; their derivation on a grid: this project.
+    """
+
+    def of_one(mode: Mode, options: DesignOptions) -> Shaper:
+        period_s = options.grid_period_s
+        usual = periods / (mode.frequency_hz * period_s)
+        # one step more than unknowns: the two ends carry no sample
+        fewest = max(2 * len(ratios) + 2, math.ceil((1.0 - _WHOLE if at_least else _FIRST) * usual))
+        most = max(2 * fewest, int(_FURTHEST * usual))
+        title = f"{name} for {mode_names([mode])} on a {ms(period_s)} grid"
+        if usual > _MOST_SAMPLES:
+            raise DesignError(f"{title} would take {usual:.0f} samples: at most {_MOST_SAMPLES}; take a longer period")
+
+        def taps(steps: int) -> FloatArray | None:
+            return _samples(mode, ratios, period_s, steps)
+
+        steps = _first(lambda count: taps(count) is not None, fewest, most, max(1, int(usual) // _STRIDES))
+        found = None if steps is None else taps(steps)
+        if found is None:
+            raise DesignError(
+                f"no {title} up to {ms(most * period_s)}: no polynomial of degree {2 * len(ratios) + 2} without "
+                f"negative samples has its zeros there; {_other_period(max(ratios) * mode.frequency_hz, period_s)}"
+            )
+        return Shaper((np.arange(len(found)) * period_s).tolist(), found.tolist())
+
+    return of_one
+
+
+def _first(good: Callable[[int], bool], fewest: int, most: int, stride: int) -> int | None:
+    """The smallest good count from `fewest` to `most`, found by strides and then by halves; None: there is none."""
+    count = next((each for each in range(fewest, most + 1, stride) if good(each)), None)
+    if count is None:
+        return None
+    return halved(good, max(count - stride, fewest - 1), count)
+
+
+def _samples(mode: Mode, ratios: tuple[float, ...], period_s: float, steps: int) -> FloatArray | None:
+    """The kernel's samples between its ends, `steps` periods apart; None if one is negative or a zero is missed."""
+    x = 2.0 * np.arange(1, steps) / steps - 1.0
+    count = 2 * len(ratios) + 1
+    basis = legendre.legvander(x, count - 1) * (1.0 - x * x)[:, None]
+    rows = [np.ones(len(x))]
+    for index, ratio in enumerate(ratios):
+        pole = Mode(ratio * mode.frequency_hz, mode.damping_ratio).pole
+        # what each sample leaves at the last one; a double zero cancels the derivative too
+        terms = np.exp((pole.real * (len(x) - 1 - np.arange(len(x))) + 1j * pole.imag * np.arange(len(x))) * period_s)
+        terms = terms * x ** ratios[:index].count(ratio)
+        rows += [terms.real, terms.imag]
+    matrix = np.array(rows)
+    target = np.eye(len(rows))[0]
+    taps = basis @ np.linalg.lstsq(matrix @ basis, target, rcond=_SINGULAR)[0]
+    if float(taps.min()) < -_CLEARLY * float(taps.max()):
+        return None
+    for _ in range(2):  # what rounding left of the zeros
+        taps = taps + np.linalg.lstsq(matrix, target - matrix @ taps, rcond=_SINGULAR)[0]
+    if float(np.abs(matrix @ taps - target).max()) > RESIDUAL_LIMIT or float(taps.min()) <= 0.0:
+        return None
+    return np.asarray(taps / taps.sum(), dtype=np.float64)
+
+
+def _other_period(highest_hz: float, period_s: float) -> str:
+    """What to do where there is no kernel."""
+    if 2.0 * highest_hz * period_s > 1.0:
+        return f"a period below {ms(0.5 / highest_hz)} tells its highest zero, {highest_hz:.4g} Hz, from slower ones"
+    return "it is for modes that are damped less"
+
+
+def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    """Minimal shapers of the bands' nominal modes: those without negative taps first, each part by duration.
+
+    Searched up to the duration of the convolved ZV, and, only if there is none, up to twice that; never beyond
+    `options.max_duration_s` or 100 periods of the fastest mode.
+    """
+    modes = [band.mode for band in bands]
+    longest_s = min(options.max_duration_s, _MOST_PERIODS / max(mode.frequency_hz for mode in modes))
+    usual_s = convolved_zv(modes).duration_s
+    for span in _SPANS:
+        found = _search(modes, min(span * usual_s, longest_s), options.max_abs_sum)
+        if found.shapers or found.max_duration_s >= longest_s:
+            break
+    if not found.shapers:
+        raise DesignError(_none_found(modes, found))
+    return sorted(found.shapers, key=lambda shaper: shaper.has_negative)
+
+
+def _search(modes: Sequence[Mode], max_duration_s: float, max_abs_sum: float) -> MinimalShapers:
+    if len(modes) <= _PROVEN_MODES:
+        return minimal_shapers(modes, max_duration_s, max_abs_sum=max_abs_sum)
+    return minimal_shapers(modes, max_duration_s, max_abs_sum=max_abs_sum, max_boxes=0)
+
+
+def _none_found(modes: Sequence[Mode], found: MinimalShapers) -> str:
+    names = ", ".join(f"{mode.frequency_hz:g} Hz" for mode in modes)
+    what = (
+        f"no minimal shaper of {names} lasts up to {ms(found.max_duration_s)} with sum|a| up to {found.max_abs_sum:g}"
+    )
+    if found.complete:
+        return what + ": proven; allow a longer one"
+    return f"{what} was found from {found.starts} starts, proven up to {ms(found.complete_up_to_s)}"
