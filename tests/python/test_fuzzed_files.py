@@ -148,10 +148,9 @@ Kind = tuple[str, Callable[[Path], bytes], Callable[[bytes], bytes], Callable[[P
 
 def _kinds() -> dict[str, Kind]:
     """Name of the file, a valid one, what is done with it once it is changed, and its reader."""
-    from shapegcode.characterization.sheet import read_sheet
-
     import shapegcode as sg
     from command import run
+    from shapegcode.characterization.programs import read_sheet
     from shapegcode.cutting.stock import Stock
     from shapegcode.cutting.tool import Tool
     from shapegcode.identification.servo.record import read_servo_record
