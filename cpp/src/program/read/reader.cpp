@@ -23,6 +23,14 @@ std::string program_names(std::span<const std::int64_t> numbers) {
   return numbers.size() > most_names ? fmt::format("{} and {} more", names, numbers.size() - most_names) : names;
 }
 
+std::string line_end_of(const std::string& text) {
+  const auto end_of_line = text.find('\n');
+  if (end_of_line != std::string::npos && end_of_line > 0 && text[end_of_line - 1] == '\r') {
+    return "\r\n";
+  }
+  return end_of_line != std::string::npos && text.compare(end_of_line, 3, "\n\r\r") == 0 ? "\n\r\r" : "\n";
+}
+
 }  // namespace
 
 Reader::Reader(std::string text, const ReaderOptions& options, std::span<const std::int64_t> shut, std::uint64_t steps)
@@ -58,12 +66,7 @@ void Reader::load_main() {
   require_room_for(text);
   const TapeFrame frame = find_frame(text);
   framed_ = frame.framed;
-  const auto end_of_line = text.find('\n');
-  if (end_of_line != std::string::npos && end_of_line > 0 && text[end_of_line - 1] == '\r') {
-    program_.line_end = "\r\n";
-  } else if (end_of_line != std::string::npos && text.compare(end_of_line, 3, "\n\r\r") == 0) {
-    program_.line_end = "\n\r\r";
-  }
+  program_.line_end = line_end_of(text);
   if (frame.no_start) {
     program_.warnings.push_back(
         {1, "no line '%' at the start: a control that reads from a tape skips all before one", 0, 0, ""});
