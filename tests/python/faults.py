@@ -7,6 +7,7 @@ import gzip
 import io
 import os
 import random
+import signal
 import struct
 import subprocess
 import sys
@@ -32,6 +33,11 @@ class Done:
     peak_bytes: int
 
 
+def hear_ctrl_c() -> None:
+    """A process that was started in the background ignores Ctrl-C, and so do its children: undone for one."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def command(
     folder: Path,
     *words: str | Path,
@@ -47,7 +53,7 @@ def command(
             stdin=subprocess.DEVNULL,
             stdout=stream,
             stderr=stream,
-            preexec_fn=start,  # noqa: PLW1509 - before the timer's thread is there
+            preexec_fn=start or hear_ctrl_c,  # noqa: PLW1509 - before the timer's thread is there
         )
     timer = threading.Timer(_WAIT_S, process.kill)
     timer.start()

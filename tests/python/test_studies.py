@@ -25,6 +25,7 @@ from shapegcode.cli.machine import file_schema
 from shapegcode.demos.path import path_program
 from shapegcode.errors import ArgumentError, MachineError
 from shapegcode.machine.output import ANY_PRICE
+from shapegcode.results.json import schema
 from shapegcode.studies import replay as replays
 from shapegcode.studies.replay import DrawsJob, play_all
 from shapegcode.studies.study_file import StudyFileError
@@ -398,7 +399,7 @@ def test_the_command_chooses_as_python_does(tmp_path: Path) -> None:
                "optimize", "STUDY.toml", "--json", "o.json", "--set", "times.tool_change_s=3")  # fmt: skip
     assert done.returncode == 0, done.stderr
     report = json.loads((tmp_path / "o.json").read_text())
-    jsonschema.validate(report, json.loads((ROOT / "docs" / "schema" / "Optimum.json").read_text()))
+    jsonschema.validate(report, schema(sg.Optimum))
     file = sg.load_study(tmp_path / "STUDY.toml")
     machine = VX500.with_values("times.tool_change_s", 3)
     found = sg.optimize(tmp_path / "part.nc", machine, **file.choice_options())

@@ -17,7 +17,7 @@ import pytest
 
 import shapegcode as sg
 from command import run
-from faults import command, sound
+from faults import command, hear_ctrl_c, sound
 from shapegcode.io.atomic import is_temporary, write_text
 from test_data_limits import PROGRAM, M, no_wait
 
@@ -123,8 +123,9 @@ def _interrupted(folder: Path, number: int, after_s: float) -> subprocess.Comple
     words = ("convert", "p.nc", *M, "-o", "o.nc", "--json", "o.json", "--html", "o.html")
     code = "print('begun', flush=True)\nfrom shapegcode.__main__ import main\nimport sys\nsys.exit(main())"
     process = subprocess.Popen(
-        [sys.executable, "-c", code, *words], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+        [sys.executable, "-c", code, *words], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=hear_ctrl_c,  # noqa: PLW1509 - no thread of this test runs yet
+    )  # fmt: skip
     assert process.stdout is not None
     process.stdout.readline()
     time.sleep(after_s)

@@ -211,11 +211,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Python flushes standard output once more when it ends: give it somewhere to go.
         _discard_output()
         return ExitCode.BROKEN_PIPE
-    except Exception as error:
+    except BaseException as error:  # a compiled module may make a panic of Ctrl-C, which is no Exception
         if ctrl_c.came:
             print("shapegcode: stopped", file=sys.stderr)
             return ExitCode.INTERRUPTED
-        if _DEBUG in words or not _expected(error):
+        if _DEBUG in words or not isinstance(error, Exception) or not _expected(error):
             raise
         print(f"shapegcode: {_message(error)}", file=sys.stderr)
         if isinstance(error, OSError) and error.errno == errno.ENOSPC:

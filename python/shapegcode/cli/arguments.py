@@ -43,7 +43,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "tls_key",
     ),
     "output": (
-        "output", "update", "force", "full", "csv", "npz", "every", "blocks", "plots", "json", "html", "html_script",
+        "output", "update", "write_origins", "force", "full", "csv", "npz", "every", "blocks", "plots", "json", "html",
+        "html_script",
     ),
     "how much is said": ("quiet", "verbose"),
 }  # fmt: skip

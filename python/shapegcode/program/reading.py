@@ -220,7 +220,7 @@ def program_bytes(path: str | Path, most: int) -> bytes:
         with open_file(path) as file:
             size = min(os.fstat(file.fileno()).st_size, most + 1)
             require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
-            return file.read(size)
+            return file.read(max(size, 1))  # a file that cannot be read says so only when it is read
     except OSError as error:
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
 
