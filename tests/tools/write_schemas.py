@@ -21,7 +21,7 @@ KEYS = Path(__file__).resolve().parents[1] / "golden" / "result_keys.txt"
 def results() -> dict[str, type[Result]]:
     """Every kind of result by its name."""
     for module in pkgutil.walk_packages(shapegcode.__path__, "shapegcode."):
-        if module.name.endswith(("result", "demos.path")) and ".cli" not in module.name:
+        if ".cli" not in module.name and not module.name.endswith("__main__"):
             importlib.import_module(module.name)
 
     def below(cls: type[Result]) -> dict[str, type[Result]]:
