@@ -1,4 +1,4 @@
-"""``shapegcode study``: a program on many machines that are drawn."""
+"""``shapegcode study``: a program on many sampled machines."""
 
 from __future__ import annotations
 

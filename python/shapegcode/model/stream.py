@@ -1,4 +1,4 @@
-"""A program played on the machine's model as one motion in time: cuts, rapids and waits, piece by piece.
+"""A program simulated on the machine's model as one motion in time: cuts, rapids and waits, piece by piece.
 
 The plant is at rest at the start and runs on through the whole program. Memory does not grow with its length.
 """

@@ -23,7 +23,7 @@ _STILL_MM = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Command and response of one program, played on the machine's model.
+    """Command and response of one program, simulated on the machine's model.
 
     Attributes:
         label: name in legends, for example "original" or "emitted".

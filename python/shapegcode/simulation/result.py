@@ -144,7 +144,7 @@ class Motion:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Simulation(Result):
-    """A program played on the machine's model as it is; figures are the largest of its cutting regions.
+    """A program simulated on the machine's model as it is; figures are the largest of its cutting regions.
 
     Attributes:
         program: name of the program.

@@ -1,4 +1,4 @@
-"""A program played on the machine's model, without changing it."""
+"""A program simulated on the machine's model, without changing it."""
 
 from __future__ import annotations
 

@@ -160,7 +160,7 @@ class Bins:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class MachineStudy(Result):
-    """A program played on many machines that are drawn.
+    """A program simulated on many sampled machines (Monte Carlo).
 
     Attributes:
         program: its name.

@@ -1,4 +1,4 @@
-"""A study: one text, many machines that are drawn, what that does to the verdict."""
+"""A study: one text, many sampled machines, what that does to the verdict."""
 
 from __future__ import annotations
 
