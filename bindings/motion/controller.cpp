@@ -32,21 +32,25 @@ void limit_axes(Vector3& limits, const AxisLimit& given) {
                                                   : std::get<Vector3>(*given);
 }
 
-Fir fir_of(const AxisShaper& shaper, double period_s) {
-  if (const auto* design = std::get_if<Shaper>(&shaper)) return to_fir(*design, period_s);
-  if (const auto* mode = std::get_if<Mode>(&shaper)) return to_fir(zv_on_grid(*mode, period_s), period_s);
-  return std::get<Fir>(shaper);
+Fir filter_of(const Shaper& design, double period_s) { return to_fir(design, period_s); }
+
+Fir filter_of(const Mode& mode, double period_s) { return to_fir(zv_on_grid(mode, period_s), period_s); }
+
+Fir filter_of(const Fir& fir, double /*period_s*/) { return fir; }
+
+ControllerShaper filter_of(const FollowingFir& following, double /*period_s*/) { return following; }
+
+ControllerShaper filter_of(const std::vector<AxisShaper>& given, double period_s) {
+  std::vector<Fir> each;
+  for (const AxisShaper& one : given) {
+    each.push_back(std::visit([period_s](const auto& shaper) { return filter_of(shaper, period_s); }, one));
+  }
+  return each;
 }
 
 ControllerShaper shaper_of(const AnyShaper& given, double period_s) {
   if (!given) return ControllerSettings{}.shaper;
-  if (const auto* design = std::get_if<Shaper>(&*given)) return to_fir(*design, period_s);
-  if (const auto* fir = std::get_if<Fir>(&*given)) return *fir;
-  if (const auto* mode = std::get_if<Mode>(&*given)) return to_fir(zv_on_grid(*mode, period_s), period_s);
-  if (const auto* following = std::get_if<FollowingFir>(&*given)) return *following;
-  std::vector<Fir> each;
-  for (const AxisShaper& one : std::get<std::vector<AxisShaper>>(*given)) each.push_back(fir_of(one, period_s));
-  return each;
+  return std::visit([period_s](const auto& shaper) -> ControllerShaper { return filter_of(shaper, period_s); }, *given);
 }
 
 // What Python names one by one.

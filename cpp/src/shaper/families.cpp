@@ -62,8 +62,8 @@ Shaper zv_on_grid(const Mode& mode, double period_s) {
   if (!(period_s > 0.0) || !std::isfinite(period_s)) {
     throw Error(ErrorKind::argument, fmt::format("period is {} s: it must be above 0", period_s));
   }
-  const std::complex<double> s = pole(mode);
-  const double half_period = std::numbers::pi / s.imag();
+  const Shaper anywhere = zv(mode);
+  const double half_period = anywhere.times_s.back();
   if (period_s > 0.5 * half_period) {
     throw Error(ErrorKind::design,
                 fmt::format("period is {} s: a quarter of the damped period of {} Hz, {:.6g} s, is the longest for ZV",
@@ -72,11 +72,11 @@ Shaper zv_on_grid(const Mode& mode, double period_s) {
   const double steps = half_period / period_s;
   constexpr double on_grid = 1e-9;
   if (std::abs(steps - std::round(steps)) < on_grid) {
-    const double decay = std::exp(s.real() * half_period);
-    return make_shaper({0.0, std::round(steps) * period_s}, {1.0 / (1.0 + decay), decay / (1.0 + decay)});
+    return make_shaper({0.0, std::round(steps) * period_s}, anywhere.amplitudes);
   }
   const double before = std::floor(steps) * period_s;
   const double behind = (std::floor(steps) + 1.0) * period_s;
+  const std::complex<double> s = pole(mode);
   // Vibration of the two impulses beside half the period, seen back at time 0, is real and negative.
   const std::complex<double> first = std::exp(-s * before);
   const std::complex<double> second = std::exp(-s * behind);

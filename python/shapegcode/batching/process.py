@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from shapegcode.io.atomic import named_errors
+from shapegcode.program.memory import MEMORY_NEEDED
 from shapegcode.results.made import this_version
 
 Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
@@ -254,10 +255,11 @@ def _ending(answer: Mapping[str, Any], packed: Packed, complained: str) -> tuple
     code = answer["code"]
     if code < 0:
         return "killed", f"killed by signal {-code}"
+    # A reader that knows beforehand what a program takes refuses it before the limit does.
+    foreseen = packed.memory_bytes > 0 and code == 2 and MEMORY_NEEDED in complained
+    if foreseen or FAILED_CODES.get(code) == "out of memory":
+        return "out of memory", f"needs more than {packed.memory_bytes / 1e6:.0f} MB (--memory-limit)"
     if code in FAILED_CODES:
-        ending = FAILED_CODES[code]
-        if ending == "out of memory":
-            return "out of memory", f"needs more than {packed.memory_bytes / 1e6:.0f} MB (--memory-limit)"
         last = complained.strip().splitlines()
         return "crashed", f"crashed: {last[-1] if last else 'no message'}"
     return "ended", complained

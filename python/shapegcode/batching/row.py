@@ -28,8 +28,7 @@ _PREFIX = "shapegcode: "
 def row_of(job: BatchJob, outcome: JobOutcome) -> tuple[BatchRow, Mapping[str, bytes]]:
     """The row of a run, and the files of it that count."""
     ended: Ended = _ENDED.get(outcome.code, "failed") if outcome.ending == "ended" else "failed"
-    scarce = (os.strerror(errno.ENOSPC), os.strerror(errno.EDQUOT), "bytes of memory are needed")
-    if ended == "refused" and any(" ".join(said.split()) in " ".join(outcome.complained.split()) for said in scarce):
+    if ended == "refused" and any(os.strerror(code) in outcome.complained for code in (errno.ENOSPC, errno.EDQUOT)):
         ended = "failed"  # not the program's fault
     written = {} if ended in ("failed", "refused") else outcome.files
     report = json.loads(written[job.report]) if job.report in written else {}

@@ -28,7 +28,6 @@ from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
 from shapegcode.program.memory import require_memory_for_lines
 from shapegcode.program.operating import no_room
-from shapegcode.program.program import ARC_OFF_RADIUS
 from shapegcode.program.reading import is_program_text, program_bytes
 from shapegcode.program.several import index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN
@@ -127,8 +126,9 @@ def check_text(
         found.append(_finding("alarm", "alarm", error.alarm, error.file or source, error.line, error.column, message))
     else:
         found += _reader_findings(program)
-        if any(ARC_OFF_RADIUS in message for _, _, _, message, _ in program.core.alarms):
-            found += _arc_centre_finding(data, program, machine)
+        if kind := program.other_arc_centre(data):
+            said = f"with {kind} I J K the whole program reads: --set input.arc_centre={kind}, or in the machine file"
+            found.append(Finding("note", "arc_centre", 0, source, 0, 0, said))
         found += (_at(program, "warning", code, 1, message) for code, message in shaped_warnings(program, machine))
         table = block_table(program, machine)
         found += _breaker_findings(program, look_ahead_breakers(program, machine, table))
@@ -234,18 +234,6 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.warnings:
         severity = "warning" if _NOT_AS_WRITTEN.search(message) else "note"
         yield _finding(severity, "reader", alarm, file or program.source, line, column, message)
-
-
-def _arc_centre_finding(data: bytes, program: Program, machine: Machine) -> Iterator[Finding]:
-    """That the arcs fit with the other meaning of I, J, K, where they do."""
-    kind = "incremental" if machine.input.arc_centre == "absolute" else "absolute"
-    other = machine.with_values({"input.arc_centre": kind})
-    try:
-        Program.from_text(data, other, source=program.source, program_number=program.number, folder=program.folder)
-    except ProgramError:
-        return
-    message = f"with {kind} I J K the whole program reads: --set input.arc_centre={kind}, or in the machine file"
-    yield Finding("note", "arc_centre", 0, program.source, 0, 0, message)
 
 
 # ---- what an accepted program does -------------------------------------------------------------------------

@@ -204,15 +204,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as stop:
         # argparse ends the process itself: 0 after --help, 2 after a wrong argument.
         return stop.code if isinstance(stop.code, int) else ExitCode.BAD_INPUT
-    except KeyboardInterrupt:
-        print("shapegcode: stopped", file=sys.stderr)
-        return ExitCode.INTERRUPTED
     except BrokenPipeError:
         # Python flushes standard output once more when it ends: give it somewhere to go.
         _discard_output()
         return ExitCode.BROKEN_PIPE
     except BaseException as error:  # a compiled module may make a panic of Ctrl-C, which is no Exception
-        if ctrl_c.came:
+        if ctrl_c.came or isinstance(error, KeyboardInterrupt):
             print("shapegcode: stopped", file=sys.stderr)
             return ExitCode.INTERRUPTED
         if _DEBUG in words or not isinstance(error, Exception) or not _expected(error):

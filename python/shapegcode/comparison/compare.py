@@ -49,11 +49,10 @@ def compare(
         ProgramError: a file is no program that can be read.
         OSError: a file cannot be read.
     """
-    machine = None if machine is None else Machine.of(machine)
-    allowed = allow if isinstance(allow, Allowed) else Allowed.of(allow)
     if machine is None:
-        read = next((each.reading.machine for each in (original, emitted) if isinstance(each, Program)), None)
-        machine = read or Machine.load("vx500")
+        machine = next((each.reading.machine for each in (original, emitted) if isinstance(each, Program)), "vx500")
+    machine = Machine.of(machine)
+    allowed = allow if isinstance(allow, Allowed) else Allowed.of(allow)
     (first, first_is_cut), (second, second_is_cut) = _read(original, machine), _read(emitted, machine)
     core = _core.compare_programs(
         first.core, second.core, reader_options(machine), _emission_lines(machine, first.core.expanded_radii_mm)

@@ -164,10 +164,9 @@ class Run:
 
     def _within_price(self, settled: Settled, rapids: ShapedRapids) -> ShapedRapids:
         """The shaped rapids, or none where with them the program would take more time than its price."""
-        original_s = self.original_s.result()
-        price_s = original_s * self.machine.price.program_time_percent / 100.0
+        price_s = self._price_s()
         if self.machine.emission.header:
-            added_s = self.model.cycle_time_s(rapids.emitted.core) - original_s
+            added_s = self.model.cycle_time_s(rapids.emitted.core) - self.original_s.result()
         else:
             added_s = self._excess_s(settled) + price_s + rapids.extra_s
         if not rapids.outcome.shaped or added_s <= price_s:
@@ -248,13 +247,16 @@ class Run:
 
     def _excess_s(self, settled: Settled) -> float:
         """Time above what the price of the program allows."""
-        original_s = self.original_s.result()
-        price_s = original_s * self.machine.price.program_time_percent / 100.0
+        price_s = self._price_s()
         cuts_s = math.fsum(figures.emitted_s - figures.original.duration_s for figures in settled.figures)
         cuts_s += self.machine.emission.prefill_dwell_s * len(settled.figures)
         if cuts_s < _NEAR_PRICE * price_s or not self.machine.emission.header:
             return cuts_s - price_s
-        return self.model.cycle_time_s(settled.emitted.core) - original_s - price_s
+        return self.model.cycle_time_s(settled.emitted.core) - self.original_s.result() - price_s
+
+    def _price_s(self) -> float:
+        """Time that shaping may add to the program."""
+        return self.original_s.result() * self.machine.price.program_time_percent / 100.0
 
     def is_benefit(self, settled: Settled) -> bool:
         """Whether a shaped cut gains enough, see `benefits`."""

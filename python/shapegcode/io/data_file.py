@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Self, cast
 
 from shapegcode.errors import RecordError, ShapegcodeError
+from shapegcode.io.atomic import named_errors
 
 __all__ = ["MAX_DEPTH", "MAX_SETTINGS_BYTES", "MAX_TEXT_BYTES", "DataFile", "open_file", "read_file", "toml_tables"]
 
@@ -77,10 +78,8 @@ def read_file(path: str | Path, most: int = _MAX_BYTES) -> bytes:
     with open_file(path) as file:
         if os.fstat(file.fileno()).st_size > most:
             raise OSError(errno.EFBIG, f"more than {most} bytes: no more is read at once", str(path))
-        try:
+        with named_errors(path):
             return file.read()
-        except OSError as error:
-            raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
 
 
 class DataFile:

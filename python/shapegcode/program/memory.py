@@ -11,6 +11,8 @@ _CGROUP = Path("/sys/fs/cgroup")
 _PER_LINE = 130
 """Bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)."""
 _SMALL_BYTES = 2**20
+MEMORY_NEEDED = "bytes of memory are needed"
+"""What a refusal for want of memory says: a batch that limits it tells it apart by that."""
 
 
 def available_bytes() -> int | None:
@@ -25,7 +27,7 @@ def require_memory(source: str, needed: int, what: str) -> None:
     available = available_bytes()
     if available is not None and needed > available:
         raise ProgramError(
-            f"{source}:1:1: {what}: some {needed} bytes of memory are needed and {available} are available; split the "
+            f"{source}:1:1: {what}: some {needed} {MEMORY_NEEDED} and {available} are available; split the "
             "program, or take a machine with more memory"
         )
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MM_PER_INCH = 25.4
 _KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
-ARC_OFF_RADIUS = "off its radius"
+_ARC_OFF_RADIUS = "off its radius"
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,6 +325,18 @@ class Program:
         """
         return f"lines {region.first_line} to {region.last_line}{' expanded' if self.core.expanded else ''}"
 
+    def other_arc_centre(self, data: bytes) -> str:
+        """The meaning of I, J, K ("absolute" or "incremental") that explains the arcs among its alarms.
+
+        Args:
+            data: what it was read from.
+
+        Returns:
+            The value of `input.arc_centre` with which the whole program reads; empty: neither explains them.
+        """
+        options = _options(data, self.source, self.reading, self.folder, self.number)
+        return _other_arc_centre(data, options, " ".join(message for _, _, _, message, _ in self.core.alarms))
+
     def region_error(self, region: _core.Region, message: str) -> ProgramError:
         """An error that names the file and the lines of a region.
 
@@ -339,16 +351,24 @@ class Program:
         return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
 
 
-def _read(data: bytes, source: str, reading: Reading, folder: Path | None, number: int | str | None) -> Program:
+def _options(
+    data: bytes, source: str, reading: Reading, folder: Path | None, number: int | str | None
+) -> _core.ReaderOptions:
     options = reading.options([folder] if folder is not None else [])
     if number is not None:
         index = index_of(data, number, source)
         options.program_index = -1 if index is None else index
         options.program = number if isinstance(number, int) and index is None else -1
+    return options
+
+
+def _read(data: bytes, source: str, reading: Reading, folder: Path | None, number: int | str | None) -> Program:
+    options = _options(data, source, reading, folder, number)
     try:
         core = _core.read_program(data, options)
     except ProgramError as error:
-        hint = _absolute_centre_hint(data, options) if ARC_OFF_RADIUS in str(error) else ""
+        kind = _other_arc_centre(data, options, str(error))
+        hint = f'; with {kind} I J K the whole program reads: set input.arc_centre = "{kind}"' if kind else ""
         raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
     # The core leaves the byte-order mark out too.
     whole = data.removeprefix(codecs.BOM_UTF8) if core.expanded else None
@@ -386,15 +406,17 @@ def located_error(source: str, line: int, column: int, message: str, alarm: int 
     return error
 
 
-def _absolute_centre_hint(text: bytes, options: _core.ReaderOptions) -> str:
-    # A post for another kind of control: say so where it explains every arc, but never guess.
+def _other_arc_centre(data: bytes, options: _core.ReaderOptions, said: str) -> str:
+    """The other meaning of I, J, K, if it explains an alarm: the whole program reads with it. Never a guess."""
+    if _ARC_OFF_RADIUS not in said:
+        return ""
     options.absolute_arc_centres = not options.absolute_arc_centres
+    options.collect_alarms = False
     try:
-        _core.read_program(text, options)
+        _core.read_program(data, options)
     except ProgramError:
         return ""
-    kind = "absolute" if options.absolute_arc_centres else "incremental"
-    return f'; with {kind} I J K the whole program reads: set input.arc_centre = "{kind}"'
+    return "absolute" if options.absolute_arc_centres else "incremental"
 
 
 def given_program(program: Program | str | Path, machine: Machine) -> Program:

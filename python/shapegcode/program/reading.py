@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import errno
 import math
 import os
 from collections.abc import Callable, Sequence
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
+from shapegcode.io.atomic import named_errors
 from shapegcode.io.data_file import open_file
 from shapegcode.program.memory import require_memory
 from shapegcode.settings.keys import toml
@@ -216,13 +216,10 @@ PROGRAM_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".
 
 def program_bytes(path: str | Path, most: int) -> bytes:
     """Content of a program file."""
-    try:
-        with open_file(path) as file:
-            size = min(os.fstat(file.fileno()).st_size, most + 1)
-            require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
-            return file.read(max(size, 1))  # a file that cannot be read says so only when it is read
-    except OSError as error:
-        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+    with open_file(path) as file, named_errors(path):
+        size = min(os.fstat(file.fileno()).st_size, most + 1)
+        require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
+        return file.read(max(size, 1))  # a file that cannot be read says so only when it is read
 
 
 def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[str, bytes] | None]:
