@@ -1,8 +1,11 @@
 """``python -m shapegcode``: the command."""
 
 import sys
+from typing import Any
 
 __all__ = ["main"]
+
+_ONCE_MORE_S = 0.01
 
 
 def main() -> int:
@@ -11,6 +14,7 @@ def main() -> int:
     Returns:
         The exit code.
     """
+    sys.unraisablehook = _interrupt_once_more
     try:
         from shapegcode.cli import main as command
 
@@ -18,6 +22,17 @@ def main() -> int:
     except KeyboardInterrupt:
         print("shapegcode: stopped", file=sys.stderr)
         return 130
+
+
+def _interrupt_once_more(lost: Any) -> None:
+    """Within a finalizer Python drops what is raised: interrupt again, when that has ended."""
+    if lost.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(lost)
+        return
+    import signal
+    from threading import Timer
+
+    Timer(_ONCE_MORE_S, signal.raise_signal, (signal.SIGINT,)).start()
 
 
 if __name__ == "__main__":

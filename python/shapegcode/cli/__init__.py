@@ -27,7 +27,6 @@ from shapegcode.cli.arguments import CommandParser
 
 _DEBUG = "--debug"
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_ONCE_MORE_S = 0.01
 _WITH_REST = "batch"
 """Behind -- it takes words for the command that it runs."""
 
@@ -180,17 +179,6 @@ class _Interrupts:
         self._mine = of_process and signal.getsignal(signal.SIGINT) is signal.default_int_handler
         if self._mine:
             signal.signal(signal.SIGINT, self._handle)
-            sys.unraisablehook = self._once_more
-
-    @staticmethod
-    def _once_more(lost: Any) -> None:
-        """Within a finalizer Python drops what is raised: interrupt again, when that has ended."""
-        if lost.exc_type is KeyboardInterrupt:
-            from threading import Timer
-
-            Timer(_ONCE_MORE_S, signal.raise_signal, (signal.SIGINT,)).start()
-        else:
-            sys.__unraisablehook__(lost)
 
     def _handle(self, _number: int, _frame: object) -> None:
         self.came = True
