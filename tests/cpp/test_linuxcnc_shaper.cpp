@@ -176,7 +176,8 @@ TEST_CASE("linuxcnc C interface: a design comes from the other thread, one that 
   CHECK(status.duration_s == doctest::Approx(0.011));
   CHECK(status.delay_s == doctest::Approx(0.25 / 46.0).epsilon(0.01));
   for (int k = 0; k < 20; ++k) shapegcode_hal_step(hal, &settings, in.data(), out.data(), &status);  // what it held
-  CHECK(out == in);
+  // In rounding only: how long the other thread took decides what it is of.
+  for (std::size_t axis = 0; axis < in.size(); ++axis) CHECK(out[axis] == doctest::Approx(in[axis]).epsilon(1e-12));
   settings.family_number = 12;
   CHECK(step_until([&] { return status.possible == 0; }));
   CHECK(status.waiting == 0);

@@ -109,6 +109,20 @@ def test_a_packed_or_nested_record_takes_no_gigabytes(bomb: str, folder: Path) -
         sound(command(folder, *words_of(kind, name, folder)), name)
 
 
+@pytest.mark.parametrize("command_name", ["time", "check"])
+def test_a_line_of_nothing_but_brackets_takes_no_time(command_name: str, folder: Path) -> None:
+    (folder / "p.nc").write_bytes(b"%\nO1\nG21G90\n" + b"(" * 200_000 + b"\nM30\n%\n")
+    sound(command(folder, command_name, "p.nc", *M), "p.nc:4", "(limit 250)")
+
+
+def test_very_many_wrong_origins_are_counted(folder: Path) -> None:
+    from shapegcode.machine import Machine
+
+    wrong = "".join(f'axes.x.modes.1.k{number} = "measured"\n' for number in range(20_000))
+    (folder / "a.toml").write_text(f"{Machine.builtin_text('vx500').partition('[origin]')[0]}\n[origin]\n{wrong}")
+    sound(command(folder, *words_of("machine", "a.toml", folder)), "a.toml", "19900 further problems are not listed")
+
+
 @pytest.mark.parametrize("bomb", TOML_BOMBS)
 def test_a_file_of_settings_takes_neither_minutes_nor_gigabytes(bomb: str, folder: Path) -> None:
     (folder / "a.toml").write_bytes(TOML_BOMBS[bomb])

@@ -63,7 +63,7 @@ def open_file(path: str | Path) -> BinaryIO:
             descriptor = os.open(path, wanted)
             mode = os.fstat(descriptor).st_mode
             if stat.S_ISREG(mode):
-                return os.fdopen(descriptor, "rb")
+                return _readable(os.fdopen(descriptor, "rb"), path)
             os.close(descriptor)
     except ValueError as error:  # a NUL in its name
         raise OSError(errno.EINVAL, str(error), str(path)) from None
@@ -71,6 +71,19 @@ def open_file(path: str | Path) -> BinaryIO:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     kind = _KINDS.get(stat.S_IFMT(mode), "something else")
     raise OSError(errno.EINVAL, f"{kind}, not a regular file; write it to a file first", str(path))
+
+
+def _readable(file: BinaryIO, path: str | Path) -> BinaryIO:
+    """The file itself; a node of the kernel that only looks regular says at its first byte that it cannot be read."""
+    try:
+        with named_errors(path):
+            if file.read(1) is None:
+                raise OSError(errno.EAGAIN, "there is nothing to read at once", str(path))
+            file.seek(0)
+    except OSError:
+        file.close()
+        raise
+    return file
 
 
 def read_file(path: str | Path, most: int = _MAX_BYTES) -> bytes:

@@ -30,7 +30,7 @@ from shapegcode.settings import change
 from shapegcode.settings.describe import values_of, write_short_toml, write_toml
 from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
-from shapegcode.settings.problems import KeyProblem, line_of
+from shapegcode.settings.problems import MAX_PROBLEMS, KeyProblem, further_problems, line_of
 from shapegcode.settings.reference import documentation
 from shapegcode.settings.remarks import (
     DEFAULT,
@@ -339,13 +339,13 @@ class Machine(TomlTable):
             machine._origins_in_comments = any(origin_of(said) != "file" for said in machine._remarks.values())
             return machine
         keys = {value.key: value.value for value in machine.values()}
-        problems = [
-            Problem(f"origin.{key}", toml(said), limit, line_of(f"origin.{key}", text) or line_of(key, text))
-            for key, said in stated.items()
-            if (limit := _wrong_origin(key, said, keys))
-        ]
-        if problems:
-            raise MachineError(source, tuple(problems))
+        wrong = [(key, said, limit) for key, said in stated.items() if (limit := _wrong_origin(key, said, keys))]
+        if wrong:
+            problems = (
+                Problem(f"origin.{key}", toml(said), limit, line_of(f"origin.{key}", text) or line_of(key, text))
+                for key, said, limit in wrong[:MAX_PROBLEMS]
+            )
+            raise MachineError(source, (*problems, *further_problems(len(wrong))))
         machine._remarks = {key: remark_of(said) for key, said in stated.items()}
         return machine
 

@@ -219,7 +219,7 @@ def program_bytes(path: str | Path, most: int) -> bytes:
     with open_file(path) as file, named_errors(path):
         size = min(os.fstat(file.fileno()).st_size, most + 1)
         require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
-        return file.read(max(size, 1))  # a file that cannot be read says so only when it is read
+        return file.read(size)
 
 
 def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[str, bytes] | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 _LOOKED_AT_BYTES = 65536
-_COMMENT = re.compile(rb"\([^)\n]*\)")
+_COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
 _OF_A_MILL = re.compile(rb"Y\s*[-+.\d#\[]|M0*6(?!\d)")
 _SURE = (
     (re.compile(rb"G(?:50|0*92)(?=\s*S\s*\d)\s*S\s*\d+"), "spindle speed limit"),

@@ -14,7 +14,7 @@ from shapegcode.errors import Problem
 from shapegcode.settings.keys import TomlTable, facts, table_type, toml, toml_key
 from shapegcode.settings.remarks import open_brackets
 
-_MAX_PROBLEMS = 100
+MAX_PROBLEMS = 100
 _LONGEST_NAME = 200  # that is compared with known ones
 
 
@@ -42,7 +42,7 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
     """Pydantic's errors as problems of the file: dotted keys, TOML values, limits with units."""
     problems: list[Problem] = []
     details = error.errors(include_url=False)
-    for detail in details[:_MAX_PROBLEMS]:
+    for detail in details[:MAX_PROBLEMS]:
         location, value = _locate(detail["loc"], data, detail["type"])
         if detail["type"] == "too_short" and isinstance(value, list) and len(value) >= detail["ctx"]["min_length"]:
             continue  # short only of its bad items, which are listed themselves
@@ -67,9 +67,13 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
         problem = Problem(problem.key, problem.value, problem.limit, line_of(problem.key, text))
         if problem not in problems:
             problems.append(problem)
-    if len(details) > _MAX_PROBLEMS:
-        problems.append(Problem("", "", f"{len(details) - _MAX_PROBLEMS} further problems are not listed"))
-    return tuple(problems)
+    return (*problems, *further_problems(len(details)))
+
+
+def further_problems(count: int) -> tuple[Problem, ...]:
+    """That there are more than the first `MAX_PROBLEMS`, where there are: to find the line of each takes time."""
+    more = count - MAX_PROBLEMS
+    return (Problem("", "", f"{more} further problems are not listed"),) if more > 0 else ()
 
 
 def _number(limit: float) -> str:
