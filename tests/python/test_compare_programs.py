@@ -351,6 +351,11 @@ def test_the_command(tmp_path: Path) -> None:
     assert run(tmp_path, "compare", "a.nc", "b.nc").returncode == 1
     allowed = run(tmp_path, "compare", "a.nc", "b.nc", "-m", "vx500", "--allow", "feeds")
     assert allowed.returncode == 0 and "built-in machine" not in allowed.stdout
+    (tmp_path / "c.nc").write_text(PART.replace("X30. F600.\nY20.", "X30. Y0.02 F600.\nX30.05 Y20."))
+    step = run(tmp_path, "compare", "a.nc", "c.nc").stdout.splitlines()[-1]
+    assert (
+        run(tmp_path, "compare", "a.nc", "c.nc", *step.rpartition(" allow it: ")[2].rstrip(".").split()).returncode == 0
+    )
     for words, said in (
         (("--allow", "feed"), "no difference of this name; there are cuts, rapids, tools"),
         (("--allow", "path=20"), "path needs a length with its unit"),

@@ -17,6 +17,7 @@ import pytest
 from scipy.io import savemat, wavfile
 
 import shapegcode as sg
+from acceptance import PROGRAMS
 from command import run
 from faults import RECORD_BOMBS, TOML_BOMBS, command, sound
 
@@ -121,6 +122,26 @@ def test_very_many_wrong_origins_are_counted(folder: Path) -> None:
     wrong = "".join(f'axes.x.modes.1.k{number} = "measured"\n' for number in range(20_000))
     (folder / "a.toml").write_text(f"{Machine.builtin_text('vx500').partition('[origin]')[0]}\n[origin]\n{wrong}")
     sound(command(folder, *words_of("machine", "a.toml", folder)), "a.toml", "19900 further problems are not listed")
+
+
+def test_a_machine_has_no_thousands_of_modes() -> None:
+    mode = {"frequency_hz": 30.0, "damping_ratio": 0.01}
+    machine = sg.Machine.load("vx500").with_values("axes.x.modes", [mode] * 200)
+    assert len(machine.axes.x.modes) == 200
+    with pytest.raises(sg.MachineError, match="200 or fewer"):
+        machine.with_values("axes.x.modes", [mode] * 201)
+
+
+@pytest.mark.parametrize("given", [None, b"G1", 3], ids=repr)
+def test_what_names_no_file_is_an_error_of_arguments(given: object) -> None:
+    with pytest.raises(sg.ArgumentError, match="a file's name is needed, not "):
+        sg.convert(given, "vx500")  # type: ignore[arg-type]
+
+
+def test_set_points_that_cannot_be_counted() -> None:
+    machine = sg.Machine.load("vx500").with_values("axes.x.max_acceleration_mm_s2", 1e-300)
+    with pytest.raises(sg.ArgumentError, match="a path takes far too many set-points"):
+        sg.simulate(PROGRAMS / "PARALLEL.NC", machine)
 
 
 @pytest.mark.parametrize("bomb", TOML_BOMBS)

@@ -534,3 +534,16 @@ def test_what_it_rests_on_costs_no_more_than_the_verdict(monkeypatch: pytest.Mon
     assert conversion.cutting_time_s.emitted > 90.0
     assert len(played) >= 8
     assert 0.0 < sum(played) <= 2.01 * conversion.cutting_time_s.emitted
+
+
+@pytest.mark.parametrize("twice", ["beside it", "another spelling"])
+def test_one_value_has_one_origin(twice: str) -> None:
+    text = sg.Machine.load("vx500").to_toml()
+    if twice == "beside it":
+        text = re.sub(
+            r"max_feed_mm_per_min = (\S+)", r'max_feed_mm_per_min = { value = \1, origin = "measured" }', text, count=1
+        )
+    else:
+        text += '"axes.x.max_feed_mm_per_min" = "measured"\n'
+    with pytest.raises(sg.MachineError, match=r"origin\.axes\.x\.max_feed_mm_per_min = .*this value has two"):
+        sg.Machine.from_toml(text)

@@ -79,6 +79,14 @@ def test_simulate_against_the_original_gives_the_figures_of_convert(
         assert replace(ours, emitted_lines=(0, 0)) == replace(theirs, emitted_lines=(0, 0))
 
 
+def test_a_program_against_itself_has_one_contour_error() -> None:
+    machine = machine_with({})
+    program = sg.Program.read(PROGRAMS / "PARALLEL.NC", machine)
+    simulation = sg.simulate(program, machine, against=program, record_samples=0)
+    assert simulation.verdict is not None
+    assert simulation.contour_error_um.command.max == simulation.verdict.contour_error_um.command.emitted.max == 0.0
+
+
 def test_figures_of_the_original_do_not_depend_on_what_is_asked_for() -> None:
     asked = [
         {"tolerance.contour_um": 5.0}, {"tolerance.contour_um": 40.0}, {"shaping.family": "zvd"},

@@ -34,7 +34,8 @@ void require_period(double period_s, std::string_view name) { require_above_zero
 std::int64_t require_count(double count, double most, std::string_view what, std::string_view things) {
   if (!(count >= 0.0 && count <= most)) {
     throw Error(ErrorKind::argument,
-                fmt::format("{} takes {:.10g} {}, at most {:.10g} are possible", what, count, things, most));
+                fmt::format("{} takes {} {}, at most {:.10g} are possible", what,
+                            std::isfinite(count) ? fmt::format("{:.10g}", count) : "far too many", things, most));
   }
   return static_cast<std::int64_t>(count);
 }

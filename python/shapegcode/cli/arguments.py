@@ -51,7 +51,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
 """Group of an option by its destination, one table for all commands: what is the same stands at the same place."""
 
 _GROUP_OF = {dest: title for title, dests in GROUPS.items() for dest in dests}
-_EXIT_CODES = "0 done and within tolerance; 1 done, but out of tolerance or with warnings; 2 not done: bad input"
+_EXIT_CODES = "0 done and within tolerance; 1 done, but out of tolerance; 2 not done: bad input"
 
 
 class _Formatter(argparse.HelpFormatter):

@@ -36,7 +36,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "shapegcode check memory.nc -m mine.toml --program all --json check.json",
     ),
     "compare": (
-        "shapegcode compare part.nc shaped.nc --allow feeds,blocks,path=20um",
+        "shapegcode compare part.nc shaped.nc --allow feeds,blocks,path=30um",
         "shapegcode compare part.nc shaped.nc -m mine.toml --allow feeds,blocks,path=0.02mm,calls --json compare.json",
     ),
     "batch": (

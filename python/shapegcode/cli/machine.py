@@ -183,7 +183,8 @@ def _show(args: argparse.Namespace) -> int:
     found = replace(describe_machine(args.machine), source=args.machine)
     if args.input is not None:
         found = _ranked(found, args)
-    return runner.finish(found, args, tables=found.tables(everything=args.verbose))
+    wrote = [args.machine] if args.write_origins else []
+    return runner.finish(found, args, tables=found.tables(everything=args.verbose), wrote=wrote)
 
 
 def _write_origins(name: str) -> None:

@@ -141,7 +141,7 @@ class Comparison(Result):
             return f"look at {first.place}: the other program has lost what keeps a shaped cut as it was judged."
         words = [word for word in self.allow if not word.startswith("path=")] if first.kind == "path" else [*self.allow]
         words.append(
-            f"path={math.ceil(first.distance_um)}um"
+            f"path={math.ceil(max(each.distance_um for each in self.refused))}um"
             if first.kind == "path"
             else first.kind.replace("emission", "blocks")
         )

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, Self, cast
 
-from shapegcode.errors import RecordError, ShapegcodeError
+from shapegcode.errors import ArgumentError, RecordError, ShapegcodeError
 from shapegcode.io.atomic import named_errors
 
 __all__ = ["MAX_DEPTH", "MAX_SETTINGS_BYTES", "MAX_TEXT_BYTES", "DataFile", "open_file", "read_file", "toml_tables"]
@@ -56,6 +56,8 @@ Fault = Callable[[str], Exception]
 
 def open_file(path: str | Path) -> BinaryIO:
     """Open a regular file to read it; a pipe or device is refused at once, without waiting for it."""
+    if not isinstance(path, str | os.PathLike):
+        raise ArgumentError(f"a file's name is needed, not {type(path).__name__}")
     wanted = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_NONBLOCK", 0)
     try:
         mode = os.stat(path).st_mode  # before it is opened: that alone can wind a tape back

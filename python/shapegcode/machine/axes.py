@@ -10,6 +10,8 @@ from pydantic import Field, model_validator
 from shapegcode.machine.drive import Drive
 from shapegcode.settings.keys import Bool, Float, InlineTable, NonNegative, Positive, Text, TomlTable, key, toml
 
+_MAX_MODES = 200  # identification finds 40 at most
+
 
 class FrequencyOver(InlineTable):
     """How the frequency of a mode depends on where an axis stands or on what the part weighs."""
@@ -127,7 +129,9 @@ class Axis(TomlTable):
     max_jerk_mm_s3: Positive | None = key(
         "largest jerk while cutting; left out: not limited", unit="mm/s³", default=None
     )
-    modes: tuple[AxisMode, ...] = key("vibration modes, one table each; none: the axis is taken as rigid", default=())
+    modes: Annotated[tuple[AxisMode, ...], Field(max_length=_MAX_MODES)] = key(
+        "vibration modes, one table each; none: the axis is taken as rigid", default=()
+    )
     rigid: Bool = key(
         "no vibration mode of this axis counts: looked for and not found, or decided. false, and no modes: nobody "
         "knows; the axis is taken as rigid, and every verdict says so",

@@ -434,6 +434,8 @@ def _wrong_origin(key: str, said: object, keys: Mapping[str, str]) -> str:
         return "no such key of this machine (modes count from 1): take the line out"
     if isinstance(said, str) and re.match(ORIGIN_TEXT, said):
         return ""
+    if isinstance(said, list):
+        return "must be one: this value has two, in [origin] and beside it, or in two spellings of its key"
     return (
         "must be measured, parameters (of the control), inherited, assumed, choice, default or stated; a note may "
         'follow: "measured: tap of 3 May"'

@@ -102,13 +102,15 @@ class _Line:
 
 
 def take_origins(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """The tables of a file without what they say of where values come from, and that."""
+    """The tables of a file without what they say of where values come from, and that; two for one value are a list."""
     found: dict[str, Any] = {}
     inline: dict[str, Any] = {}
     plain = {name: _plain(value, name, inline) for name, value in data.items() if name != ORIGIN}
     if ORIGIN in data:
         _flatten(data[ORIGIN], "", found)
-    return plain, found | inline if ORIGIN in data or inline else None
+    for key, said in inline.items():
+        _note(key, said, found)
+    return plain, found if ORIGIN in data or inline else None
 
 
 def _plain(value: Any, key: str, inline: dict[str, Any]) -> Any:
@@ -124,10 +126,14 @@ def _plain(value: Any, key: str, inline: dict[str, Any]) -> Any:
 
 def _flatten(value: Any, key: str, found: dict[str, Any]) -> None:
     if not isinstance(value, Mapping):
-        found[key or ORIGIN] = value
+        _note(key or ORIGIN, value, found)
         return
     for name, each in value.items():
         _flatten(each, f"{key}.{name}" if key else name, found)
+
+
+def _note(key: str, said: Any, found: dict[str, Any]) -> None:
+    found[key] = [found[key], said] if key in found else said
 
 
 def remark_of(stated: str) -> str:

@@ -78,7 +78,8 @@ def simulate(
     nominal, verdict = {}, None
     if against is not None:
         against = given_program(against, machine)
-        nominal = {mine.first_line: other.path for mine, other in paired_regions(program, against)}
+        pairs = paired_regions(program, against)
+        nominal = {mine.first_line: other.path for mine, other in pairs if not mine.path.moves_as(other.path)}
         verdict = judge_program(program, against, machine, shaped=shaped)
     runs: list[RegionRun] = []
     played: list[_core.PlaybackFigures] = []

@@ -128,14 +128,15 @@ class ProgramHeads {
       if (begin > from_ && text_[begin - 1] != '\n') {
         continue;
       }
-      if (mark == '&' || mark == '<') {
+      const std::string_view line = text_.substr(at);
+      const auto has_name = [&] { return line.substr(0, line.find('\n')).find('>') != std::string_view::npos; };
+      if (mark == '&' || (mark == '<' && has_name())) {
         return Head{begin, mark == '&' ? Kind::folder : Kind::name, -1};
       }
-      const std::string_view line = text_.substr(at);
       const std::int64_t number = leading_number(line, mark == ':' ? ':' : 'O');
       std::size_t behind = 1;
       skip_spaces(line, behind);
-      if (number >= 0 || (behind < line.size() && line[behind] == '<' && mark != ':')) {
+      if (number >= 0 || (behind < line.size() && line[behind] == '<' && mark != ':' && has_name())) {
         return Head{begin, number >= 0 ? Kind::number : Kind::name, number};
       }
     }
