@@ -23,7 +23,6 @@ from shapegcode.conversion.tables import (
     percent,
     rests_table,
 )
-from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.results.figures import CONTOURS, ContourError
@@ -90,8 +89,7 @@ class Conversion(PlayedFigures, Result):
         restart_points: blocks inside of shaped cuts at which the control can begin.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
-        model: the machine that it was played on.
-        played: original and emitted program, to play them again for a page.
+        played: a handle and no data: both programs and the machine, to play them again for a picture or a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool, "shaped_cuts_within": bool}
@@ -124,7 +122,6 @@ class Conversion(PlayedFigures, Result):
     restart_points: tuple[RestartPoint, ...] = ()
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
-    model: MachineModel = field(metadata=hidden())
     played: PlayedPrograms | None = field(default=None, compare=False, metadata=hidden())
 
     __eq__ = Result.__eq__
