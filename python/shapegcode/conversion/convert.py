@@ -12,7 +12,7 @@ from pathlib import Path
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.outcome import judge, result_of
-from shapegcode.conversion.plan import CutChoice, ConversionPlan, Progress, Shaped
+from shapegcode.conversion.plan import ConversionPlan, CutChoice, Progress, Shaped
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids as shape_rapids_of
 from shapegcode.conversion.recommendation import gain_um
 from shapegcode.conversion.rests import Begun, begin_rests
