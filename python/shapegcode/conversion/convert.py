@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import compress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.outcome import judge, result_of
 from shapegcode.conversion.plan import ConversionPlan, CutChoice, Progress, Shaped
-from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids as shape_rapids_of
 from shapegcode.conversion.recommendation import gain_um
 from shapegcode.conversion.rests import Begun, begin_rests
 from shapegcode.conversion.result import Conversion
@@ -25,6 +25,9 @@ from shapegcode.program.compensation import program_for_conversion
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.ahead import cores
+
+if TYPE_CHECKING:
+    from shapegcode.conversion.rapids.shape import ShapedRapids
 
 _ATTEMPTS = 10  # each for cuts that left their tolerance, ran too fast or cost too much; few need more than two
 _PRICE_ROUNDS = 6
@@ -271,7 +274,9 @@ def _as_it_was(plan: ConversionPlan, shaped: Shaped) -> Shaped:
 
 def shape_rapids(plan: ConversionPlan, shaped: Shaped) -> Shaped:
     """Rapids as shaped moves where that saves time; none where the program would take more time than its price."""
-    found = shape_rapids_of(shaped.emitted, shaped.written.placed, plan.model, plan.grid, plan.pool, plan.budget)
+    from shapegcode.conversion.rapids import shape
+
+    found = shape.shape_rapids(shaped.emitted, shaped.written.placed, plan.model, plan.grid, plan.pool, plan.budget)
     found = _within_price(plan, shaped, found)
     written = replace(shaped.written, size=found.emitted.size, placed=found.placed)
     shaped = replace(shaped, written=written, emitted=found.emitted, rapids=found)

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.conversion.aims import Aims, CutCurves
 from shapegcode.conversion.budget import Budget, Spending, keepable
-from shapegcode.conversion.rapids.shape import ShapedRapids
 from shapegcode.conversion.recommendation import benefits, most_to_gain_um
 from shapegcode.conversion.rests import Begun
 from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
@@ -22,6 +22,9 @@ from shapegcode.shaping.grid import choose_grid
 from shapegcode.verdict.figures import Placed, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures
 from shapegcode.verdict.program import rapid_vibration_um, simulate_unchanged
+
+if TYPE_CHECKING:
+    from shapegcode.conversion.rapids.shape import ShapedRapids
 
 _NEAR_PRICE = 0.7  # of the price: from here on the time of the program is worked out in full
 

@@ -10,13 +10,13 @@ from shapegcode.comparison.result import KindCount, ProgramDifference
 from shapegcode.conversion.aims import ToleranceCurve, curve_table
 from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.operating import ControlNote, control_table, restart_table
-from shapegcode.conversion.rapids.shape import RapidsOutcome
 from shapegcode.conversion.recommendation import FilterAdvice, Grade
 from shapegcode.conversion.restart import RestartPoint
 from shapegcode.conversion.rests import RestsOn
 from shapegcode.conversion.tables import (
     BeforeAfter,
     CutOutcome,
+    RapidsOutcome,
     before_after_table,
     change_percent,
     cut_table,

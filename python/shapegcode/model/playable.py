@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from shapegcode.machine import Machine
-from shapegcode.model.scene import scene_of
 from shapegcode.program import Program
-from shapegcode.results.page.scene import Scene
+
+if TYPE_CHECKING:
+    from shapegcode.results.page.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +33,8 @@ class PlayedPrograms:
 
     def scene(self, on_progress: Callable[[float], None] = lambda _done: None) -> Scene | None:
         """Play them."""
+        from shapegcode.model.scene import scene_of
+
         return scene_of(
-            self.original,
-            self.machine,
-            self.emitted,
-            labels=self.labels,
-            plant=self.plant,
-            on_progress=on_progress,
+            self.original, self.machine, self.emitted, labels=self.labels, plant=self.plant, on_progress=on_progress
         )
