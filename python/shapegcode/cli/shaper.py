@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
         "Designs every family of input shapers for some vibration modes and compares them: duration, what is left of "
-        "the vibration if the frequencies are off, contour cost, negative taps; and recommends one. "
+        "the vibration if the frequencies are off, contour cost, negative impulses; and recommends one. "
         "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input."
     )
     add = parser.add_argument
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what is least in the design to take, within the limit: duration, contour cost, or what is left of the "
         "vibration (default: %(default)s)",
     )  # fmt: skip
-    add("--negative", action="store_true", help="a design with negative taps may be recommended")
+    add("--negative", action="store_true", help="a design with negative impulses may be recommended")
     add("--taps", metavar="TIME:A,...", help='compare a shaper of your own: "0:.5,10.9ms:.5"')
     add(
         "--speed", metavar="MM/S", type=positive, default=200.0,

@@ -240,7 +240,7 @@ class Conversion(PlayedFigures, Result):
                     "--set power_on.units=G20 (inch) or G21 (mm), and write that code into it."
                 )
             if self.recommendation.startswith("already"):
-                return "run the program as it is; --shape-all shapes it all the same."
+                return "run the program as it is; --shape-all shapes it nevertheless."
             return "run the original program: nothing in it was shaped."
         if self.recommendation.startswith("no benefit"):
             return "run the original program: the shaped one brings no benefit."

@@ -23,7 +23,7 @@ def open_axes(program: Program, machine: Machine) -> list[str]:
     reach = [np.ptp(np.asarray(region.path.polyline()), axis=0) for region in program.regions]
     stated = {value.key for value in machine.values() if not value.unmeasured}
     return [
-        f"{letter.upper()} moves, and nobody knows whether it has a vibration mode: taken as rigid; "
+        f"{letter.upper()} moves, and whether it has a vibration mode is not known: assumed rigid; "
         f"tap it (shapegcode identify), or state axes.{letter}.rigid = true"
         for rank, (letter, axis) in enumerate(zip("xyz", machine.axes.as_tuple(), strict=True))
         if not axis.modes

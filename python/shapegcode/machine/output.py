@@ -155,8 +155,8 @@ class Shaping(TomlTable):
         "smooth-si",
         "smooth-zvd-ei",
     ] = key(
-        'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative taps, exact '
-        "at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
+        'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative impulses, '
+        "exact at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
         default="auto",
     )
     per_axis: Bool = key(

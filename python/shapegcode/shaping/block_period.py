@@ -119,7 +119,7 @@ def choose_block_period(
             return _choice(max(near, key=lambda each: each.period_s), candidates)
     raise DesignError(
         f"no block period from {ms(periods_s[0])} to {ms(periods_s[-1])} in steps of {ms(interpolation_period_s)} has "
-        f"a shaper without negative taps within {ms(max_duration_s)} for {band_names(bands)}; the first says: "
+        f"a shaper without negative impulses within {ms(max_duration_s)} for {band_names(bands)}; the first says: "
         f"{candidates[0].refusal}"
     )
 

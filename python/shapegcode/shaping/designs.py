@@ -72,7 +72,7 @@ class Design:
 
     @property
     def abs_sum(self) -> float:
-        """Sum of the taps' magnitudes: 1 without negative taps."""
+        """Sum of the taps' magnitudes: 1 without negative impulses."""
         return self.shaper.abs_sum
 
     @property
@@ -132,14 +132,14 @@ def parse_taps(given: str | Sequence[Any] | dict[str, Any]) -> Shaper:
         try:
             given = json.loads(text)
         except json.JSONDecodeError as error:
-            raise ArgumentError(f"the taps are no JSON: {error}") from error
+            raise ArgumentError(f"the impulses are no JSON: {error}") from error
     if isinstance(given, dict):
         if set(given) != {"times_s", "amplitudes"}:
-            raise ArgumentError(f"taps as a table have the keys times_s and amplitudes: given {', '.join(given)}")
+            raise ArgumentError(f"impulses as a table have the keys times_s and amplitudes: given {', '.join(given)}")
         return Shaper(_numbers(given["times_s"]), _numbers(given["amplitudes"]))
     pairs = [_numbers(pair) for pair in given]
     if any(len(pair) != 2 for pair in pairs):
-        raise ArgumentError(f"taps as a list are pairs of time in s and amplitude: given {given}")
+        raise ArgumentError(f"impulses as a list are pairs of time in s and amplitude: given {given}")
     return Shaper([pair[0] for pair in pairs], [pair[1] for pair in pairs])
 
 
@@ -169,8 +169,8 @@ def _from_text(text: str) -> Shaper:
 def _numbers(values: Any) -> list[float]:
     """The numbers of a list; a text or a truth value is none."""
     if isinstance(values, str | bytes) or not isinstance(values, Sequence):
-        raise ArgumentError(f"a list of numbers is wanted among the taps: given {values!r}")
+        raise ArgumentError(f"a list of numbers is wanted among the impulses: given {values!r}")
     for value in values:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ArgumentError(f"{value!r} is no number of the taps")
+            raise ArgumentError(f"{value!r} is no number of the impulses")
     return [float(value) for value in values]

@@ -70,7 +70,7 @@ def choose_grid(
 ) -> Grid:
     """Block period and shaper for all modes of a machine, and shapers that follow moving modes.
 
-    With `shaping.family` = "auto" the shortest shaper without negative taps that leaves at most
+    With `shaping.family` = "auto" the shortest shaper without negative impulses that leaves at most
     `shaping.vibration_limit` of the vibration anywhere in the modes' stated bands; exact where no band is stated. With
     a named family its shortest one. Text that shall bear a turned feed override (`Machine.bears_override`) gets the
     period that suits the dial, see `best_for_dial`.
@@ -103,7 +103,7 @@ def choose_grid(
         if moving_axis(machine) is not None:
             raise _core.ArgumentError(
                 f"shaping.family = {shaping.family!r}: modes that move with an axis (frequency_over) are followed by "
-                'shapers without negative taps; use "auto"'
+                'shapers without negative impulses; use "auto"'
             )
         return _of_family(shaping.family, bands, machine, period, feed)
     family = "robust" if any(band.uncertainty for band in bands) else "non-negative"

@@ -32,7 +32,7 @@ _SAME_DURATION = 0.02  # designs whose durations differ by less are equal, relat
 
 
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
-    """Shortest shaper with non-negative taps on a grid that cancels every mode exactly there.
+    """Shortest shaper with non-negative impulses on a grid that cancels every mode exactly there.
 
     The number of periods is the smallest for which the conditions (sum 1, both parts of each mode's sum zero)
     have a non-negative solution. Among the solutions of that duration the one with the least second central

@@ -106,7 +106,7 @@ def minimax_robust(
 
     The number of periods is the smallest for which the least worst residual is below the limit (to 0.1 %). Among the
     non-negative designs of that duration the one with the least second central moment, the contour cost, is taken
-    (to 0.5 %); with negative taps, the one with the least sum of magnitudes.
+    (to 0.5 %); with negative impulses, the one with the least sum of magnitudes.
 
     Source: this project.
     """
@@ -197,7 +197,7 @@ class Task:
         """The task, its values checked."""
         check_modes_and_times(bands, period_s=period_s)
         if not (math.isfinite(max_abs_sum) and max_abs_sum >= 1.0):
-            raise ArgumentError(f"max_abs_sum is {max_abs_sum}: it must be finite and at least 1, the sum of the taps")
+            raise ArgumentError(f"max_abs_sum is {max_abs_sum}: must be finite and at least 1, the sum of the impulses")
         bands = tuple(bands)
         wide = [band for band in bands if band.uncertainty]
         largest = None if non_negative else max_abs_sum
@@ -354,7 +354,7 @@ def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesi
 
 def no_exact(task: Task, duration_s: float) -> str:
     """Why the modes without a band have no design of a duration, for a message."""
-    taps = "non-negative taps" if task.max_abs_sum is None else f"taps with sum|a| up to {task.max_abs_sum:g}"
+    taps = "non-negative impulses" if task.max_abs_sum is None else f"impulses with sum|a| up to {task.max_abs_sum:g}"
     if task.mirrored:
         taps = f"mirrored {taps}"
     return f"{taps} up to {ms(duration_s)} on a {ms(task.period_s)} grid do not cancel {mode_names(task.exact)} exactly"
@@ -386,7 +386,7 @@ def unreachable(task: Task) -> str:
         if turns <= high + _WHOLE:
             often = "once" if turns == 1 else f"{turns} times"
             return (
-                f"{band} Hz swings {often} per period of {ms(task.period_s)} at {turns / turns_per_hz:.5g} Hz, "
-                "where all taps add up (z close to +1)"
+                f"{band} Hz completes {often} per period of {ms(task.period_s)} at {turns / turns_per_hz:.5g} Hz, "
+                "where all impulses add up (z close to +1)"
             )
     return ""

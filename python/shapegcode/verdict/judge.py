@@ -377,5 +377,5 @@ def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list
         return []
     return [
         f"runs in {now_s:.1f} s instead of {was_s:.1f} s: too slow a feed for blocks of {block_period_s * 1e3:g} ms "
-        "(raise controller.minimum_feed_mm_per_min above it to keep its text)"
+        "(raise controller.minimum_feed_mm_per_min above it to leave the cut unchanged)"
     ]

@@ -231,7 +231,7 @@ def _warnings(outcome: RapidsOutcome, machine: Machine) -> list[str]:
     if machine.controller.rapid_path == "non_linear":
         warnings.append(
             "shaped rapids are straight lines; the rapids that they replace were not (controller.rapid_path = "
-            '"non_linear"): check that the straight way is free'
+            '"non_linear"): check that the straight path is free'
         )
     if outcome.slowed_blocks and not machine.emission.leaves_look_ahead:
         warnings.append(
