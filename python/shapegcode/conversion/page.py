@@ -235,7 +235,7 @@ def _times(conversion: Conversion) -> Section:
 
 
 def _machine(machine: Machine) -> Section:
-    """What the machine was taken for: modes, tolerances, and every value that nobody measured."""
+    """What the machine was taken for: modes, tolerances, and every value that was not measured."""
     values = [value for value in machine.values() if value.unmeasured or value.key.startswith(_SHOWN_KEYS)]
     unmeasured = sum(value.unmeasured for value in values)
     columns = (

@@ -83,13 +83,13 @@ class Conversion(PlayedFigures, Result):
         budget: only under one: what it allowed, and what was given up for it.
         rapids: only where rapids may be shaped: what became of them.
         least_gain_um: what is too little.
-        rests_on: values that nobody measured on this machine, by how far each moves the deciding figure to its limit.
+        rests_on: values that were not measured on this machine, by how far each moves the deciding figure to its limit.
         unmeasured_tried: how many such values were moved.
         at_the_control: caution, before you run when it is loaded and run; empty where nothing was shaped.
         restart_points: blocks inside of shaped cuts at which the control can begin.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
-        played: a handle and no data: both programs and the machine, to play them again for a picture or a page.
+        played: a handle and no data: both programs and the machine, to simulate them again for a picture or a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool, "shaped_cuts_within": bool}
@@ -382,7 +382,7 @@ class Conversion(PlayedFigures, Result):
             The page, as data.
 
         Raises:
-            MachineError, NumericError: a program cannot be played.
+            MachineError, NumericError: a program cannot be simulated.
         """
         page = super().page(**options)
         if page.scene is None or self.from_json:

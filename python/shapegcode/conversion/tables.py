@@ -79,7 +79,7 @@ def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
 
 
 def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
-    """The values that nobody measured on this machine and that the verdict rests on."""
+    """The values that were not measured on this machine and that the verdict rests on."""
     columns = (
         Column("key", left=True),
         Column("assumed → tested", value=_moved, text=True),
@@ -293,7 +293,7 @@ class RapidMove:
         settling_s: from the end of the set-points until the table stays within the band.
         residual_vibration_um: largest |table - command| while the set-points rest.
         residual_limit_um: what the emitted one is judged by.
-        misses: tolerances that it leaves; always empty: such a rapid keeps its text.
+        misses: tolerances that it leaves; always empty: such a rapid is left unchanged.
     """
 
     lines: tuple[int, int]

@@ -33,7 +33,7 @@ def open_axes(program: Program, machine: Machine) -> list[str]:
 
 
 def played_warnings(program: Program, figures: PlayedFigures, machine: Machine, *, is_priced: bool) -> list[str]:
-    """What playing the emitted program showed: misses, the tolerance that binds, figures made worse."""
+    """What simulating the emitted program showed: misses, the tolerance that binds, figures made worse."""
     expanded = " expanded" if program.core.expanded else ""
     misses = [
         f"{program.place(region.lines[0])}: lines {region.lines[0]} to {region.lines[1]}{expanded}: {miss}"

@@ -11,7 +11,7 @@ from shapegcode.machine import Machine
 def controller_model(
     machine: Machine, *, feed_override: float = 1.0, rapid_override: float = 1.0, shaped: bool | None = None
 ) -> _core.ControllerModel:
-    """The controller of a machine as the core times and plays it."""
+    """The controller of a machine as the core times and simulates it."""
     controller = machine.controller
     model = _core.ControllerModel()
     model.period_s = controller.interpolation_period_s

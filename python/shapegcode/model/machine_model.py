@@ -1,6 +1,6 @@
-"""A machine as the core plays it: made once from the machine file, and asked by everything that plays.
+"""A machine as the core simulates it: made once from the machine file, and asked by everything that simulates.
 
-Whether the look-ahead plans the speed along a path or the path is played block by block is decided here and nowhere
+Whether the look-ahead plans the speed along a path or the path is simulated block by block is decided here and nowhere
 else (`PlayingController`).
 """
 
@@ -96,7 +96,7 @@ class PlayingController:
         against: _core.Path | None = None,
         block_end: _core.BlockEnd | None = None,
     ) -> _core.PlaybackFigures:
-        """A path played from rest to rest and measured against itself or another one."""
+        """A path simulated from rest to rest and measured against itself or another one."""
         options.axis_filters = self.filters
         profile = self._planned(path)
         if profile is not None:
@@ -159,12 +159,12 @@ class MachineModel:
 
     @cached_property
     def ordinary(self) -> PlayingController:
-        """The controller as it plays an ordinary program."""
+        """The controller as it simulates an ordinary program."""
         return PlayingController(controller_model(self.machine))
 
     @cached_property
     def shaped(self) -> PlayingController:
-        """The controller as it plays shaped blocks: one by one, without look-ahead."""
+        """The controller as it simulates shaped blocks: one by one, without look-ahead."""
         model = _core.for_shaped_blocks(controller_model(self.machine))
         model.block_end = self.own_rule
         return PlayingController(model)
@@ -240,8 +240,8 @@ class MachineModel:
     ) -> _core.PlaybackOptions:
         """Options with the plant of the verdict.
 
-        Behind feed drives the residual is the swing of the table against its motor once that has arrived: the lag that
-        runs out at a stop is no vibration.
+        Behind feed drives the residual is the vibration of the table against its motor once that has arrived: the lag
+        that runs out at a stop is no vibration.
         """
         plant = self.machine.verdict.plant
         options = self.options(plant=plant, filters=filters, shift=shift, only=only, offset=offset)
@@ -299,7 +299,7 @@ class MachineModel:
         tracker: _core.ContourTracker | None = None,
         increment_mm: float | None = None,
     ) -> _core.PlaybackFigures:
-        """Emitted blocks as the controller plays them, measured against the programmed path."""
+        """Emitted blocks as the controller simulates them, measured against the programmed path."""
         options = self.verdict_options(filters=self.shaped.filters, shift=shift, only=only, offset=offset)
         options.measure_contour = contour
         if tracker is not None:

@@ -1,4 +1,4 @@
-"""Programs and the machine they are played on, kept so that a page can play them again."""
+"""Programs and the machine they are simulated on, kept so that a page can simulate them again."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class PlayedPrograms:
     """A program, and the one that was made of it.
 
     Attributes:
-        original: what is played.
+        original: what is simulated.
         machine: controller and plant.
         emitted: made of it; None: none.
         labels: of both, for people.
@@ -32,7 +32,7 @@ class PlayedPrograms:
     plant: str = "modal"
 
     def scene(self, on_progress: Callable[[float], None] = lambda _done: None) -> Scene | None:
-        """Play them."""
+        """Simulate them."""
         from shapegcode.model.scene import scene_of
 
         return scene_of(

@@ -1,6 +1,6 @@
-"""Programs played for a page: one motion in time beside the other, thinned as it passes by.
+"""Programs simulated for a page: one motion in time beside the other, thinned as it passes by.
 
-Memory does not grow with the length of a program: each piece is thinned as soon as it was played.
+Memory does not grow with the length of a program: each piece is thinned as soon as it was simulated.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _FLAT = {
 
 @dataclass(frozen=True)
 class _Nominal:
-    """A cut that is played, and the path that it shall follow."""
+    """A cut that is simulated, and the path that it shall follow."""
 
     first_line: int
     last_line: int
@@ -82,7 +82,7 @@ def scene_of(
     most_points: int = MOST_POINTS,
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Scene:
-    """Play a program, and the one that was made of it, for a page."""
+    """Simulate a program, and the one that was made of it, for a page."""
     programs = [original, *([emitted] if emitted is not None else [])]
     period_s = MachineModel(machine).period_s
     variants, spectra, said = [], [], []

@@ -78,7 +78,7 @@ def _other_period(stamp: Stamp, machine: Machine) -> str:
 
 
 def shaped_note(program: Program) -> str:
-    """How a program is played, in one sentence; empty for one without shaped regions."""
+    """How a program is simulated, in one sentence; empty for one without shaped regions."""
     shaped, whole = program.shaped_regions, len(program.regions)
     if not shaped:
         return ""

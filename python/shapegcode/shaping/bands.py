@@ -21,7 +21,7 @@ NO_MODE = (
 """Why there is no shaper."""
 NARROW_PERCENT = 0.2
 """A band of a mode of a machine is designed for if it is wider than this, either way."""
-_SLOWEST_HZ = 0.1  # the swing of a load on 25 m of rope; no machine tool has a slower mode
+_SLOWEST_HZ = 0.1  # the period of a load on 25 m of rope; no machine tool has a slower mode
 _FASTEST_HZ = 10_000.0  # as in a machine file
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _SIZE = r"(?:\d+\.?\d*|\.\d+)"
@@ -129,7 +129,7 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
     """The modes of all axes of a machine with the bands that it states; equal ones once, with the wider band.
 
     A band as narrow as a tap test gives is none: a shaper that is exact at the nominal frequency leaves less there than
-    one that spends `shaping.vibration_limit` all over it. The verdict plays its ends all the same.
+    one that spends `shaping.vibration_limit` all over it. The verdict simulates its ends nevertheless.
     """
     from shapegcode.model.modes import still_mode
 

@@ -94,7 +94,7 @@ def choose_block_period(
     Raises:
         ArgumentError: no mode, a value outside its range, or no multiple of the interpolation period in the range.
         DesignError: no candidate has a design: modes without a band cannot be cancelled within `max_duration_s`, or
-            every grid has a frequency of the bands that swings a whole number of times per period.
+            every grid has a frequency of the bands that completes a whole number of cycles per period.
 
     Source: this project.
     """

@@ -26,7 +26,7 @@ _SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of 
 _ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
 _OWN_TAPS = "taps"  # the family of taps that the user gives
 _MOST_PERIODS = 5000  # of the longest shaper: finer grids are as good as continuous times
-_NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of swings per period
+_NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of cycles per period
 
 
 def choose_shaper(

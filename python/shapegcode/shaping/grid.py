@@ -73,7 +73,7 @@ def choose_grid(
     With `shaping.family` = "auto" the shortest shaper without negative impulses that leaves at most
     `shaping.vibration_limit` of the vibration anywhere in the modes' stated bands; exact where no band is stated. With
     a named family its shortest one. Text that shall bear a turned feed override (`Machine.bears_override`) gets the
-    period that suits the dial, see `best_for_dial`.
+    period that suits other feed overrides, see `best_for_dial`.
 
     Args:
         machine: modes and controller.
@@ -205,7 +205,7 @@ def shaper_track(
 
 
 def dial_vibration_um(block_period_s: float, shaper: _core.Shaper, model: MachineModel, feed_mm_per_s: float) -> float:
-    """Largest residual vibration of straight strokes in equal blocks, over the positions of the dial."""
+    """Largest residual vibration of straight moves in equal blocks, over the feed overrides."""
     moves = np.array([float(bool(axis.modes)) for axis in model.machine.axes.as_tuple()])
     speed = feed_mm_per_s * math.sqrt(moves.sum())
     fir = _core.Fir([round(t / block_period_s) for t in shaper.times_s], list(shaper.amplitudes))
@@ -230,7 +230,7 @@ def dial_vibration_um(block_period_s: float, shaper: _core.Shaper, model: Machin
 def best_for_dial(
     designs: Iterable[tuple[float, _core.Shaper]], machine: Machine, feed_mm_per_s: float
 ) -> tuple[float, _core.Shaper]:
-    """The block period with the best of both: a short shaper, and little vibration with the dial turned.
+    """The block period with the best of both: a short shaper, and little vibration with another feed override.
 
     What stays below `tolerance.residual_floor_um` counts as that. Above it twice the vibration weighs as much as a
     shaper of twice the duration.

@@ -53,7 +53,7 @@ _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 FloatArray = NDArray[np.float64]
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's dust
 _GROWTH = 1.4  # of the number of periods while it is searched
-_WHOLE = 1e-3  # swings per period from a whole number
+_WHOLE = 1e-3  # cycles per period from a whole number
 _LAST_TAP = 1e-3
 """Where the best use of the last periods of a damped mode is to wait, a tap this large marks their end."""
 _SAME_VARIANCE = 5e-3  # relative
@@ -374,7 +374,7 @@ def refusal(task: Task, limit: float, max_duration_s: float) -> str:
 def unreachable(task: Task) -> str:
     """What no non-negative shaper of this grid can reduce, for a message; empty if there is nothing.
 
-    At a frequency that swings a whole number of times per period every tap adds to the others: what a shaper seems
+    At a frequency with a whole number of cycles per period every tap adds to the others: what a shaper seems
     to take away is only what dies out while it lasts.
     """
     if task.max_abs_sum is not None:
@@ -384,9 +384,9 @@ def unreachable(task: Task) -> str:
         low, high = (band.mode.frequency_hz * (1.0 + side * band.uncertainty) * turns_per_hz for side in (-1.0, 1.0))
         turns = max(1, math.ceil(low - _WHOLE))
         if turns <= high + _WHOLE:
-            often = "once" if turns == 1 else f"{turns} times"
+            cycles = "one cycle" if turns == 1 else f"{turns} cycles"
             return (
-                f"{band} Hz completes {often} per period of {ms(task.period_s)} at {turns / turns_per_hz:.5g} Hz, "
+                f"{band} Hz completes {cycles} per period of {ms(task.period_s)} at {turns / turns_per_hz:.5g} Hz, "
                 "where all impulses add up (z close to +1)"
             )
     return ""

@@ -42,7 +42,7 @@ def simulate(
     record_samples: int = 200_000,
     on_progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Simulation:
-    """Play the cutting regions of a program through the controller's model and the plant, each from rest to rest.
+    """Simulate the cutting regions of a program through the controller's model and the plant, each from rest to rest.
 
     `play_motion` and `stream` play the whole program in one.
 
@@ -51,7 +51,7 @@ def simulate(
         machine: controller and plant.
         plant: "modal" for the modes behind an ideal servo, "feed-drive" for `axes.*.drive`; what is said of vibration
             then holds the lag of the servo loop.
-        shaped: whether cuts are shaped blocks: played at their feed, without look-ahead, behind the control's own
+        shaped: whether cuts are shaped blocks: simulated at their feed, without look-ahead, behind the control's own
             filter (`controller.shaped_time_constant_s`), in the worse of both rules of block timing. None: those
             regions of which the program says so, as one that shapegcode wrote does.
         against: the original of a shaped program: the contour error is measured against its path, and the whole program
@@ -152,7 +152,7 @@ def play_motion(
     every: int = 1,
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Motion:
-    """Play a whole program in time; keep the largest values and the curves of its motion, and write it to files.
+    """Simulate a whole program in time; keep the largest values and the curves of its motion, and write it to files.
 
     Memory does not grow with the length of the program.
 

@@ -1,4 +1,4 @@
-"""One emitted region played in every case of the verdict."""
+"""One emitted region simulated in every operating condition of the verdict."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 
 @dataclass(frozen=True)
 class Played:
-    """A case that was played.
+    """An operating condition that was simulated.
 
     Attributes:
         run: its figures.
-        cut_s: how much longer all blocks take in it than at 100 %, before any filter, where only their end was played;
-            else 0.
+        cut_s: how much longer all blocks take in it than at 100 %, before any filter, where only their end was
+            simulated; else 0.
     """
 
     run: _core.PlaybackFigures
@@ -35,13 +35,13 @@ class Played:
 
 @dataclass(frozen=True)
 class CasePlayer:
-    """Plays one emitted region; every method is a task of its own.
+    """Simulates one emitted region; every method is a task of its own.
 
     Attributes:
         blocks: what was emitted.
         path: what was programmed.
         model: the machine for the core.
-        cases: in which it is played.
+        cases: in which it is simulated.
         target: what the contour tolerance is about.
         offset: from the region's positions to the machine's.
         tracker: of the programmed path.
@@ -152,7 +152,7 @@ class CasePlayer:
 
 
 def case_figures(run: _core.PlaybackFigures, *, contour: bool = True, response: bool = True) -> CaseFigures:
-    """What a playback showed."""
+    """What a simulation showed."""
     if not contour:
         return CaseFigures(run.residual_mm, None, None, run.duration_s)
     followed = Deviation.of([run.response]) if response else None

@@ -1,4 +1,4 @@
-"""What a controller, its operator and a drifting machine may do to an emitted program: the cases of the verdict.
+"""Operating conditions: what a controller, its operator and a drifting machine may do to an emitted program.
 
 Each case varies one thing around the program as it is meant to run, and a few stand for the corners of the band that
 the machine file states (table `[verdict]`). The cases inside the band decide; the others are shown.
@@ -30,7 +30,7 @@ _QUANTITIES = {"command": "contour error of the command", "response": "contour e
 
 @dataclass(frozen=True)
 class Case:
-    """One way in which the emitted text may be played.
+    """One operating condition of the emitted program.
 
     Attributes:
         name: in words, unique.
@@ -69,7 +69,7 @@ class Case:
 
 @dataclass(frozen=True)
 class CaseFigures:
-    """One region played in one case.
+    """One region simulated in one operating condition.
 
     Attributes:
         residual_mm: largest |table - command| while the set-points rest, (3,).
@@ -150,11 +150,11 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
 
 
 def stated_cases(machine: Machine) -> list[Case]:
-    """The cases in which a program of this machine is played; the two nominal ones come first (ceil, carry).
+    """The conditions in which a program of this machine is simulated; the two nominal ones come first (ceil, carry).
 
-    Overrides from 50 to 120 % and at the ends of the band (none where the dial is locked), each mode and all of them up
-    and down by their stated uncertainty with as little damping as they state, both together at the corners of the band,
-    the look-ahead mode left on (for a controller that has one), and a block buffer that runs empty once.
+    Overrides from 50 to 120 % and at the ends of the band (none where the override is locked); each mode, and all of
+    them, up and down by their stated uncertainty with as little damping as they state; both together at the corners of
+    the band; the look-ahead mode left on (for a controller that has one); and a block buffer that runs empty once.
     """
     band, own = machine.verdict, machine.controller.block_end
     low, high = band.override_percent
@@ -165,7 +165,7 @@ def stated_cases(machine: Machine) -> list[Case]:
     def at_override(percent: float) -> Case:
         return Case(f"override {percent:g} %", own, low <= percent <= high, override=percent / 100.0)
 
-    turns = machine.emission.override != "lock"  # a dial that is switched off does nothing
+    turns = machine.emission.override != "lock"  # an override that is switched off has no effect
     ends = sorted({low, high} - {100.0}) if turns else []
     cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, *ends} - {100.0}) if turns]
     modes = _uncertain_modes(machine)

@@ -1,4 +1,4 @@
-"""The verdict on an emitted text: regions played in every case, held against limits, summed up."""
+"""The verdict on an emitted text: regions simulated in every condition, held against limits, summed up."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class RegionFigures:
 
 @dataclass(frozen=True)
 class Playing:
-    """The playbacks of one emitted region under way.
+    """The simulations of one emitted region under way.
 
     Attributes:
         player: whose tasks they are.
@@ -98,7 +98,7 @@ class Playing:
 
 
 class Judge:
-    """Plays emitted regions in every case and holds them against the machine's tolerances.
+    """Simulates emitted regions in every case and holds them against the machine's tolerances.
 
     Args:
         model: of the machine; its file states tolerances, and the band in which a program must be good.
@@ -123,7 +123,7 @@ class Judge:
         pool: Executor,
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
-        """Play every emitted region beside its original: `begin` and `figures`."""
+        """Simulate every emitted region beside its original: `begin` and `figures`."""
         trackers = [_core.ContourTracker(place.region.path) for place in placed]
         return self.figures(self.begin(emitted, placed, trackers, pool), originals, on_step)
 
@@ -155,9 +155,9 @@ class Judge:
         originals: Sequence[Future[_core.PlaybackFigures]],
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
-        """What the playbacks show."""
+        """What the simulations show."""
         results: list[RegionFigures] = []
-        # A program may be one long region: what moves is the number of its playbacks.
+        # A program may be one long region: what moves is the number of its simulations.
         done = count(1)
         total = sum(len(each.nominal) + len(each.others) + 3 for each in running)
 
@@ -176,7 +176,7 @@ class Judge:
     def contour_um(self, figures: RegionFigures, *, turned: bool = True) -> float:
         """Largest deviation from the path of what the contour tolerance is about, over the cases that count, µm.
 
-        Without those that a lower feed is no remedy for: look-ahead left on, a starved block.
+        Without those that a lower feed is no remedy for: look-ahead left on, a buffer underrun.
         """
         deviations = [
             played.command if self.target == "command" else played.response

@@ -162,7 +162,7 @@ class _RapidShaper:
         return bool(budget.too_fast(measure_load(choice.region, choice.shaped, self.grid, bits)))
 
     def _judge(self, choices: Sequence[Choice]) -> None:
-        """Play every replacement as the text has it."""
+        """Simulate every replacement as the text has it."""
         spliced = splice(self.emitted.core.text, self.placed, choices)
         emitted = read_back([spliced.text], spliced.everything, self.machine)
         stops_s = _STOP_S + self.machine.emission.prefill_dwell_s
