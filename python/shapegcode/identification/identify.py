@@ -24,8 +24,6 @@ from shapegcode.io.read import ReadOptions, read_measurement
 from shapegcode.io.record import Quantity, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 
-__all__ = ["MOST_MODES", "identify"]
-
 MOST_MODES = 8
 """Largest number of modes that is tried unless asked otherwise."""
 _LARGEST_MODEL = 99
