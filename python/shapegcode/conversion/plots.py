@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from shapegcode.conversion.aims import ToleranceCurve
 from shapegcode.conversion.result import Conversion
 from shapegcode.results import plot
-from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
+from shapegcode.results.path_plots import RECORD_SAMPLES, PlayedRegion, motion_pictures
 from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
