@@ -50,7 +50,7 @@ from shapegcode._core import (
     zv_on_grid as zv_on_grid,
 )
 from shapegcode.batching.batch import batch as batch
-from shapegcode.batching.cluster import Cluster as Cluster
+from shapegcode.batching.process import Cluster as Cluster
 from shapegcode.batching.result import (
     Batch as Batch,
     BatchRow as BatchRow,
@@ -145,23 +145,20 @@ from shapegcode.io.edge_capture import (
 )
 from shapegcode.io.edge_json import read_edge_json as read_edge_json
 from shapegcode.io.frequency_response import FrequencyResponse as FrequencyResponse
-from shapegcode.io.read import ReadOptions as ReadOptions
-from shapegcode.io.record import Record as Record
+from shapegcode.io.record import ReadOptions as ReadOptions, Record as Record
 from shapegcode.io.run_log import (
     iter_run_logs as iter_run_logs,
     read_run_logs as read_run_logs,
 )
-from shapegcode.io.run_record import (
+from shapegcode.io.run_tracks import (
     RunLog as RunLog,
     Signal as Signal,
 )
 from shapegcode.machine import Machine as Machine
 from shapegcode.machine.description_result import (
     MachineDescription as MachineDescription,
-    describe_machine as describe_machine,
-)
-from shapegcode.machine.difference_result import (
     MachineDifference as MachineDifference,
+    describe_machine as describe_machine,
     machine_difference as machine_difference,
 )
 from shapegcode.machine.fanuc_import import import_parameters as import_parameters

@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
-from shapegcode.cli.arguments import add_alias
+from shapegcode.cli.arguments import add_alias, positive, ratio, seconds, share
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
-from shapegcode.cli.typed import positive, ratio, seconds, share
 
 # The registry's, whose solvers take too long to load for a help text.
 _FAMILIES = (
@@ -87,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     """Compare shapers."""
     from shapegcode._core import ArgumentError
     from shapegcode.cli import runner
-    from shapegcode.cli.console import output_console
+    from shapegcode.cli.runner import output_console
     from shapegcode.shaping.comparison import choose_shaper
     from shapegcode.shaping.result import families_table
 

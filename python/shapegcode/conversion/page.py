@@ -14,7 +14,7 @@ from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled import ScheduledConversion
 from shapegcode.conversion.tables import CutOutcome, before_after_table, rests_table
 from shapegcode.machine import Machine
-from shapegcode.results.made import Made
+from shapegcode.results.json import Made
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
 from shapegcode.results.page.model import (
     Bars,

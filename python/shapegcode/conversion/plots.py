@@ -9,7 +9,7 @@ from shapegcode.conversion.aims import ToleranceCurve
 from shapegcode.conversion.result import Conversion
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results import plot
-from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
+from shapegcode.results.path_plots import RECORD_SAMPLES, PlayedRegion, motion_pictures
 from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:

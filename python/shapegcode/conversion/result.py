@@ -26,8 +26,7 @@ from shapegcode.conversion.tables import (
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.results.figures import CONTOURS, ContourError
-from shapegcode.results.json import exact, hidden, sparse
-from shapegcode.results.made import Made
+from shapegcode.results.json import Made, exact, hidden, sparse
 from shapegcode.results.page.model import Light, Page, Section
 from shapegcode.results.result import Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table

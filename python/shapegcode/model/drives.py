@@ -10,7 +10,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.errors import MachineError, Problem
 from shapegcode.machine import Machine
-from shapegcode.machine.drive import Drive
+from shapegcode.machine.axes import Drive
 from shapegcode.model.modes import axis_modes
 
 _UM = 1e-6  # m

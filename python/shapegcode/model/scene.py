@@ -19,8 +19,17 @@ from shapegcode.model.modes import axis_modes
 from shapegcode.model.stream import Chunk, stream
 from shapegcode.program import Program
 from shapegcode.program.pairing import paired_regions
-from shapegcode.results.page.scene import ModeLine, Scene, SceneSpectrum, Variant
-from shapegcode.results.page.thinning import PIXELS_HIGH, PIXELS_WIDE, AccelerationSpectrum, Kept, Thinner
+from shapegcode.results.page.scene import (
+    PIXELS_HIGH,
+    PIXELS_WIDE,
+    AccelerationSpectrum,
+    Kept,
+    ModeLine,
+    Scene,
+    SceneSpectrum,
+    Thinner,
+    Variant,
+)
 
 MOST_POINTS = 60_000
 """Samples of a program that a page shows, at most."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.results import plot
-from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
+from shapegcode.results.path_plots import RECORD_SAMPLES, PlayedRegion, motion_pictures
 from shapegcode.results.result import Plot
 from shapegcode.simulation.result import Motion, Simulation
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.io.run_log import RunLog, Signal
+from shapegcode.io.run_tracks import RunLog, Signal
 from shapegcode.io.units import find_unit
 from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
