@@ -69,9 +69,9 @@ from shapegcode.checking.result import (
     Check as Check,
     Finding as Finding,
 )
-from shapegcode.comparison.allowed import Allowed as Allowed
 from shapegcode.comparison.compare import compare as compare
 from shapegcode.comparison.result import (
+    Allowed as Allowed,
     Comparison as Comparison,
     KindCount as KindCount,
     ProgramDifference as ProgramDifference,
@@ -171,7 +171,7 @@ from shapegcode.metrology.measure import (
 )
 from shapegcode.metrology.plots import plot_part as plot_part, plot_walls as plot_walls
 from shapegcode.metrology.result import Measurement as Measurement
-from shapegcode.model.drives import drive_parameters as drive_parameters
+from shapegcode.model.modes import drive_parameters as drive_parameters
 from shapegcode.model.response import plant_response as plant_response
 from shapegcode.model.stream import stream as stream
 from shapegcode.program import Program as Program
@@ -193,9 +193,8 @@ from shapegcode.setup.answers import Answers as Answers, AnswersError as Answers
 from shapegcode.setup.build import set_up as set_up
 from shapegcode.setup.result import MachineSetup as MachineSetup
 from shapegcode.shaping.bands import ModeBand as ModeBand
-from shapegcode.shaping.block_period import choose_block_period as choose_block_period
 from shapegcode.shaping.comparison import choose_shaper as choose_shaper
-from shapegcode.shaping.grid import choose_grid as choose_grid
+from shapegcode.shaping.grid import choose_block_period as choose_block_period, choose_grid as choose_grid
 from shapegcode.shaping.grid_designs import shortest_non_negative as shortest_non_negative
 from shapegcode.shaping.plots import (
     plot_branches as plot_branches,

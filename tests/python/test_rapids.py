@@ -18,7 +18,7 @@ from shapegcode.cli import main
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.convert import Conversion, convert
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model
+from shapegcode.model.machine_model import controller_model
 from shapegcode.program import Program
 
 Vector = npt.NDArray[np.float64]

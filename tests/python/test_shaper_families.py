@@ -34,7 +34,7 @@ from shapegcode.shaping import (
     parse_mode_band,
     shortest_non_negative,
 )
-from shapegcode.shaping.designs import parse_taps
+from shapegcode.shaping.bands import parse_taps
 from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid
 from shapegcode.shaping.registry import distinct
 from shapegcode.shaping.solvers import simultaneous_zv

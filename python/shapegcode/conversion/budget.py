@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.conversion.region_text import EmittedRegion
+from shapegcode.conversion.write import EmittedRegion
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.results.result import Xyz

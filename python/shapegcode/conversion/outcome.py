@@ -6,17 +6,25 @@ import math
 from dataclasses import dataclass
 from functools import partial
 
-from shapegcode.comparison.allowed import Allowed
 from shapegcode.comparison.compare import compare
+from shapegcode.comparison.result import Allowed
 from shapegcode.conversion.aims import ToleranceCurve
 from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.plan import ConversionPlan, Shaped
-from shapegcode.conversion.recommendation import Grade, Situation, filter_advice, most_to_gain_um, recommend
+from shapegcode.conversion.recommendation import (
+    Grade,
+    Situation,
+    filter_advice,
+    most_to_gain_um,
+    open_axes,
+    played_warnings,
+    recommend,
+    text_warnings,
+)
 from shapegcode.conversion.restart import restart_points
 from shapegcode.conversion.rests import RestsOn, rests_on
 from shapegcode.conversion.result import ChangeProof, Conversion
 from shapegcode.conversion.tables import CutOutcome, outcome_of, tools_of_cuts
-from shapegcode.conversion.warnings import open_axes, played_warnings, text_warnings
 from shapegcode.machine import Machine
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.model.playable import PlayedPrograms
@@ -32,8 +40,7 @@ from shapegcode.verdict.figures import (
     PlayedFigures,
     UsedShaper,
 )
-from shapegcode.verdict.judge import RegionFigures
-from shapegcode.verdict.program import rapid_vibration_um, simulate_unchanged, unshaped_regions
+from shapegcode.verdict.judge import RegionFigures, rapid_vibration_um, simulate_unchanged, unshaped_regions
 
 
 @dataclass(frozen=True)

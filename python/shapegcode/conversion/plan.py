@@ -20,8 +20,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.shaping.grid import choose_grid
 from shapegcode.verdict.figures import Placed, RegionVerdict
-from shapegcode.verdict.judge import Judge, RegionFigures
-from shapegcode.verdict.program import rapid_vibration_um, simulate_unchanged
+from shapegcode.verdict.judge import Judge, RegionFigures, rapid_vibration_um, simulate_unchanged
 
 if TYPE_CHECKING:
     from shapegcode.conversion.rapids.shape import ShapedRapids

@@ -17,8 +17,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.settings.keys import KeyValue
-from shapegcode.verdict.case_player import case_figures
-from shapegcode.verdict.cases import Case, CaseFigures, Judged, RegionLimits, judge_region
+from shapegcode.verdict.cases import Case, CaseFigures, Judged, RegionLimits, case_figures, judge_region
 from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge, RegionFigures
 

@@ -11,9 +11,8 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad, keepable, measure_load
-from shapegcode.conversion.region_text import EmittedRegion, NoRoomError, RegionText, Room
 from shapegcode.conversion.restart import CutRestarts, FreeNumbers
-from shapegcode.conversion.write import RegionWriter
+from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionText, RegionWriter, Room
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel

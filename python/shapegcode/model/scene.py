@@ -13,12 +13,11 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, controller_model
 from shapegcode.model.modes import axis_modes
 from shapegcode.model.stream import Chunk, stream
 from shapegcode.program import Program
-from shapegcode.program.pairing import paired_regions
+from shapegcode.program.compensation import paired_regions
 from shapegcode.results.page.scene import (
     PIXELS_HIGH,
     PIXELS_WIDE,

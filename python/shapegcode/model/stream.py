@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, controller_model
 from shapegcode.model.modes import Offset
 from shapegcode.program import Program, given_program
 

@@ -14,9 +14,18 @@ import numpy as np
 
 from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper
 from shapegcode.machine import Machine
-from shapegcode.shaping.bands import ModeBand, machine_bands, mode_band, ms, spoken
-from shapegcode.shaping.block_period import candidate_periods, check_block_period
-from shapegcode.shaping.designs import Design, DesignOptions, evaluate, parse_taps
+from shapegcode.shaping.bands import (
+    Design,
+    DesignOptions,
+    ModeBand,
+    evaluate,
+    machine_bands,
+    mode_band,
+    ms,
+    parse_taps,
+    spoken,
+)
+from shapegcode.shaping.grid import candidate_periods, check_block_period
 from shapegcode.shaping.ranking import OBJECTIVES, is_within, pareto_front, reason_for, recommend
 from shapegcode.shaping.registry import FAMILIES, Family, design, family_named
 from shapegcode.shaping.result import Recommendation, Refusal

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from shapegcode._core import DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
 from shapegcode.shaping.bands import check_modes_and_times, mode_names, ms, whole_periods
-from shapegcode.shaping.linear_program import LinearProgram, non_negative_least_squares
+from shapegcode.shaping.cutting_planes import LinearProgram, non_negative_least_squares
 
 FloatArray = NDArray[np.float64]
 

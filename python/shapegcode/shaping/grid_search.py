@@ -27,8 +27,8 @@ from shapegcode._core import (
     worst_residual,
 )
 from shapegcode.shaping.bands import check_times, ms, whole_periods
+from shapegcode.shaping.cutting_planes import LinearProgram
 from shapegcode.shaping.grid_designs import halved
-from shapegcode.shaping.linear_program import LinearProgram
 
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _HINT_PERIODS = 400  # longest grid that a refusal searches, periods

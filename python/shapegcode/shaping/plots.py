@@ -14,8 +14,7 @@ from shapegcode import _core
 from shapegcode._core import MinimalBranches, Mode, Shaper, minimal_branches
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
-from shapegcode.shaping.bands import ModeBand, mode_band
-from shapegcode.shaping.designs import Design
+from shapegcode.shaping.bands import Design, ModeBand, mode_band
 from shapegcode.shaping.result import Recommendation, times_name
 
 if TYPE_CHECKING:

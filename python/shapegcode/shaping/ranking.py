@@ -12,8 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shapegcode._core import ArgumentError
-from shapegcode.shaping.bands import ModeBand, ms, spoken
-from shapegcode.shaping.designs import Design
+from shapegcode.shaping.bands import Design, ModeBand, ms, spoken
 from shapegcode.shaping.registry import FAMILIES
 
 NO_RESIDUAL = 1e-9

@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
-from shapegcode.shaping.bands import NARROW_PERCENT, ModeBand, ms
-from shapegcode.shaping.designs import Design, DesignOptions, evaluate
+from shapegcode.shaping.bands import NARROW_PERCENT, Design, DesignOptions, ModeBand, evaluate, ms
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.robust import minimax_robust
 from shapegcode.shaping.solvers import (

@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
-from shapegcode.shaping.bands import ModeBand, spoken
-from shapegcode.shaping.designs import Design
+from shapegcode.shaping.bands import Design, ModeBand, spoken
 from shapegcode.shaping.ranking import NO_RESIDUAL, is_within, recommend
 from shapegcode.shaping.registry import FAMILIES
 

@@ -27,8 +27,7 @@ from shapegcode._core import (
     negative_zv,
     repeated_zv,
 )
-from shapegcode.shaping.bands import ModeBand, mode_names, ms
-from shapegcode.shaping.designs import DesignOptions, on_grid
+from shapegcode.shaping.bands import DesignOptions, ModeBand, mode_names, ms, on_grid
 from shapegcode.shaping.grid_designs import halved
 from shapegcode.shaping.grid_search import RESIDUAL_LIMIT, Conditions, ResidualLimit, Zero, shortest_on_grid
 

@@ -12,20 +12,19 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, controller_model
 from shapegcode.model.modes import Offset, machine_warnings, region_range_warnings
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
-from shapegcode.program.pairing import paired_regions
+from shapegcode.program.compensation import paired_regions
 from shapegcode.results.figures import ContourError, Tracks, largest_xyz_um
 from shapegcode.results.result import Xyz
 from shapegcode.simulation.files import csv_file, npz_file
 from shapegcode.simulation.motion import MotionRecorder
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
-from shapegcode.verdict.program import judge_program
+from shapegcode.verdict.judge import judge_program
 
 _RULES = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 # How long behind a stop its settling time is looked for. A drive is integrated all that time.

@@ -18,7 +18,7 @@ from shapegcode.errors import RecordError
 from shapegcode.io.run_tracks import RunLog, Signal
 from shapegcode.io.units import find_unit
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model
+from shapegcode.model.machine_model import controller_model
 from shapegcode.program import Program
 from shapegcode.timing.calibration.runs_file import RunEntry
 
