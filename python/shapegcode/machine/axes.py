@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from shapegcode.errors import ArgumentError
 from shapegcode.settings.keys import Bool, Float, InlineTable, NonNegative, Positive, Text, TomlTable, key, toml
 
 
@@ -245,3 +246,12 @@ class Axes(TomlTable):
     def as_tuple(self) -> tuple[Axis, Axis, Axis]:
         """The three axes in the order X, Y, Z."""
         return (self.x, self.y, self.z)
+
+
+def check_axes(keep: str, rigid: str) -> None:
+    """Whether axes are named as they can be."""
+    wrong = sorted({*keep, *rigid} - set("xyz"))
+    if wrong:
+        raise ArgumentError(f"{', '.join(wrong)}: axes are x, y and z")
+    if both := sorted({*keep} & {*rigid}):
+        raise ArgumentError(f"{', '.join(both).upper()}: its modes cannot be kept and it be rigid")

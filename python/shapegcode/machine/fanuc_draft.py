@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from shapegcode.errors import ArgumentError, Problem
+from shapegcode.machine.axes import check_axes
 from shapegcode.machine.fanuc_dump import Dump, DumpValues
 from shapegcode.machine.machine import Machine
 from shapegcode.machine.result import AssumedValue, MissingParameter, ReadParameter, ReadTable, Value
@@ -92,15 +93,6 @@ class Draft:
         table[name] = value
         shown: Value = "; ".join(f"{k} = {v}" for k, v in value.items()) or "none" if isinstance(value, dict) else value
         return shown
-
-
-def check_axes(keep: str, rigid: str) -> None:
-    """Whether axes are named as they can be."""
-    wrong = sorted({*keep, *rigid} - set("xyz"))
-    if wrong:
-        raise ArgumentError(f"{', '.join(wrong)}: axes are x, y and z")
-    if both := sorted({*keep} & {*rigid}):
-        raise ArgumentError(f"{', '.join(both).upper()}: its modes cannot be kept and it be rigid")
 
 
 def take_modes(draft: Draft, base: Machine | None, keep: str, rigid: str) -> None:
