@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
@@ -83,6 +84,7 @@ class Comparison(Result):
         warnings: none.
     """
 
+    published: ClassVar[tuple[str, ...]] = ("comparison of programs",)
     original: str
     emitted: str
     machine: str
