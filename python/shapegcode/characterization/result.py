@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 from shapegcode.characterization.air_tests import Kind
 from shapegcode.machine import Machine
@@ -209,6 +210,7 @@ class Characterisation(Result):
         warnings: contradictions: results that do not go with the others, with their place.
     """
 
+    published: ClassVar[tuple[str, ...]] = ("block overlap",)
     machine: str
     findings: tuple[ControllerFact, ...]
     files: tuple[str, ...]

@@ -295,7 +295,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "output", "update", "write_origins", "force", "full", "csv", "npz", "every", "blocks", "plots", "json", "html",
         "html_script",
     ),
-    "how much is said": ("quiet", "verbose"),
+    "how much is said": ("quiet", "verbose", "cite"),
 }  # fmt: skip
 """Group of an option by its destination, one table for all commands: what is the same stands at the same place."""
 

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="probability of staying within tolerance, for example 99%% (default: the file's)",
     )  # fmt: skip
     add_plots_argument(parser, "write time and probability of the choices as a picture (PNG and SVG) into this folder")
-    add_result_arguments(parser)
+    add_result_arguments(parser, cites=False)  # each draw is a run of `convert`, which cites
 
 
 def run(args: argparse.Namespace) -> int:

@@ -50,8 +50,8 @@ def add_plots_argument(
     parser.add_argument("--plots", metavar="DIR", help=what)
 
 
-def add_result_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--json``, ``--html``, ``--html-script``, ``--quiet``, ``--verbose``: of every command with a result."""
+def add_result_arguments(parser: argparse.ArgumentParser, *, cites: bool = True) -> None:
+    """Declare what every command with a result has; *cites*: with ``--cite``."""
     add_json_argument(parser)
     parser.add_argument(
         "--html",
@@ -59,6 +59,10 @@ def add_result_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the result as a page: one file that any browser opens, without a network",
     )
     add_script_argument(parser)
+    if cites:
+        parser.add_argument(
+            "--cite", action="store_true", help="also say which papers are behind the methods of this run, as BibTeX"
+        )
     add_amount_arguments(parser)
 
 

@@ -267,6 +267,9 @@ def _say(
         console.print(wrapped(text), markup=False, soft_wrap=True, style=style)
 
     say(result.answer, "bold" if result.ok else "bold red")
+    if getattr(args, "cite", False):
+        for entry in result.citations:
+            console.print(f"\n{entry}", markup=False, soft_wrap=True)
     for table in shown:
         console.print()
         console.print(table)

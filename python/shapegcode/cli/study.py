@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_plots_argument(
         parser, "write what decides, and the quantiles over it, as pictures (PNG and SVG) into this folder"
     )
-    add_result_arguments(parser)
+    add_result_arguments(parser, cites=False)  # each draw is a run of `convert`, which cites
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from shapegcode._core import ArgumentError
 from shapegcode.io.units import find_unit
@@ -178,6 +179,7 @@ class Comparison(Result):
         warnings: none.
     """
 
+    published: ClassVar[tuple[str, ...]] = ("comparison of programs",)
     original: str
     emitted: str
     machine: str

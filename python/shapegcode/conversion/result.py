@@ -127,6 +127,16 @@ class Conversion(PlayedFigures, Result):
     __hash__ = Result.__hash__
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods behind shaper, blocks, controller and proof."""
+        found = [f"shaper {self.shaper.family}"]
+        if self.played is not None:
+            found += self.played.methods
+            if self.regions and self.played.machine.emission.rounding == "vibration":
+                found.append("rounding of block ends")
+        return (*found, "comparison of programs") if self.proof is not None else tuple(found)
+
+    @property
     def text(self) -> bytes:
         """The emitted program, as a file holds it."""
         return self.emitted.text

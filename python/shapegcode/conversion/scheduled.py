@@ -73,6 +73,11 @@ class ScheduledConversion(Conversion):
     feed_schedule: FeedSchedule
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """Those of the conversion and of the feeds."""
+        return (*super().methods, *self.feed_schedule.methods)
+
+    @property
     def ok(self) -> bool:
         """Whether the shaped program keeps the machine's tolerances and the tool's limits."""
         return super().ok and self.feed_schedule.ok

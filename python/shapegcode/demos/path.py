@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import resources
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -123,6 +123,7 @@ class PathDemo(Result):
         conditions: both feeds at both reductions.
     """
 
+    published: ClassVar[tuple[str, ...]] = ("path of paper 000",)
     paper: str
     title: str
     rows: tuple[Statement, ...]

@@ -209,6 +209,11 @@ class FeedSchedule(Result):
     played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods of the force and of the controller."""
+        return ("cutting force", *(() if self.played is None else self.played.methods))
+
+    @property
     def misses(self) -> tuple[str, ...]:
         """Limits that are not kept, of regions and moves, in words."""
         groups = [*(region.misses for region in self.regions), *(move.misses for move in self.moves)]

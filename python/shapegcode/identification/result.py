@@ -162,6 +162,13 @@ class Identification(Result):
     fitted: tuple[FloatArray, ...] = field(default=(), metadata=hidden())
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods of the fit that was made."""
+        if self.sweep is not None:
+            return ("modes from a sweep",)
+        return ("modes from frequency responses" if self.responses else "modes from records",)
+
+    @property
     def taps(self) -> tuple[Record, ...]:
         """Taps or decays that were used."""
         return () if self.prepared is None else self.prepared.records

@@ -397,6 +397,12 @@ class Measurement(Result):
     played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods of the controller, the plant and the fit of arcs."""
+        has_arcs = any(section.arc is not None for program in self.programs for section in program.sections)
+        return (*(("circle fit",) if has_arcs else ()), *(() if self.played is None else self.played.methods))
+
+    @property
     def ok(self) -> bool:
         """The response of every program that is judged stays within the tolerance of the path."""
         return all(program.ok is not False for program in self.programs)

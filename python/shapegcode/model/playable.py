@@ -31,6 +31,18 @@ class PlayedPrograms:
     labels: tuple[str, str] = ("original", "emitted")
     plant: str = "modal"
 
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods of the controller and the plant that play them; see `Result.methods`."""
+        control, drives = self.machine.controller, [axis.drive for axis in self.machine.axes.as_tuple()]
+        used = {
+            "block overlap": control.motion == "after_interpolation",
+            "junction deviation": control.motion == "look_ahead" and control.corner_rule == "junction_deviation",
+            "LuGre friction": self.plant != "modal"
+            and any(drive is not None and drive.friction_model == "lugre" for drive in drives),
+        }
+        return tuple(name for name, is_used in used.items() if is_used)
+
     def scene(self, on_progress: Callable[[float], None] = lambda _done: None) -> Scene | None:
         """Simulate them."""
         from shapegcode.model.scene import scene_of

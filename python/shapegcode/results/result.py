@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from shapegcode.results.outcome import Outcome, Pair, Plot, Xyz
+from shapegcode.results.outcome import NotKeptError, Outcome, Pair, Plot, Xyz
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,6 +38,23 @@ class Playable(Protocol):
 
 class Result(Outcome):
     """Base of every result. A class that inherits it is a frozen dataclass and says what is abstract in `Outcome`."""
+
+    published: ClassVar[tuple[str, ...]] = ()
+    """Methods of others that every result of the class rests on."""
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods that it rests on, by their names in `shapegcode.results.citations.METHODS`."""
+        return self.published
+
+    @property
+    def citations(self) -> tuple[str, ...]:
+        """BibTeX entries of this program and of the papers behind its methods: what ``--cite`` prints."""
+        from shapegcode.results.citations import entries_of
+
+        if self.from_json:
+            raise NotKeptError("citations: the JSON of a result does not hold its methods; run the command with --cite")
+        return entries_of(self.methods)
 
     @property
     def played(self) -> Playable | None:

@@ -67,6 +67,11 @@ class Recommendation(Result):
     warnings: tuple[str, ...] = ()
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """Every family that has a design."""
+        return tuple(f"shaper {each.family}" for each in self.designs)
+
+    @property
     def design(self) -> Design:
         """The design to take."""
         return self.designs[self.recommended]

@@ -194,6 +194,11 @@ class Simulation(Result):
     played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods of the controller and the plant."""
+        return () if self.played is None else self.played.methods
+
+    @property
     def ok(self) -> bool:
         """Without `against` nothing is held against a tolerance; with it every cut keeps its limits."""
         return self.verdict is None or self.verdict.within_tolerance

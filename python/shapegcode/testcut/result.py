@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,7 @@ class CutDesign(Result):
         machine: whose controller runs the program.
     """
 
+    published: ClassVar[tuple[str, ...]] = ("cutting force",)
     cut: TestCut
     files: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -160,6 +161,7 @@ class TaperResult(Result):
         kind: of the test cut.
     """
 
+    published: ClassVar[tuple[str, ...]] = ("cutting force",)
     program: str
     machine: str
     cutting: CuttingLaw
@@ -297,6 +299,7 @@ class CornerResult(Result):
         kind: of the test cut.
     """
 
+    published: ClassVar[tuple[str, ...]] = ("cutting force",)
     program: str
     machine: str
     peaks: tuple[CornerPass, ...]
@@ -389,6 +392,7 @@ class IntervalResult(Result):
         kind: of the test cut.
     """
 
+    published: ClassVar[tuple[str, ...]] = ("cutting force",)
     program: str
     machine: str
     interval_mm: float | None

@@ -171,6 +171,11 @@ class CycleTime(TimeParts, Result):
     __hash__ = Result.__hash__
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods of the controller and the plant."""
+        return () if self.played is None else self.played.methods
+
+    @property
     def difference_percent(self) -> float | None:
         """Closed form over full interpolation, in % of the latter; None without one."""
         full = self.full_interpolation_s

@@ -1,0 +1,58 @@
+"""The papers behind the methods that a result names, as BibTeX: what ``--cite`` prints.
+
+The entries stand in ``data/references.bib``, in full sentences in docs/evidence/references.md.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Iterable, Mapping
+from importlib import resources
+
+__all__ = ["METHODS", "bibliography", "entries_of"]
+
+#: Keys of the entries behind each method; none: it is this project's own, or the user's.
+METHODS: Mapping[str, tuple[str, ...]] = {
+    "shaper zv": ("smith1958", "park2009"),
+    "shaper zvd": ("singer1990",),
+    "shaper zvdd": ("singer1990",),
+    "shaper mzv": ("klipper",),
+    "shaper ei": ("singhose1994vector",),
+    "shaper ei2": ("singhose1997",),
+    "shaper ei3": ("singhose1997",),
+    "shaper si": ("singhose1996",),
+    "shaper negative-zv": ("singhose1994negative",),
+    "shaper simultaneous": (),
+    "shaper minimal": ("park2009",),
+    "shaper polynomial": (),
+    "shaper non-negative": (),
+    "shaper robust": (),
+    "shaper mirrored": (),
+    "shaper taps": (),
+    **{f"shaper smooth-{name}": ("kalico",) for name in ("zv", "mzv", "ei", "ei2", "si", "zvd-ei")},
+    "rounding of block ends": ("jelinek1971",),
+    "comparison of programs": ("myers1986",),
+    "block overlap": ("lee2022",),
+    "junction deviation": ("jeon2011",),
+    "LuGre friction": ("canudas1995",),
+    "cutting force": ("kim2001",),
+    "modes from records": ("back2003", "steiglitz1965", "roy1989", "golub2003"),
+    "modes from frequency responses": ("ewins", "golub2003"),
+    "modes from a sweep": (),
+    "circle fit": ("chernov2010",),
+    "path of paper 000": ("ko2023",),
+}
+
+
+@functools.cache
+def bibliography() -> Mapping[str, str]:
+    """Every entry by its key, the program's own first."""
+    text = (resources.files("shapegcode") / "data" / "references.bib").read_text(encoding="utf-8")
+    return {re.split(r"[{,]", entry, maxsplit=2)[1]: entry for entry in text.strip().split("\n\n")}
+
+
+def entries_of(methods: Iterable[str]) -> tuple[str, ...]:
+    """The entry of the program and those behind some methods, each once, in the order of the file."""
+    keys = {"shapegcode", *(key for name in methods for key in METHODS[name])}
+    return tuple(entry for key, entry in bibliography().items() if key in keys)
