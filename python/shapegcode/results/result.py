@@ -15,7 +15,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from shapegcode.results.outcome import NotKeptError, Outcome, Pair, Plot, Xyz
+from shapegcode.results.outcome import Outcome, Pair, Plot, Xyz
+from shapegcode.results.values import NotKeptError
 
 if TYPE_CHECKING:
     import pandas as pd
