@@ -29,14 +29,14 @@ from shapegcode.program.pairing import paired_regions
 FloatArray = npt.NDArray[np.float64]
 _CHUNK_SAMPLES = 65_536
 _LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
-_LEAST_REST_S = 0.25
+_MIN_REST_S = 0.25
 _MILLIONTH = math.log(1e6)
-_MOST_PROFILE_STATIONS = 200_000  # kept of each program for pictures
-_LARGEST_TOOL_MM = 1000.0
-_LEAST_SPACING_MM = 1e-3
+_MAX_PROFILE_STATIONS = 200_000  # kept of each program for pictures
+_MAX_TOOL_MM = 1000.0
+_MIN_SPACING_MM = 1e-3
 _SHORT_MM = 0.5
-_MOST_SECTIONS = 20_000  # of a program: each is a row with its walls
-_LARGEST_FACTOR = 2.0**20
+_MAX_SECTIONS = 20_000  # of a program: each is a row with its walls
+_MAX_FACTOR = 2.0**20
 _LAST_LINE = 2**32 - 1
 _BLOCKS_PER_CURVE = 2.5  # a shaped program's own blocks are shorter than this many block periods at its feed
 
@@ -196,13 +196,13 @@ class _Settings:
         for name, value in (("tool diameter", self.tool_diameter_mm), ("station spacing", self.station_spacing_mm)):
             if not (math.isfinite(value) and value > 0.0):
                 raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
-        if self.tool_diameter_mm > _LARGEST_TOOL_MM:
+        if self.tool_diameter_mm > _MAX_TOOL_MM:
             raise _core.ArgumentError(
-                f"tool diameter is {self.tool_diameter_mm:g} mm, must be at most {_LARGEST_TOOL_MM:g} mm"
+                f"tool diameter is {self.tool_diameter_mm:g} mm, must be at most {_MAX_TOOL_MM:g} mm"
             )
-        if self.station_spacing_mm < _LEAST_SPACING_MM:
+        if self.station_spacing_mm < _MIN_SPACING_MM:
             raise _core.ArgumentError(
-                f"station spacing is {self.station_spacing_mm:g} mm, must be at least {_LEAST_SPACING_MM:g} mm"
+                f"station spacing is {self.station_spacing_mm:g} mm, must be at least {_MIN_SPACING_MM:g} mm"
             )
         for name, value in (("cut-off", self.cutoff_mm or 0.0), ("lambda s", self.lambda_s_mm)):
             if not (math.isfinite(value) and value >= 0.0):
@@ -257,18 +257,14 @@ def measure_samples(
 
 
 def _measured_regions(
-    jobs: Iterable[Job],
-    machine: Machine,
-    plant: str,
-    settings: _Settings,
-    on_done: Callable[[], None],
+    jobs: Iterable[Job], machine: Machine, plant: str, settings: _Settings, on_done: Callable[[], None]
 ) -> Iterator[MeasuredRegion]:
     """Every region of a program, played and measured."""
     kept = 0
     for number, job in enumerate(jobs, start=1):
         samples = _samples(job, machine, plant)
         lines = (job.nominal.first_line, job.nominal.last_line)
-        period_s, keep = machine.controller.interpolation_period_s, kept < _MOST_PROFILE_STATIONS
+        period_s, keep = machine.controller.interpolation_period_s, kept < _MAX_PROFILE_STATIONS
         region = _measured(samples, job.path, job.sections, settings, period_s, lines, number, keep_walls=keep)
         kept += sum(each.walls.distance_mm.size for each in region.sections if each.walls is not None)
         yield region
@@ -307,7 +303,7 @@ def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
 def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Command and response of a region, and what follows the stop until vibration and servo lag have decayed."""
     model = MachineModel(machine)
-    memory_s = max(model.vibration_memory_s, _LEAST_REST_S)
+    memory_s = max(model.vibration_memory_s, _MIN_REST_S)
     if plant != "modal":
         # The position loop takes the lag off as exp(-gain t): to a millionth, as the vibration.
         memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
@@ -357,9 +353,9 @@ def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequenc
 def _joined(pairs: Sequence[tuple[_core.Region, _core.Region]], machine: Machine, *, own_blocks: bool) -> float:
     """How many times longer than elsewhere runs must be to stand alone, so that a program has a number of sections
     that somebody may look at; a region has one at least."""
-    most = max(_MOST_SECTIONS, len(pairs))
+    most = max(_MAX_SECTIONS, len(pairs))
     factor = 1.0
-    while factor < _LARGEST_FACTOR:
+    while factor < _MAX_FACTOR:
         count = sum(
             len(_core.path_sections(region.path, factor * _short_mm(region.path, machine, own_blocks=own_blocks)))
             for _, region in pairs
