@@ -11,8 +11,11 @@ import numpy as np
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import open_file, read_file
 from shapegcode.io.frequency_response import FrequencyResponse
+from shapegcode.io.frf_files import is_frf_text, is_mat, read_frf_mat, read_frf_text
 from shapegcode.io.record import FloatArray, ReadOptions, Record
 from shapegcode.io.sampling import STATED_RATE_TOLERANCE
+from shapegcode.io.taps import is_klipper, klipper_options, read_csv
+from shapegcode.io.uff import is_frf_uff, read_frf_uff, read_uff
 
 _BYTES_TO_KNOW = 4096
 _WAV = (b"RIFF", b"RIFX", b"RF64")
@@ -30,11 +33,8 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
                 f"{path}: a WAV file does not say what its full scale is in volts: state N and m/s² at full scale "
                 "(--force-scale, --response-scale)"
             )
-
         return read_wav(path, options)
     if _is_uff(head):
-        from shapegcode.io.uff import read_uff
-
         return read_uff(path, options)
     for suffixes, kind in (({".uff", ".unv", ".uf", ".uf58"}, "UFF"), ({".wav", ".wave"}, "WAV")):
         if path.suffix.lower() in suffixes:
@@ -43,8 +43,6 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
                 f"{path}: not a {kind} file: it begins with {head[:16]!r} instead of {begins}; rename it if it is text "
                 "with columns"
             )
-    from shapegcode.io.taps import is_klipper, klipper_options, read_csv
-
     return read_csv(path, klipper_options(options) if is_klipper(head) else options)
 
 
@@ -53,13 +51,9 @@ def read_measurement(path: str | Path, options: ReadOptions | None = None) -> li
     path = Path(path)
     options = options or ReadOptions()
     head = _head(path)
-    from shapegcode.io.frf_files import is_frf_text, is_mat, read_frf_mat, read_frf_text
-
     if is_mat(path, head):
         return read_frf_mat(path, options)
     if _is_uff(head):
-        from shapegcode.io.uff import is_frf_uff, read_frf_uff
-
         return read_frf_uff(path, options) if is_frf_uff(path, options) else read_records(path, options)
     if head[:4] not in _WAV and path.suffix.lower() not in _NO_TEXT and is_frf_text(path, options):
         return read_frf_text(path, options)

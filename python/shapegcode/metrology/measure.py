@@ -91,8 +91,7 @@ def measure(
     several = [given_program(each, machine) for each in given]
     if not several:
         raise _core.ArgumentError("no program to measure")
-    settings = _Settings(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
-    settings.check()
+    options = _options(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
     shaped = [program.shaped_regions > 0 for program in several]
     if against is not None:
         against = given_program(against, machine)
@@ -114,7 +113,7 @@ def measure(
     for program, is_shaped, counts in zip(several, shaped, _judged(beside), strict=True):
         nominal = against or program
         jobs = jobs_of(program, nominal, machine, lines)
-        regions = list(_measured_regions(jobs, machine, plant, settings, one_done))
+        regions = list(_measured_regions(jobs, machine, plant, options, one_done))
         measured.append(
             MeasuredProgram.of(
                 regions,
@@ -181,43 +180,29 @@ def _section_warnings(jobs: Iterable[Job]) -> Iterator[str]:
         )
 
 
-@dataclass(frozen=True)
-class _Settings:
-    """With what programs are measured; see `measure`."""
-
-    tool_diameter_mm: float
-    band_um: float
-    station_spacing_mm: float
-    cutoff_mm: float | None
-    lambda_s_mm: float
-
-    def check(self) -> None:
-        """Refuse what nobody can measure with, before anything is played."""
-        for name, value in (("tool diameter", self.tool_diameter_mm), ("station spacing", self.station_spacing_mm)):
-            if not (math.isfinite(value) and value > 0.0):
-                raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
-        if self.tool_diameter_mm > _MAX_TOOL_MM:
-            raise _core.ArgumentError(
-                f"tool diameter is {self.tool_diameter_mm:g} mm, must be at most {_MAX_TOOL_MM:g} mm"
-            )
-        if self.station_spacing_mm < _MIN_SPACING_MM:
-            raise _core.ArgumentError(
-                f"station spacing is {self.station_spacing_mm:g} mm, must be at least {_MIN_SPACING_MM:g} mm"
-            )
-        for name, value in (("cut-off", self.cutoff_mm or 0.0), ("lambda s", self.lambda_s_mm)):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
-
-    def core(self, period_s: float) -> _core.MetrologyOptions:
-        """The same for the core."""
-        options = _core.MetrologyOptions()
-        options.period_s = period_s
-        options.tool_radius_mm = self.tool_diameter_mm / 2.0
-        options.station_spacing_mm = self.station_spacing_mm
-        options.band_mm = self.band_um * 1e-3
-        options.cutoff_mm = self.cutoff_mm or 0.0
-        options.lambda_s_mm = self.lambda_s_mm
-        return options
+def _options(
+    tool_diameter_mm: float, band_um: float, station_spacing_mm: float, cutoff_mm: float | None, lambda_s_mm: float
+) -> _core.MetrologyOptions:
+    """With what is measured; what nobody can measure with is refused before anything is simulated."""
+    for name, value in (("tool diameter", tool_diameter_mm), ("station spacing", station_spacing_mm)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
+    if tool_diameter_mm > _MAX_TOOL_MM:
+        raise _core.ArgumentError(f"tool diameter is {tool_diameter_mm:g} mm, must be at most {_MAX_TOOL_MM:g} mm")
+    if station_spacing_mm < _MIN_SPACING_MM:
+        raise _core.ArgumentError(
+            f"station spacing is {station_spacing_mm:g} mm, must be at least {_MIN_SPACING_MM:g} mm"
+        )
+    for name, value in (("cut-off", cutoff_mm or 0.0), ("lambda s", lambda_s_mm)):
+        if not (math.isfinite(value) and value >= 0.0):
+            raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
+    options = _core.MetrologyOptions()
+    options.tool_radius_mm = tool_diameter_mm / 2.0
+    options.station_spacing_mm = station_spacing_mm
+    options.band_mm = band_um * 1e-3
+    options.cutoff_mm = cutoff_mm or 0.0
+    options.lambda_s_mm = lambda_s_mm
+    return options
 
 
 def measure_samples(
@@ -251,13 +236,12 @@ def measure_samples(
     Raises:
         ArgumentError: a value outside its range, arrays of other shapes, or values that are not finite.
     """
-    settings = _Settings(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
-    settings.check()
-    return _measured(chunks, path, _core.path_sections(path), settings, period_s, lines)
+    options = _options(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
+    return _measured(chunks, path, _core.path_sections(path), options, period_s, lines)
 
 
 def _measured_regions(
-    jobs: Iterable[Job], machine: Machine, plant: str, settings: _Settings, on_done: Callable[[], None]
+    jobs: Iterable[Job], machine: Machine, plant: str, options: _core.MetrologyOptions, on_done: Callable[[], None]
 ) -> Iterator[MeasuredRegion]:
     """Every region of a program, played and measured."""
     kept = 0
@@ -265,7 +249,7 @@ def _measured_regions(
         samples = _samples(job, machine, plant)
         lines = (job.nominal.first_line, job.nominal.last_line)
         period_s, keep = machine.controller.interpolation_period_s, kept < _MAX_PROFILE_STATIONS
-        region = _measured(samples, job.path, job.sections, settings, period_s, lines, number, keep_walls=keep)
+        region = _measured(samples, job.path, job.sections, options, period_s, lines, number, keep_walls=keep)
         kept += sum(each.walls.distance_mm.size for each in region.sections if each.walls is not None)
         yield region
         on_done()
@@ -275,20 +259,21 @@ def _measured(
     chunks: Iterable[tuple[FloatArray, FloatArray]],
     path: _core.Path,
     sections: list[_core.PathSection],
-    settings: _Settings,
+    options: _core.MetrologyOptions,
     period_s: float,
     lines: tuple[int, int],
     region: int = 1,
     *,
     keep_walls: bool = True,
 ) -> MeasuredRegion:
-    metrology = _core.SectionMetrology(path, sections, settings.core(period_s))
+    options.period_s = period_s
+    metrology = _core.SectionMetrology(path, sections, options)
     for command, response in chunks:
         metrology.feed(command, response)
     walls = [_wall(metrology, index) if keep_walls else None for index in range(len(sections))]
     figures = metrology.finish()
     found = (
-        MeasuredSection.of(each, region, settings.tool_diameter_mm, wall)
+        MeasuredSection.of(each, region, 2.0 * options.tool_radius_mm, wall)
         for each, wall in zip(figures.sections, walls, strict=True)
     )
     return MeasuredRegion(lines, path, figures, tuple(found), metrology.station_spacing_mm)
