@@ -21,10 +21,10 @@ from prompt_toolkit.output import DummyOutput
 
 import shapegcode as sg
 from command import run
-from shapegcode.cli.setup import ask_all
 from shapegcode.machine.output import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.settings.describe import toml_schema
+from shapegcode.setup.ask import ask_all
 
 ANSWERS = """\
 name = "VMC-3"

@@ -232,7 +232,7 @@ def test_of_very_many_sections_short_runs_are_measured_together_and_it_is_said(m
     each = sg.measure(program, machine, 6.0)
     assert len(each.programs[0].regions[0].sections) == 60
     assert not any("measured together" in warning for warning in each.warnings)
-    monkeypatch.setattr(measure, "_MOST_SECTIONS", 20)
+    monkeypatch.setattr(measure, "_MAX_SECTIONS", 20)
     joined = sg.measure(program, machine, 6.0)
     assert len(joined.programs[0].regions[0].sections) <= 20
     assert any("measured together as curves" in warning for warning in joined.warnings)

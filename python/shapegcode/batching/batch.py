@@ -7,7 +7,7 @@ import functools
 import os
 import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 
@@ -87,7 +87,9 @@ def batch(
         planned = plan(sources, [str(each) for each in machines], str(output), command, options, html, base)
         # A scheduler that does not answer is found before anything is written; processes of this machine end before
         # the folder goes that they work in.
-        remote = None if cluster is None else stack.enter_context(cluster_executor(cluster, processes))
+        remote: tuple[Executor, int] | None = (
+            None if cluster is None else stack.enter_context(cluster_executor(cluster, processes))
+        )
         manifest = Manifest(Path(output), resume=resume, base=base.folder)
         stack.callback(manifest.close)
         if html is not None:
@@ -96,7 +98,12 @@ def batch(
         _sweep(scratch, folders)
         scratch.mkdir()
         stack.callback(shutil.rmtree, scratch, ignore_errors=True)
-        executor, slots = remote or stack.enter_context(_local_executor(processes, hosts))
+        if remote is None:
+            remote = ThreadPoolExecutor(max_workers=processes), processes
+            stack.callback(remote[0].shutdown)
+            stack.callback(hosts.end)
+            stack.callback(remote[0].shutdown, wait=False, cancel_futures=True)
+        executor, slots = remote
         prepare = functools.partial(
             pack, seconds=time_limit_s, memory_bytes=memory_limit_bytes, scratch="" if cluster else str(scratch)
         )
@@ -126,14 +133,3 @@ def _warnings(stopped: str, called: Sequence[str]) -> tuple[str, ...]:
         more = f" and {len(called) - _NAMED} more" if len(called) > _NAMED else ""
         found.append(f"subprograms (M99), done where they are called: {', '.join(called[:_NAMED])}{more}")
     return tuple(found)
-
-
-@contextlib.contextmanager
-def _local_executor(processes: int, hosts: Hosts) -> Iterator[tuple[Executor, int]]:
-    executor = ThreadPoolExecutor(max_workers=processes)
-    try:
-        yield executor, processes
-    finally:
-        executor.shutdown(wait=False, cancel_futures=True)
-        hosts.end()
-        executor.shutdown()

@@ -203,7 +203,6 @@ class Plan:
     shared: Mapping[str, bytes]  # content of the files that many of them read, by name
 
     def __len__(self) -> int:
-        """How many runs there are."""
         return len(self.sources) * len(self.lines)
 
     def job(self, rank: int) -> BatchJob:

@@ -58,12 +58,7 @@ class BatchJob:
     program: str  # what it is of, as it was given
     machine: str
     words: tuple[str, ...]  # of the command line
-    output: str  # its main file, as a name in its folder; the JSON is beside it
-
-    @property
-    def key(self) -> str:
-        """What it is called in the manifest: its main file."""
-        return self.output
+    output: str  # its main file, as a name in its folder: its key in the manifest; the JSON is beside it
 
     @property
     def report(self) -> str:

@@ -27,7 +27,7 @@ from shapegcode.batching.process import BatchJob, JobOutcome, Packed
 from shapegcode.batching.result import BatchRow, Ended, figures_of
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_bytes
-from shapegcode.results.json import plain
+from shapegcode.results.json import file_hash, plain
 from shapegcode.results.outcome import Pair
 from shapegcode.results.page.html import is_shared
 
@@ -100,11 +100,9 @@ class KeptRows(Sequence[BatchRow]):
         self._ranks = array("q", (rank for rank, at in enumerate(places) if at >= 0))
 
     def __len__(self) -> int:
-        """How many runs are done."""
         return len(self._ranks)
 
     def __iter__(self) -> Iterator[BatchRow]:
-        """One after the other."""
         return map(self._row, self._ranks)
 
     @overload
@@ -114,7 +112,6 @@ class KeptRows(Sequence[BatchRow]):
     def __getitem__(self, rank: slice) -> list[BatchRow]: ...
 
     def __getitem__(self, rank: int | slice) -> BatchRow | list[BatchRow]:
-        """One of them, or several."""
         ranks = self._ranks[rank]
         return self._row(ranks) if isinstance(ranks, int) else [self._row(each) for each in ranks]
 
@@ -133,10 +130,9 @@ class KeptRows(Sequence[BatchRow]):
 
 def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
     """The rows as CSV."""
-    names = ["residual_um", "contour_um", "cycle_time_s"]
     heads: list[str] = []
     for field in fields(BatchRow):
-        heads += [f"{field.name}.original", f"{field.name}.emitted"] if field.name in names else [field.name]
+        heads += [f"{field.name}.original", f"{field.name}.emitted"] if field.name in _PAIRS else [field.name]
     yield _csv_line(heads)
     for row in rows:
         flat = _flat(plain(row))
@@ -242,7 +238,7 @@ class Runs:
                 except OSError as error:
                     self._keep(rank, "", JobOutcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {}))
                     continue
-                if self._is_done(rank, job.key, packed.fingerprint):
+                if self._is_done(rank, job.output, packed.fingerprint):
                     continue
                 waiting[executor.submit(run, packed)] = (rank, packed.fingerprint)
                 if len(waiting) >= slots * _AHEAD:
@@ -265,9 +261,7 @@ class Runs:
         """Wait for one of them at least, and keep what came back."""
         while True:
             self._tell(min(slots, len(waiting)))
-            done, _ = concurrent.futures.wait(
-                waiting, _TOLD_EVERY_S, return_when=concurrent.futures.FIRST_COMPLETED
-            )  # fmt: skip
+            done, _ = concurrent.futures.wait(waiting, _TOLD_EVERY_S, return_when=concurrent.futures.FIRST_COMPLETED)
             if done:
                 break
         for future in done:
@@ -309,13 +303,11 @@ class Runs:
             except OSError as error:
                 if error.errno in _FULL:
                     raise
-                row, hashes = (
-                    row_of(job, JobOutcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {}))[0],
-                    {},
-                )
+                crashed = JobOutcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {})
+                row, hashes = row_of(job, crashed)[0], {}
                 self._remove(written)
                 self._write(job, {}, hashes)
-            line = {**plain(row), "key": job.key, "fingerprint": fingerprint, "files": hashes}
+            line = {**plain(row), "key": job.output, "fingerprint": fingerprint, "files": hashes}
             self._count(rank, self._manifest.add(line), row.ended)
 
     def _write(self, job: BatchJob, written: Mapping[str, bytes], hashes: Mapping[str, str]) -> None:
@@ -327,7 +319,7 @@ class Runs:
             if is_shared(name):
                 self._shared[name] = hashes[name]
         # What an earlier run wrote and this one did not: nobody may take it for a result of this one.
-        earlier = (self._manifest.earlier(job.key) or {}).get("files", {})
+        earlier = (self._manifest.earlier(job.output) or {}).get("files", {})
         self._remove(name for name in earlier if name not in written)
 
     def _remove(self, names: Iterable[str]) -> None:
@@ -355,7 +347,6 @@ class Runs:
 
 def _hash_of(name: str) -> str:
     try:
-        with open(name, "rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
+        return file_hash(name)[0]
     except OSError:
         return ""

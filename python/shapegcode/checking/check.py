@@ -12,16 +12,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from shapegcode._core import ProgramError
-from shapegcode.checking.result import (
-    Check,
-    Finding,
-    FindingCounts,
-    SerialLine,
-    ShortBlocks,
-    ShortRun,
-    StarvedRun,
-)
-from shapegcode.checking.runs import BlockTable, Breaker, CuttingRun, block_table, look_ahead_breakers
+from shapegcode.checking.result import Check, Finding, FindingCounts, SerialLine, ShortBlocks, ShortRun, StarvedRun
+from shapegcode.checking.runs import BlockTable, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
@@ -46,7 +38,7 @@ _NOT_AS_WRITTEN = re.compile(r"does not end with M30|^text behind the '%'|^G68 R
 _ROUNDING = 1e-9
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
 # Of one reading (most_alarms in the core's reader).
-_MOST_ALARMS = 200
+_MAX_ALARMS = 200
 _MEMORY_PER_LINE = 350  # bytes
 
 
@@ -130,7 +122,9 @@ def check_text(
             found.append(Finding("note", "arc_centre", 0, source, 0, 0, said))
         found += (_at(program, "warning", code, 1, message) for code, message in shaped_warnings(program, machine))
         table = block_table(program, machine)
-        found += _breaker_findings(program, look_ahead_breakers(program, machine, table))
+        for stop in look_ahead_breakers(program, machine, table):
+            severity = "warning" if stop.unasked else "note"
+            found.append(_at(program, severity, "look_ahead_breaker", stop.line, stop.message))
         found += _feed_findings(program, table)
         found += _low_feed_findings(program, machine)
         if not program.core.alarms:
@@ -226,9 +220,9 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
             yield _finding("warning", "work_limit", 0, file or program.source, line, column, said)
         else:
             yield _finding("alarm", "alarm", alarm, file or program.source, line, column, message)
-    if len(program.core.alarms) >= _MOST_ALARMS:
+    if len(program.core.alarms) >= _MAX_ALARMS:
         line, _, _, _, file = program.core.alarms[-1]
-        message = f"reading stopped here after {_MOST_ALARMS} alarms: what follows is not checked"
+        message = f"reading stopped here after {_MAX_ALARMS} alarms: what follows is not checked"
         yield Finding("note", "reader", 0, file or program.source, line, 0, message)
     for line, column, alarm, message, file in program.core.warnings:
         severity = "warning" if _NOT_AS_WRITTEN.search(message) else "note"
@@ -236,12 +230,6 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
 
 
 # ---- what an accepted program does -------------------------------------------------------------------------
-
-
-def _breaker_findings(program: Program, breakers: Iterable[Breaker]) -> Iterator[Finding]:
-    for breaker in breakers:
-        severity = "warning" if breaker.unasked else "note"
-        yield _at(program, severity, "look_ahead_breaker", breaker.line, breaker.message)
 
 
 def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:

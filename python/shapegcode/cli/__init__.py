@@ -113,9 +113,7 @@ def parser_of(selected: str | None) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, title="commands")
     for command in COMMANDS:
         sub = commands.add_parser(
-            command.name,
-            help=command.help,
-            description=f"{command.help[:1].upper()}{command.help[1:]}.",
+            command.name, help=command.help, description=f"{command.help[:1].upper()}{command.help[1:]}."
         )
         if command.name == selected:
             module = importlib.import_module(command.module)

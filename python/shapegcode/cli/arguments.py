@@ -1,4 +1,4 @@
-"""The parser of every command: its options in groups, the same everywhere, and examples below them."""
+"""The parser of every command: options in groups, examples below them, and what is typed for an option as a value."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any, NoReturn
 
-_LARGEST_OVERRIDE = 2.54
+_MAX_OVERRIDE = 2.54
 _SIZE_UNITS = {"": 1, "k": 1024, "M": 1024**2, "G": 1024**3}
 _LENGTH_UNITS = {"um": 1.0, "µm": 1.0, "mm": 1e3}
 _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -77,7 +77,7 @@ def share(text: str) -> float:
 
 def override(text: str) -> float:
     """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
-    most = _LARGEST_OVERRIDE
+    most = _MAX_OVERRIDE
     return value if 0.0 < (value := _share(text)) <= most else _refuse(text, f"above 0 and at most {most:.0%}")
 
 
@@ -191,26 +191,17 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "shapegcode optimize STUDY.toml",
         "shapegcode optimize STUDY.toml -m mine.toml --at-least 99% --html optimum.html --json optimum.json",
     ),
-    "setup": (
-        "shapegcode setup -o mine.toml",
-        "shapegcode setup --answers answers.toml -o mine.toml --force",
-    ),
+    "setup": ("shapegcode setup -o mine.toml", "shapegcode setup --answers answers.toml -o mine.toml --force"),
     "machine": (
         "shapegcode machine init vx500 -o mine.toml",
         "shapegcode machine import CNC-PARA.TXT --from vx500 -o mine.toml",
     ),
-    "machine init": (
-        "shapegcode machine init",
-        "shapegcode machine init vx500 -o mine.toml --full",
-    ),
+    "machine init": ("shapegcode machine init", "shapegcode machine init vx500 -o mine.toml --full"),
     "machine import": (
         "shapegcode machine import CNC-PARA.TXT -o mine.toml",
         "shapegcode machine import CNC-PARA.TXT TOOLOFST.TXT MACRO.TXT --from vx500 -o mine.toml",
     ),
-    "machine show": (
-        "shapegcode machine show vx500",
-        "shapegcode machine show mine.toml --for part.nc",
-    ),
+    "machine show": ("shapegcode machine show vx500", "shapegcode machine show mine.toml --for part.nc"),
     "machine diff": (
         "shapegcode machine diff vx500 mine.toml",
         "shapegcode machine diff old.toml mine.toml --json diff.json",
@@ -247,10 +238,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "shapegcode testcut fit pass1.csv pass2.csv pass3.csv --cut TAPER.json -o cutting.toml",
         "shapegcode testcut fit 2=pass2.csv --cut CORNER.json --plots plots",
     ),
-    "report": (
-        "shapegcode report result.json",
-        "shapegcode report result.json -o result.html --html-script beside",
-    ),
+    "report": ("shapegcode report result.json", "shapegcode report result.json -o result.html --html-script beside"),
     "completion": ("shapegcode completion bash", "shapegcode completion fish"),
     "demo": ("shapegcode demo path", "shapegcode demo path --json path.json --html path.html"),
 }
@@ -321,7 +309,6 @@ class CommandParser(argparse.ArgumentParser):
     """A parser that puts each option into its group."""
 
     def __init__(self, **kwargs: Any) -> None:
-        """Make it."""
         self._titled: dict[str, argparse._ArgumentGroup] = {}
         super().__init__(**({"formatter_class": _Formatter} | kwargs))
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import count, seconds, size
 from shapegcode.cli.options import add_amount_arguments, add_cluster_arguments, cluster_of
 
@@ -67,10 +69,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the batch."""
-    from dataclasses import replace
 
     from shapegcode.batching.batch import batch
-    from shapegcode.cli import ExitCode, runner
+    from shapegcode.cli import ExitCode
 
     options = list(getattr(args, "rest", ()))
     _check_options(args, options)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import one_of
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 
@@ -77,7 +78,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the tests or fit their results; see the module."""
-    from shapegcode.cli import runner
 
     _check_options(args)
     machine = load_machine(args)
@@ -105,7 +105,6 @@ def _check_options(args: argparse.Namespace) -> None:
 
 
 def _runs(args: argparse.Namespace, machine: Machine) -> int:
-    from shapegcode.cli import runner
     from shapegcode.timing.calibration.calibrate import learn_clock
     from shapegcode.timing.calibration.runs_file import load_runs
 
@@ -114,25 +113,23 @@ def _runs(args: argparse.Namespace, machine: Machine) -> int:
     runner.check_files(args, also_read=read)
     with runner.progress(f"learning from {args.runs}", args) as bar:
         found = learn_clock(file, machine, families=args.look_ahead, on_progress=bar.update)
-    output = (args.output, found.to_toml().encode()) if args.output is not None else None
-    return runner.finish(found, args, output=output, notes=[f"not told: {each}" for each in found.not_told])
+    return runner.finish(
+        found, args, output=_machine_file(args, found), notes=[f"not told: {each}" for each in found.not_told]
+    )
 
 
 def _servo(args: argparse.Namespace, machine: Machine) -> int:
-    from shapegcode.cli import runner
     from shapegcode.identification.servo.fit import fit_servo
 
     with runner.progress(f"fitting {args.servo}", args) as bar:
         found = fit_servo(
             args.servo, machine, axes=args.axes, units=args.units, drive=args.drive, on_progress=bar.update
         )
-    output = (args.output, found.to_toml().encode()) if args.output is not None else None
-    return runner.finish(found, args, output=output)
+    return runner.finish(found, args, output=_machine_file(args, found))
 
 
 def _write(args: argparse.Namespace, machine: Machine) -> int:
     from shapegcode.characterization.programs import write_characterization_tests
-    from shapegcode.cli import runner
     from shapegcode.errors import ArgumentError
 
     for option, value in (("-o", args.output), ("--units", args.units)):
@@ -144,11 +141,13 @@ def _write(args: argparse.Namespace, machine: Machine) -> int:
 
 def _fit(args: argparse.Namespace, machine: Machine) -> int:
     from shapegcode.characterization.characterize import characterize
-    from shapegcode.cli import runner
 
     with runner.progress(f"fitting {args.fit}", args) as bar:
         found = characterize(args.fit, machine, units=args.units, on_progress=bar.update)
     runner.check_files(args, also_read=found.files)
-    return runner.finish(
-        found, args, output=(args.output, found.to_toml().encode()) if args.output is not None else None
-    )
+    return runner.finish(found, args, output=_machine_file(args, found))
+
+
+def _machine_file(args: argparse.Namespace, found: Any) -> tuple[str, bytes] | None:
+    """The machine file of ``-o``, with what is known."""
+    return None if args.output is None else (args.output, found.to_toml().encode())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from shapegcode.cli import runner
 from shapegcode.cli.options import add_input_arguments, add_result_arguments, load_machine
 
 
@@ -22,7 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check one program."""
     from shapegcode.checking.check import check
-    from shapegcode.cli import runner
 
     machine = load_machine(args)
     runner.check_files(args)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from shapegcode.cli import runner
 from shapegcode.cli.options import add_machine_argument, add_result_arguments, load_machine
 
 
@@ -28,7 +29,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compare two programs."""
-    from shapegcode.cli import runner
     from shapegcode.comparison.compare import compare
 
     notes = [] if args.machine else ["read as the built-in machine vx500 reads programs: -m MACHINE names another one"]

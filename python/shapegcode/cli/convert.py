@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import ctypes
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import add_alias, line_ranges, positive, ratio, seconds, size
 from shapegcode.cli.feed import add_cutting_arguments
 from shapegcode.cli.options import (
@@ -21,9 +24,9 @@ from shapegcode.cli.options import (
     output_file,
     overridden,
 )
+from shapegcode.cli.runner import ProgressBar
 
 if TYPE_CHECKING:
-    from shapegcode.cli.runner import ProgressBar
     from shapegcode.conversion.result import Conversion
     from shapegcode.machine import Machine
     from shapegcode.program import Program
@@ -56,10 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_machine_argument(parser)
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write")
     parser.add_argument(
-        "--arc-feed",
-        metavar="RATIO",
-        type=ratio,
-        help="feed on arcs relative to the programmed feed, for example 60%%",
+        "--arc-feed", metavar="RATIO", type=ratio, help="feed on arcs relative to the programmed feed, for example 60%%"
     )
     add_override_arguments(parser, MACHINE_KEYS)
     parser.add_argument(
@@ -75,11 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="shape nothing but the cuts in these lines of IN, for example 12-80,95-240",
     )
     parser.add_argument(
-        "--leave",
-        metavar="A-B,...",
-        type=line_ranges,
-        default=(),
-        help="leave the cuts in these lines of IN unchanged",
+        "--leave", metavar="A-B,...", type=line_ranges, default=(), help="leave the cuts in these lines of IN unchanged"
     )
     parser.add_argument(
         "--tolerance-curve",
@@ -127,7 +123,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Convert one program; see the module."""
     from shapegcode._core import ArgumentError
-    from shapegcode.cli import runner
     from shapegcode.program.compensation import read_for_conversion
     from shapegcode.program.several import alone_with
 
@@ -191,8 +186,6 @@ def _give_memory_back() -> None:
     By itself it keeps them for later from the second time on; a path, a plan and a text of a million blocks then stand
     in memory one beside the other.
     """
-    import ctypes
-    import sys
 
     if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
         libc.mallopt(_MMAP_THRESHOLD, _LARGE_BYTES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from shapegcode.cli import runner
 from shapegcode.cli.options import add_plots_argument, add_result_arguments
 
 _PAGES = {
@@ -44,7 +45,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Repeat a paper's figures."""
-    from shapegcode.cli import runner
     from shapegcode.demos.path import path_demo
 
     runner.check_files(args)

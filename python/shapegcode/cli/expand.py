@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from shapegcode.cli import runner
 from shapegcode.cli.options import add_input_arguments, add_result_arguments, load_machine
 
 
@@ -27,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Expand one program; see the module."""
-    from shapegcode.cli import runner
     from shapegcode.program.expand import expand
 
     machine = load_machine(args)

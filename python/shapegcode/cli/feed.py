@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import micrometres, share
 from shapegcode.cli.options import (
     add_input_arguments,
@@ -80,7 +81,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Schedule the feeds of one program."""
-    from shapegcode.cli import runner
     from shapegcode.feed.schedule import schedule_feed
     from shapegcode.program.compensation import read_for_conversion
 

@@ -7,12 +7,13 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli import arguments, options
+from shapegcode.cli import arguments, options, runner
+from shapegcode.io.atomic import write_text
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-_MOST_MODES = 8  # as identify.MOST_MODES, which would have to be imported with all that is slow
+_MAX_MODES = 8  # as identify.MOST_MODES, which would have to be imported with all that is slow
 _HELP_TIME = "where the decay begins in the file, for example 250ms (default: found by itself)"
 # What the user says of a file, over what it says itself: option, field of ReadOptions, how it is read, help.
 _OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
@@ -70,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_machine_argument(parser, required=False)
     add("--modes", metavar="N", type=arguments.count, help="how many (default: chosen by evidence)")
     most = "largest number of modes that is tried (default: %(default)s)"
-    add("--most-modes", metavar="N", type=arguments.count, default=_MOST_MODES, help=most)
+    add("--most-modes", metavar="N", type=arguments.count, default=_MAX_MODES, help=most)
     within = "look for modes between these frequencies, Hz"
     add("--frequencies", metavar="LOW:HIGH", type=arguments.frequency_band, help=within)
     ignore = "take it as a free decay: do not use the force, even if there is one"
@@ -86,7 +87,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Identify modes, or say how to do the test."""
-    from shapegcode.cli import runner
     from shapegcode.errors import ArgumentError
 
     if args.tap_plan and args.files:
@@ -105,10 +105,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _identify(args: argparse.Namespace) -> int:
-    from shapegcode.cli import runner
     from shapegcode.identification.identify import identify
     from shapegcode.identification.update import check_updatable, update_machine
-    from shapegcode.io.atomic import write_text
     from shapegcode.io.record import ReadOptions
 
     if args.update is not None:

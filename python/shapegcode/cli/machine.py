@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.cli.options import add_modes_arguments, add_result_arguments, decided_modes
+from shapegcode.cli import runner
+from shapegcode.cli.options import add_modes_arguments, add_result_arguments, decided_modes, write_new
+from shapegcode.io.atomic import write_text
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -125,14 +129,13 @@ def _init(args: argparse.Namespace) -> int:
     if args.output == "-":
         sys.stdout.write(text)
         return 0
-    _write(args, text)
+    write_new(args, text)
     print(f"wrote {args.output}, the values of {args.name}: inherited or assumed, until you put in your own")
     print(f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
     return 0
 
 
 def _import(args: argparse.Namespace) -> int:
-    from shapegcode.cli import runner
     from shapegcode.machine import Machine
     from shapegcode.machine.fanuc_import import import_parameters
 
@@ -142,7 +145,7 @@ def _import(args: argparse.Namespace) -> int:
     keep, rigid = decided_modes(args, _modes_of(base), "no dump holds modes, and")
     found = import_parameters(dump, base, tables=tables, name=args.name, keep_modes=keep, rigid=rigid)
     if found.ok:
-        _write(args, found.to_toml())
+        write_new(args, found.to_toml())
     wrote = [args.output] if found.ok else []
     return runner.finish(found, args, tables=found.tables(everything=args.verbose), wrote=wrote)
 
@@ -172,9 +175,6 @@ def _sorted(files: list[str]) -> tuple[str, list[str]]:
 
 
 def _show(args: argparse.Namespace) -> int:
-    from dataclasses import replace
-
-    from shapegcode.cli import runner
     from shapegcode.machine.description_result import describe_machine
 
     runner.check_files(args)
@@ -189,10 +189,8 @@ def _show(args: argparse.Namespace) -> int:
 
 def _write_origins(name: str) -> None:
     """Write where the values of a machine file come from as a table into it; everything else stays."""
-    from pathlib import Path
 
     from shapegcode.identification.update import check_updatable
-    from shapegcode.io.atomic import write_text
     from shapegcode.machine import Machine
     from shapegcode.settings.remarks import with_origin_table
 
@@ -206,9 +204,7 @@ def _write_origins(name: str) -> None:
 
 def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescription:
     """With the values that nobody measured, by what they do to a program."""
-    from dataclasses import replace
 
-    from shapegcode.cli import runner
     from shapegcode.conversion.convert import convert
     from shapegcode.conversion.open_axes import open_axes
     from shapegcode.machine import Machine
@@ -243,7 +239,6 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
 
 
 def _diff(args: argparse.Namespace) -> int:
-    from shapegcode.cli import runner
     from shapegcode.machine.description_result import machine_difference
 
     runner.check_files(args)
@@ -267,23 +262,9 @@ def file_schema(kind: str) -> str:
 
 
 def _schema(args: argparse.Namespace) -> int:
-    from shapegcode.io.atomic import write_text
-
     if args.output == "-":
         sys.stdout.write(file_schema(args.kind))
     else:
         write_text(args.output, file_schema(args.kind))
         print(f"wrote {args.output}\nnext: put `#:schema {args.output}` into the first line of a {args.kind} file")
     return 0
-
-
-def _write(args: argparse.Namespace, text: str) -> None:
-    """Write the machine file of ``-o``."""
-    from shapegcode.errors import ArgumentError
-    from shapegcode.io.atomic import write_text
-
-    try:
-        write_text(args.output, text, overwrite=args.force)
-    except FileExistsError:
-        said = f"{args.output} exists; --force overwrites it, -o FILE writes another one"
-        raise ArgumentError(said) from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import add_alias, line_range, micrometres
 from shapegcode.cli.options import (
     add_machine_argument,
@@ -61,7 +62,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure programs."""
-    from shapegcode.cli import runner
     from shapegcode.metrology.measure import measure
     from shapegcode.program import Program
 

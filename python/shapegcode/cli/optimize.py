@@ -6,6 +6,7 @@ import argparse
 import shlex
 from dataclasses import replace
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import ratio
 from shapegcode.cli.options import add_plots_argument, add_result_arguments
 from shapegcode.cli.study import add_study_arguments, load
@@ -33,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Choose."""
-    from shapegcode.cli import runner
     from shapegcode.studies.optimize import optimize
 
     file, machine = load(args)

@@ -10,6 +10,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 from shapegcode.cli.arguments import axes, micrometres, number, one_of, program_choice, seconds
+from shapegcode.io.atomic import write_text
 
 if TYPE_CHECKING:
     from shapegcode.batching.process import Cluster
@@ -54,9 +55,7 @@ def add_result_arguments(parser: argparse.ArgumentParser, *, cites: bool = True)
     """Declare what every command with a result has; *cites*: with ``--cite``."""
     add_json_argument(parser)
     parser.add_argument(
-        "--html",
-        metavar="FILE",
-        help="write the result as a page: one file that any browser opens, without a network",
+        "--html", metavar="FILE", help="write the result as a page: one file that any browser opens, without a network"
     )
     add_script_argument(parser)
     if cites:
@@ -69,9 +68,7 @@ def add_result_arguments(parser: argparse.ArgumentParser, *, cites: bool = True)
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
     """Declare ``--json FILE``; the value is ``args.json``, None where it is not given."""
     parser.add_argument(
-        "--json",
-        metavar="FILE",
-        help="write the result as JSON to FILE; - for standard output and nothing else there",
+        "--json", metavar="FILE", help="write the result as JSON to FILE; - for standard output and nothing else there"
     )
 
 
@@ -167,6 +164,21 @@ def output_file(name: str) -> Path:
     return path
 
 
+def file_exists(name: str) -> Exception:
+    """The error of a file that nobody said to overwrite."""
+    from shapegcode.errors import ArgumentError
+
+    return ArgumentError(f"{name} exists; --force overwrites it, -o FILE writes another one")
+
+
+def write_new(args: argparse.Namespace, text: str) -> None:
+    """Write the file of ``-o``, which may stand there with ``--force`` alone."""
+    try:
+        write_text(args.output, text, overwrite=args.force)
+    except FileExistsError:
+        raise file_exists(args.output) from None
+
+
 def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
     """Refuse to write a file that is read, or written otherwise, in the same run."""
     from shapegcode._core import ArgumentError
@@ -187,7 +199,7 @@ _TYPED = {
     "s": ("TIME", seconds, "5ms"),
     "%": ("PERCENT", lambda text: number(text.removesuffix("%")), "10%"),
 }
-_MOST_CHOICES_SHOWN = 4
+_MAX_CHOICES_SHOWN = 4
 
 
 def add_override_arguments(parser: argparse.ArgumentParser, keys: Mapping[str, str]) -> None:
@@ -199,7 +211,7 @@ def add_override_arguments(parser: argparse.ArgumentParser, keys: Mapping[str, s
             said["action"] = argparse.BooleanOptionalAction
         elif get_origin(kind) is Literal:
             said["choices"] = get_args(kind)
-            if len(said["choices"]) > _MOST_CHOICES_SHOWN:
+            if len(said["choices"]) > _MAX_CHOICES_SHOWN:
                 said["metavar"] = key.rpartition(".")[2].upper()
                 meaning += f". One of {', '.join(said['choices'])}"
         elif unit in _TYPED:
@@ -246,10 +258,7 @@ def add_modes_arguments(parser: argparse.ArgumentParser, keep: str) -> None:
         help="keep the modes of these axes, for example XY, though they were not measured here: it is the same machine",
     )
     parser.add_argument(
-        "--rigid",
-        metavar="AXES",
-        type=axes,
-        help="these axes have no vibration mode that counts, for example Z",
+        "--rigid", metavar="AXES", type=axes, help="these axes have no vibration mode that counts, for example Z"
     )
 
 

@@ -9,12 +9,17 @@ import io
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
-    from shapegcode.model.playable import PlayedPrograms
-    from shapegcode.results.json import Made, MadeFile
+from shapegcode._core import ShapegcodeError
+from shapegcode.cli import COMMANDS, parser_of
+from shapegcode.cli.options import load_machine, overridden
+from shapegcode.cli.runner import MACHINES
+from shapegcode.machine import Machine
+from shapegcode.model.playable import PlayedPrograms
+from shapegcode.program import Program
+from shapegcode.program.compensation import read_for_conversion
+from shapegcode.results.json import Made, MadeFile, file_hash
 
 _WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement", "Simulation")
 
@@ -35,10 +40,6 @@ def changes(made: Made, folder: Path) -> tuple[dict[tuple[str, str], Path], list
 
 
 def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
-    from shapegcode.cli.runner import MACHINES
-    from shapegcode.machine import Machine
-    from shapegcode.results.json import MadeFile, file_hash
-
     if file.role in MACHINES and file.name in Machine.builtin_names() and not Path(file.name).exists():
         now = MadeFile.of(file.role, file.name, Machine.builtin_text(file.name).encode()).sha256
         changed = f"the built-in machine {file.name} is another one in this version: motion is not shown"
@@ -63,7 +64,6 @@ def played_again(
     made: Made, found: Mapping[tuple[str, str], Path], report: Mapping[str, Any]
 ) -> tuple[PlayedPrograms | None, str]:
     """Read the programs and the machine of a run again, with the options that it was run with."""
-    from shapegcode._core import ShapegcodeError
 
     if made.result not in _WITH_MOTION or not made.command or "program_address" in report:
         return None, ""
@@ -78,7 +78,6 @@ def played_again(
 
 def _typed(command: str) -> argparse.Namespace | None:
     """The options of a command as it was typed; None where it cannot be read."""
-    from shapegcode.cli import COMMANDS, parser_of
 
     try:
         words = shlex.split(command)[1:]
@@ -99,10 +98,6 @@ def _typed(command: str) -> argparse.Namespace | None:
 def _read_again(
     made: Made, found: Mapping[tuple[str, str], Path], args: argparse.Namespace, plant: str
 ) -> PlayedPrograms | None:
-    from shapegcode.model.playable import PlayedPrograms
-    from shapegcode.program import Program
-    from shapegcode.program.compensation import read_for_conversion
-
     inputs = [place for (role, _), place in found.items() if role in ("input", "inputs")]
     if not inputs:
         return None
@@ -122,8 +117,6 @@ def _read_again(
 
 
 def _machine(args: argparse.Namespace, found: Mapping[tuple[str, str], Path]) -> Machine:
-    from shapegcode.cli.options import load_machine, overridden
-
     place = found.get(("machine", str(args.machine)))
     args.machine = str(place) if place is not None else args.machine
     module = importlib.import_module(f"shapegcode.cli.{args.command}")

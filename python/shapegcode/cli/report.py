@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from shapegcode.cli import runner
+from shapegcode.cli.options import add_amount_arguments, add_json_argument, add_script_argument, refuse_same_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -14,7 +18,6 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    from shapegcode.cli.options import add_amount_arguments, add_json_argument, add_script_argument
 
     parser.description = (
         "Makes the page that --html writes later, from the JSON: figures from the JSON, and where the programs and the "
@@ -33,8 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Make the pages."""
     from shapegcode._core import ArgumentError
-    from shapegcode.cli import runner
-    from shapegcode.cli.options import refuse_same_file
     from shapegcode.results.page.html import save
     from shapegcode.results.report_result import ReportPage, Reports
     from shapegcode.results.revive import written_reports
@@ -66,14 +67,13 @@ def _target(source: Path, report: Mapping[str, Any]) -> Path:
 
 def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[float], None]) -> tuple[Page, str]:
     """The page of a result, and the result's class; empty: this version cannot read it."""
-    from dataclasses import replace
 
     from shapegcode._core import ArgumentError
     from shapegcode.cli.replay import changes, played_again
     from shapegcode.results.json import this_version
+    from shapegcode.results.outcome import NotKeptError
     from shapegcode.results.page.default import raw_page
     from shapegcode.results.revive import made_of, revived
-    from shapegcode.results.values import NotKeptError
 
     try:
         made = made_of(report)

@@ -1,13 +1,4 @@
-"""What every command does around its one call: files, progress, answer, tables, pictures, next step, exit code.
-
-def run(args):
-    from shapegcode.timing import cycle_time
-    machine = load_machine(args)
-    runner.check_files(args)
-    with runner.progress(f"timing {args.input}", args) as bar:
-        result = cycle_time(args.input, machine, ...)
-    return runner.finish(result, args)
-"""
+"""What every command does around its one call: files, progress, answer, tables, pictures, next step, exit code."""
 
 from __future__ import annotations
 
@@ -22,6 +13,7 @@ import sys
 import textwrap
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
@@ -78,7 +70,6 @@ class ProgressBar:
     """A bar on standard error; until it is opened nothing is shown."""
 
     def __init__(self, description: str) -> None:
-        """Say what is being done."""
         self._description = description
         self.bar: Progress | None = None
 
@@ -159,20 +150,16 @@ def progress(description: str, args: argparse.Namespace) -> Iterator[ProgressBar
             bar.bar.stop()
 
 
-def write_program(target: str | Path, content: bytes | memoryview) -> None:
-    """Write a program; "-" is standard output."""
-    if str(target) == "-":
-        sys.stdout.buffer.write(content)
-    else:
-        write_bytes(target, content)
-
-
-def _write(report: dict[str, Any], json: str | None, output: tuple[str | Path, bytes | memoryview] | None) -> None:
+def write_results(report: object, json: str | None, output: tuple[str | Path, bytes | memoryview] | None) -> None:
+    """Write the JSON and the program of a command."""
     if json not in (None, "-"):
         write_json(report, str(json))
     if output is not None:
         # Last of all, so that no program stands there when something else could not be written.
-        write_program(*output)
+        if str(output[0]) == "-":
+            sys.stdout.buffer.write(output[1])
+        else:
+            write_bytes(*output)
     if json == "-":
         write_json(report, json)
 
@@ -188,7 +175,6 @@ def _write_page(
     html = getattr(args, "html", None)
     if html is None and getattr(args, "json", None) is None:
         return []  # nobody looks at the hashes
-    from dataclasses import replace
 
     from shapegcode.results.json import plain
 
@@ -229,7 +215,7 @@ def finish(
     if several is not None:
         several.add(report, output)
     else:
-        _write(report, getattr(args, "json", None), output)
+        write_results(report, getattr(args, "json", None), output)
     pictured = [f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: there are none of this result"]
     _say(
         result,

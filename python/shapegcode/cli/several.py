@@ -12,22 +12,22 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
-    from shapegcode.program.several import ProgramPlace
+from shapegcode._core import ArgumentError, ProgramError
+from shapegcode.cli.options import load_machine
+from shapegcode.cli.runner import check_files, output_console, standard_output, write_results
+from shapegcode.machine import Machine
+from shapegcode.program import Program
+from shapegcode.program.reading import program_bytes
+from shapegcode.program.several import ProgramPlace, is_subprogram, programs_of
+from shapegcode.program.stamp import STAMP_BEGIN
 
 _TABLES = ("csv", "npz", "html")
 
 
 def run_all(args: argparse.Namespace) -> int:
     """Run a command for every program of its file that no other one calls."""
-    from shapegcode._core import ArgumentError, ProgramError
-    from shapegcode.cli.options import load_machine
-    from shapegcode.cli.runner import check_files
-    from shapegcode.program.reading import program_bytes
-    from shapegcode.program.several import programs_of
 
     for name in _TABLES:
         if getattr(args, name, None) == "-":
@@ -53,8 +53,6 @@ def run_all(args: argparse.Namespace) -> int:
 
 def _called(several: Gathered, machine: Machine) -> set[int]:
     """Places of programs that another one of the file calls: they are done there."""
-    from shapegcode._core import ProgramError
-    from shapegcode.program import Program
 
     called: set[int] = set()
     folder = Path(several.source).parent
@@ -72,8 +70,6 @@ def _called(several: Gathered, machine: Machine) -> set[int]:
 
 def _left_over(several: Gathered) -> set[int]:
     """Places of subprograms beside shaped programs, whose text has taken in what they called."""
-    from shapegcode.program.several import is_subprogram
-    from shapegcode.program.stamp import STAMP_BEGIN
 
     if STAMP_BEGIN not in several.text:
         return set()
@@ -82,9 +78,6 @@ def _left_over(several: Gathered) -> set[int]:
 
 
 def _run_one(args: argparse.Namespace, several: Gathered) -> int:
-    from shapegcode._core import ProgramError
-    from shapegcode.cli.runner import output_console, standard_output
-
     one = argparse.Namespace(**vars(args))
     one.program, one.several = f"#{several.at + 1}", several
     label = several.address.strip("/<>#").replace("/", "-").replace("<", "").replace(">", "")
@@ -107,7 +100,6 @@ def _run_one(args: argparse.Namespace, several: Gathered) -> int:
 
 def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left: set[int]) -> None:
     """Write the one JSON and the one program, and say it."""
-    from shapegcode.cli.runner import output_console, standard_output, write_json, write_program
 
     target = getattr(args, "json", None)
     outputs = {str(output) for output, _ in several.written.values()}
@@ -117,12 +109,7 @@ def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left:
     for report in several.reports:
         if output is not None and "output" in report:
             report["output"] = output
-    if target not in (None, "-"):
-        write_json(several.reports, target)
-    if output is not None:
-        write_program(output, several.joined())
-    if target == "-":
-        write_json(several.reports, target)
+    write_results(several.reports, target, None if output is None else (output, several.joined()))
     console = output_console(standard_output(args))
     if called:
         console.print(f"called by others and done there: {several.names(called)}", markup=False, soft_wrap=True)

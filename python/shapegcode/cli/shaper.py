@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import add_alias, positive, ratio, seconds, share
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 
@@ -85,13 +86,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare shapers."""
     from shapegcode._core import ArgumentError
-    from shapegcode.cli import runner
-    from shapegcode.cli.runner import output_console
     from shapegcode.shaping.comparison import choose_shaper
     from shapegcode.shaping.result import families_table
 
     if args.list_families:
-        output_console(args.json).print(families_table())
+        runner.output_console(args.json).print(families_table())
         return 0
     if bool(args.mode) == (args.machine is not None):
         raise ArgumentError("the modes come from --mode 46:0.02 ... or from -m MACHINE: give one of both")

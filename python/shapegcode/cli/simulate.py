@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import count, line_range
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
 
@@ -39,9 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "loops of [axes.x.drive] (default: %(default)s)",
     )
     parser.add_argument(
-        "--csv",
-        metavar="FILE",
-        help="write the motion in time, one line per period; - for standard output",
+        "--csv", metavar="FILE", help="write the motion in time, one line per period; - for standard output"
     )
     parser.add_argument("--npz", metavar="FILE", help="write the same columns as a NumPy archive")
     parser.add_argument(
@@ -64,9 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Play one program."""
-    from dataclasses import replace
 
-    from shapegcode.cli import runner
     from shapegcode.model.shaped_program import shaped_note
     from shapegcode.program import Program
     from shapegcode.simulation.simulate import play_motion, simulate

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import count
 from shapegcode.cli.options import (
     add_cluster_arguments,
@@ -14,6 +15,7 @@ from shapegcode.cli.options import (
     cluster_of,
     load_machine,
 )
+from shapegcode.io.atomic import write_lines
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -29,7 +31,6 @@ def add_study_arguments(parser: argparse.ArgumentParser, what: str, draws: str) 
 
 def load(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
     """The file and the machine; the program and the machine then stand among what the command reads."""
-    from shapegcode.cli import runner
     from shapegcode.errors import ArgumentError
     from shapegcode.studies.study_file import load_study
 
@@ -61,8 +62,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the study."""
-    from shapegcode.cli import runner
-    from shapegcode.io.atomic import write_lines
     from shapegcode.studies.study import study
 
     file, machine = load(args)

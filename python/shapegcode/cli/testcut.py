@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import positive, program_number
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
-
-if TYPE_CHECKING:
-    from shapegcode.testcut.design import CornerShape, CutConditions
-    from shapegcode.testcut.result import CutDesign
 
 
 def _list(text: str) -> tuple[float, ...]:
@@ -62,25 +60,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "not as it should be; 2: bad input."
     )
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
-    for name, act, options, meaning, description in (
+    for name, options, meaning, description in (
         (
-            "taper", _taper, _TAPER, "growing radial depth: for the coefficients of the cutting force (figure 4)",
+            "taper", _TAPER, "growing radial depth: for the coefficients of the cutting force (figure 4)",
             "Mills a tapered edge, then passes along it with one feed each: for k1 and k2.",
         ),
         (
-            "corner", _corner, (*_SHAPE, *_CORNER),
+            "corner", (*_SHAPE, *_CORNER),
             "a corner unrolled on a straight line: constant feed, then modified (figure 7)",
             "Mills an edge on which a straight pass meets the radial depth of a corner, and passes it with constant "
             "feed, then with the feed of equation 7.",
         ),
         (
-            "interval", _interval, (*_SHAPE, *_INTERVAL),
+            "interval", (*_SHAPE, *_INTERVAL),
             "feeds that change every 0.2, 0.4 and 0.6 mm: which the controller follows (figure 8)",
             "Passes of constant radial depth whose feed changes as in a corner, each at another interval.",
         ),
     ):  # fmt: skip
         cut = actions.add_parser(name, help=meaning, description=description)
-        cut.set_defaults(act=act)
         add_machine_argument(cut)
         for names, metavar, kind, said, default in (*_CUT, *options):
             needed: dict[str, Any] = {"required": True} if default is _NEEDED else {"default": default}
@@ -98,7 +95,6 @@ def _add_fit(actions: Any) -> None:
         "coefficients with 95 % intervals, of a corner measured against expected resultant, of an interval test the "
         "shortest interval that the controller follows.",
     )
-    fit.set_defaults(act=_fit)
     fit.add_argument(
         "files", metavar="CSV", nargs="+",
         help="record of a pass with a header, time_s or position_mm, fx_n, fy_n; 2=FILE names the pass",
@@ -121,54 +117,30 @@ def _add_fit(actions: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write a test cut, or fit; see the module."""
-    return int(args.act(args))
+    return _fit(args) if args.action == "fit" else _write(args)
 
 
-def _taper(args: argparse.Namespace) -> int:
-    from shapegcode.testcut.design import taper_cut
-
-    feeds = args.feeds if len(args.feeds) > 1 else None
-    return _written(args, taper_cut(_conditions(args, args.feeds[0]), feeds, args.radial_depth, args.length))
-
-
-def _corner(args: argparse.Namespace) -> int:
-    from shapegcode.testcut.design import corner_cut
-
-    return _written(args, corner_cut(_conditions(args, args.feed), _shape(args), args.interval))
-
-
-def _interval(args: argparse.Namespace) -> int:
-    from shapegcode.testcut.design import interval_cut
-
-    return _written(args, interval_cut(_conditions(args, args.feed), _shape(args), args.intervals, args.feeds))
-
-
-def _conditions(args: argparse.Namespace, feed: float) -> CutConditions:
+def _write(args: argparse.Namespace) -> int:
     from shapegcode.cutting.tool import Tool
-    from shapegcode.testcut.design import CutConditions
-
-    return CutConditions(load_machine(args), Tool.load(args.tool), feed, args.axial_depth, args.spindle, args.up)
-
-
-def _shape(args: argparse.Namespace) -> CornerShape:
-    from shapegcode.testcut.design import CornerShape
-
-    return CornerShape(args.allowance, args.rough_radius, args.finish_radius)
-
-
-def _written(args: argparse.Namespace, design: CutDesign) -> int:
-    from pathlib import Path
-
-    from shapegcode.cli import runner
+    from shapegcode.testcut.design import CornerShape, CutConditions, corner_cut, interval_cut, taper_cut
     from shapegcode.testcut.program import write_test_cut
 
+    feed = args.feeds[0] if args.action == "taper" else args.feed
+    conditions = CutConditions(load_machine(args), Tool.load(args.tool), feed, args.axial_depth, args.spindle, args.up)
+    if args.action == "taper":
+        design = taper_cut(conditions, args.feeds if len(args.feeds) > 1 else None, args.radial_depth, args.length)
+    else:
+        shape = CornerShape(args.allowance, args.rough_radius, args.finish_radius)
+        if args.action == "corner":
+            design = corner_cut(conditions, shape, args.interval)
+        else:
+            design = interval_cut(conditions, shape, args.intervals, args.feeds)
     runner.check_files(args, also_written=[Path(args.output).with_suffix(".json")])
     design = write_test_cut(design, args.output, args.program)
     return runner.finish(design, args, wrote=design.files)
 
 
 def _fit(args: argparse.Namespace) -> int:
-    from shapegcode.cli import runner
     from shapegcode.errors import ArgumentError
     from shapegcode.testcut.cut import read_test_cut
     from shapegcode.testcut.fit import fit_test_cut

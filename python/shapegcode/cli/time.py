@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 
+from shapegcode.cli import runner
 from shapegcode.cli.arguments import override, ratio
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
+from shapegcode.io.atomic import write_lines
 
 # A table of more blocks is built only where it is written.
-_MOST_BLOCKS_SHOWN = 100_000
+_MAX_BLOCKS_SHOWN = 100_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,8 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Time one program."""
-    from shapegcode.cli import runner
-    from shapegcode.io.atomic import write_lines
     from shapegcode.model.shaped_program import shaped_note
     from shapegcode.program import Program
     from shapegcode.timing.cycle_time import cycle_time
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         time = cycle_time(
             program,
             machine,
-            per_block=wanted or program.core.block_count <= _MOST_BLOCKS_SHOWN,
+            per_block=wanted or program.core.block_count <= _MAX_BLOCKS_SHOWN,
             full=not args.no_full,
             feed_override=args.override,
             rapid_override=args.rapid_override,

@@ -36,7 +36,7 @@ _ROUNDS = 3
 _TURN_RAD = 0.1
 # Height of the layers on ramps and helices.
 _RAMP_STEP_RATIO = 0.1  # of the tool's diameter
-_MOST_LAYERS = 200  # sweeping one costs time in every layer above the tip
+_MAX_LAYERS = 200  # sweeping one costs time in every layer above the tip
 
 
 @dataclass(frozen=True)
@@ -431,8 +431,8 @@ def build_material(
 def _fewer(borders_mm: Sequence[float]) -> list[float]:
     """At most so many heights: those that lie closest together become one, as in a surface that is milled in 3-D."""
     borders = list(borders_mm)
-    least_mm = (borders[-1] - borders[0]) / (4.0 * _MOST_LAYERS)
-    while len(borders) > _MOST_LAYERS + 1:
+    least_mm = (borders[-1] - borders[0]) / (4.0 * _MAX_LAYERS)
+    while len(borders) > _MAX_LAYERS + 1:
         kept = borders[:1]
         for border in borders[1:-1]:
             if border - kept[-1] >= least_mm:

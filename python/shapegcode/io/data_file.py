@@ -99,7 +99,6 @@ class DataFile:
     """One file that is read, plain or packed, and how much of its limits is used up."""
 
     def __init__(self, path: str | Path, fault: Fault = RecordError) -> None:
-        """Open it."""
         self.path, self._fault = Path(path), fault
         self._file = open_file(path)
         self.size = os.fstat(self._file.fileno()).st_size  # on the disk, bytes
@@ -109,11 +108,9 @@ class DataFile:
         self._unpacked = self._memory = 0
 
     def __enter__(self) -> Self:
-        """It is open already."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close it."""
         self._file.close()
 
     def pieces(self) -> Iterator[bytes]:

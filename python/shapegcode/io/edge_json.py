@@ -25,8 +25,8 @@ from shapegcode.io.edge_capture import EdgeAxis, EdgeBlock, EdgeCall, EdgeCaptur
 from shapegcode.io.run_tracks import RunLog, Signal
 
 FloatArray = npt.NDArray[np.float64]
-_FEWEST = 2
-_LARGEST = 1e12
+_MIN_ROWS = 2
+_MAX_VALUE = 1e12
 _NUMBERS = {int, float, type(None)}
 
 
@@ -52,7 +52,7 @@ def read_rows(source: str, addresses: tuple[str, ...], files: Iterable[tuple[str
             if len(piece):
                 pieces.append(piece)
                 places.append(where)
-    if sum(map(len, pieces)) < _FEWEST:
+    if sum(map(len, pieces)) < _MIN_ROWS:
         raise RecordError(f"{source}: the Payload holds {sum(map(len, pieces))} rows of HFData: at least 2 are needed")
     values = np.concatenate(pieces)
     starts = np.cumsum([0, *(len(piece) for piece in pieces)])
@@ -91,11 +91,11 @@ def _numbers(where: str, rows: Any, addresses: tuple[str, ...]) -> FloatArray:
         values: FloatArray = np.array(rows, dtype=np.float64).reshape(len(rows), len(addresses))
     except OverflowError as error:
         raise RecordError(f"{where}: a number is too large: {error}") from error
-    wild = np.argwhere(np.abs(values) > _LARGEST)
+    wild = np.argwhere(np.abs(values) > _MAX_VALUE)
     if len(wild):
         at, place = wild[0]
         raise RecordError(
-            f"{where}[{at}]: {addresses[place]} = {values[at, place]:g}: must be finite and at most {_LARGEST:g}"
+            f"{where}[{at}]: {addresses[place]} = {values[at, place]:g}: must be finite and at most {_MAX_VALUE:g}"
         )
     return values
 
@@ -262,7 +262,7 @@ def _clock_notes(stamps: Sequence[tuple[int, str]], cycle_s: float) -> list[str]
 
 
 _VERSIONS = ((0, 6), (1, 1))
-_MOST_GAPS = 10
+_MAX_GAPS = 10
 _CYCLE_MS = (0.05, 50.0)
 
 
@@ -439,9 +439,9 @@ def _capture(path: Path, parts: list[_Part], rows: Rows) -> EdgeCapture:
     notes += [
         f"{gap.missing} cycles ({gap.missing * first.cycle_s:.3f} s) are missing at {gap.start_s:.3f} s, behind "
         f"counter {gap.counter}"
-        for gap in gaps[:_MOST_GAPS]
+        for gap in gaps[:_MAX_GAPS]
     ]
-    if len(gaps) > _MOST_GAPS:
+    if len(gaps) > _MAX_GAPS:
         notes.append(f"{sum(gap.missing for gap in gaps)} cycles are missing in {len(gaps)} places altogether")
     events = Events(int(rows.counter[0]), first.cycle_s)
     for part in parts:

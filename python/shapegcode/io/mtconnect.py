@@ -1,6 +1,7 @@
-"""Reads MTConnectStreams documents, one or many in a file: what an agent answers to `sample` and `current`.
+"""Reads what MTConnect agents answer to `sample` and `current` (MTConnectStreams), and what adapters send (SHDR).
 
-Source of the format: MTConnect Institute, MTConnect Standard, Part 1 and Part 3 (streams), versions 1.0 to 2.x.
+Sources of the formats: MTConnect Institute, MTConnect Standard, Part 1 and Part 3 (streams), versions 1.0 to 2.x;
+C++ Agent, "Adapter Agent Protocol Version 2.0": ``time|item|value``, also several ``|item|value`` in a line.
 """
 
 from __future__ import annotations

@@ -1,13 +1,21 @@
-"""Reads the record of a tap test or of a decay, whatever file it is in."""
+"""Reads the record of a tap test or of a decay, whatever file it is in; WAV files are read here."""
 
 from __future__ import annotations
 
+import io
+import warnings
 from pathlib import Path
 
+import numpy as np
+
 from shapegcode.errors import RecordError
-from shapegcode.io.data_file import open_file
+from shapegcode.io.data_file import open_file, read_file
 from shapegcode.io.frequency_response import FrequencyResponse
-from shapegcode.io.record import ReadOptions, Record
+from shapegcode.io.frf_files import is_frf_text, is_mat, read_frf_mat, read_frf_text
+from shapegcode.io.record import FloatArray, ReadOptions, Record
+from shapegcode.io.sampling import STATED_RATE_TOLERANCE
+from shapegcode.io.taps import is_klipper, klipper_options, read_csv
+from shapegcode.io.uff import is_frf_uff, read_frf_uff, read_uff
 
 _BYTES_TO_KNOW = 4096
 _WAV = (b"RIFF", b"RIFX", b"RF64")
@@ -20,18 +28,13 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
     options = options or ReadOptions()
     head = _head(path)
     if head[:4] in _WAV:
-        from shapegcode.io.wav import read_wav
-
         if options.force_sensitivity or options.response_sensitivity:
             raise RecordError(
                 f"{path}: a WAV file does not say what its full scale is in volts: state N and m/s² at full scale "
                 "(--force-scale, --response-scale)"
             )
-
         return read_wav(path, options)
     if _is_uff(head):
-        from shapegcode.io.uff import read_uff
-
         return read_uff(path, options)
     for suffixes, kind in (({".uff", ".unv", ".uf", ".uf58"}, "UFF"), ({".wav", ".wave"}, "WAV")):
         if path.suffix.lower() in suffixes:
@@ -40,8 +43,6 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
                 f"{path}: not a {kind} file: it begins with {head[:16]!r} instead of {begins}; rename it if it is text "
                 "with columns"
             )
-    from shapegcode.io.taps import is_klipper, klipper_options, read_csv
-
     return read_csv(path, klipper_options(options) if is_klipper(head) else options)
 
 
@@ -50,19 +51,12 @@ def read_measurement(path: str | Path, options: ReadOptions | None = None) -> li
     path = Path(path)
     options = options or ReadOptions()
     head = _head(path)
-    from shapegcode.io.frf_mat import is_mat, read_frf_mat
-
     if is_mat(path, head):
         return read_frf_mat(path, options)
     if _is_uff(head):
-        from shapegcode.io.frf_uff import is_frf_uff, read_frf_uff
-
         return read_frf_uff(path, options) if is_frf_uff(path, options) else read_records(path, options)
-    if head[:4] not in _WAV and path.suffix.lower() not in _NO_TEXT:
-        from shapegcode.io.frf_text import is_frf_text, read_frf_text
-
-        if is_frf_text(path, options):
-            return read_frf_text(path, options)
+    if head[:4] not in _WAV and path.suffix.lower() not in _NO_TEXT and is_frf_text(path, options):
+        return read_frf_text(path, options)
     return read_records(path, options)
 
 
@@ -78,3 +72,102 @@ def _head(path: Path) -> bytes:
 def _is_uff(head: bytes) -> bool:
     plain = head.lstrip(b"\r\n")
     return plain[:6] == b"    -1" and plain[6:7] in {b"\r", b"\n", b" "}
+
+
+def _channels(path: Path) -> tuple[int, FloatArray, bool]:
+    """(samples per second, (n, channels), whether the values are shares of full scale)."""
+    from scipy.io import wavfile
+
+    try:
+        with warnings.catch_warnings():
+            # Chunks with titles and the like, which measuring programs add, are of no interest.
+            warnings.simplefilter("ignore", wavfile.WavFileWarning)
+            # From memory: of a file SciPy takes the memory for as many samples as its header states.
+            rate, data = wavfile.read(io.BytesIO(read_file(path)))
+    except OSError:
+        raise
+    except Exception as error:  # SciPy raises what its parts do
+        raise RecordError(
+            f"{path}: the WAV file cannot be read ({error}); needed is PCM of 16, 24 or 32 bits, or float of 32 or 64"
+        ) from error
+    if data.ndim == 1:
+        data = data[:, np.newaxis]
+    if data.dtype.kind == "f":
+        with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one, and is told of as such
+            return rate, data.astype(np.float64), False
+    if data.dtype == np.uint8:
+        raise RecordError(
+            f"{path}: 8 bits per sample resolve 1/128 of full scale, too coarse for a decay; needed are 16, 24 or 32 "
+            "bits, or float"
+        )
+    # SciPy puts 24 bits into the upper three bytes of 32, so that full scale is that of the type.
+    return rate, data.astype(np.float64) / -float(np.iinfo(data.dtype).min), True
+
+
+def read_wav(path: Path, options: ReadOptions) -> list[Record]:
+    """Read a WAV file.
+
+    Float samples are in N and m/s² (or times the scales); integers are shares of full scale, which mean N and m/s² by
+    the scales only.
+    """
+    rate, data, shares = _channels(path)
+    count, channels = data.shape
+    if channels > 2:
+        raise RecordError(
+            f"{path}: {channels} channels; needed is one (free decay) or two (force, response); "
+            "write CSV or UFF for more"
+        )
+    if rate <= 0 or count < 16:
+        raise RecordError(f"{path}: {count} samples at {rate} Hz: a record has at least 16, a good one some 1000")
+    period = 1.0 / rate
+    if options.period_s is not None and abs(options.period_s / period - 1.0) > STATED_RATE_TOLERANCE:
+        raise RecordError(
+            f"{path}: {rate} samples per second, a period of {options.period_s:g} s is stated: must agree within "
+            f"{100 * STATED_RATE_TOLERANCE:g} %"
+        )
+    bad = np.argwhere(~np.isfinite(data))
+    if bad.size:
+        row, channel = bad[0]
+        raise RecordError(
+            f"{path}: sample {row + 1} of channel {channel + 1} is {data[row, channel]}: must be a finite number"
+        )
+    notes: list[str] = []
+    response = data[:, -1]
+    force_n: FloatArray | None = None
+    if channels == 2:
+        force = data[:, 1] if options.response_first else data[:, 0]
+        response = data[:, 0] if options.response_first else data[:, 1]
+        if not options.ignore_force:
+            missing = [
+                name
+                for name, scale in (
+                    ("--force-scale", options.force_scale),
+                    ("--response-scale", options.response_scale),
+                )
+                if scale is None
+            ]
+            if shares and missing:
+                raise RecordError(
+                    f"{path}: integer samples are shares of full scale; a mass needs {' and '.join(missing)} (N, m/s² "
+                    "at full scale); frequencies and damping only: --ignore-force"
+                )
+            force_n = np.ascontiguousarray(force * (options.force_scale or 1.0))
+            if not shares and options.force_scale is None:
+                notes.append("no unit in a WAV file: force is taken in N")
+    if options.response_scale is None:
+        notes.append(
+            "integer samples without a scale: the response is a share of full scale, good for frequencies and damping"
+            if shares
+            else f"no unit in a WAV file: response is taken in SI ({options.quantity or 'acceleration'})"
+        )
+    return [
+        Record(
+            source=str(path),
+            period_s=period,
+            response=np.ascontiguousarray(response * (options.response_scale or 1.0)),
+            quantity=options.quantity or "acceleration",
+            force_n=force_n,
+            axis=options.axis,
+            warnings=tuple(notes),
+        )
+    ]

@@ -1,4 +1,4 @@
-"""One tap, or one decay: what the sensors gave, in SI units, whatever file it came from."""
+"""One tap, or one decay: what the sensors gave, in SI units; and what the user says of its file."""
 
 from __future__ import annotations
 

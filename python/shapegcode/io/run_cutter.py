@@ -42,7 +42,6 @@ class RunCutter:
     """Takes events, gives runs; holds the values of one run at a time."""
 
     def __init__(self, source: str, table: ItemTable, feed_unit: str | None, max_values: int) -> None:
-        """Nothing was read yet."""
         self.notes = FileNotes()
         self.feed_unit = feed_unit
         self._source = source
@@ -216,9 +215,7 @@ class RunCutter:
 
     def _moved(self) -> bool:
         """Whether block numbers changed so far."""
-        return any(
-            len(set(track.values)) > 1 for track in self._tracks.values() if track.counts
-        )  # fmt: skip
+        return any(len(set(track.values)) > 1 for track in self._tracks.values() if track.counts)
 
     # --- the ends of runs ---
 

@@ -1,4 +1,4 @@
-"""The data items of a log of runs: what they are, and what controls and adapters call them."""
+"""The data items of a log of runs, their time stamps, and notes of what reading bridged or left out."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _NAMES: dict[Role, str] = {
 }
 
 #: Names that are kept for messages.
-_MOST_NAMES = 1000
+_MAX_NAMES = 1000
 
 ROLES: tuple[Role, ...] = get_args(Role)
 """What an item can be; the keys of `items`."""
@@ -118,7 +118,7 @@ class ItemTable:
         if found is not None:
             # The same item again, in another document, is one object: values are kept by it.
             found = self._items.setdefault((found.name, found.role), found)
-        if len(self.seen) < _MOST_NAMES:
+        if len(self.seen) < _MAX_NAMES:
             self.seen[names[0]] = found
         return found
 
@@ -148,7 +148,6 @@ class FileNotes:
     """Notes since the last run."""
 
     def __init__(self) -> None:
-        """None yet."""
         self.feed_unit: str | None = None  # what the file itself says of the unit of the feed
         self._kinds: dict[str, tuple[list[str], int, int]] = {}
 
@@ -188,7 +187,6 @@ class Stamps:
     """Reads time stamps; those of the same minute quickly."""
 
     def __init__(self) -> None:
-        """Nothing is known yet."""
         self._minute = b"-"
         self._base = 0.0
 

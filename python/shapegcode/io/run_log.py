@@ -15,9 +15,12 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from shapegcode.errors import RecordError
+from shapegcode.io.edge_json import edge_runs
 from shapegcode.io.layout import head_of
+from shapegcode.io.mtconnect import mtconnect_events, shdr_events
 from shapegcode.io.run_cutter import RunCutter
 from shapegcode.io.run_items import ItemTable, stated_feed_unit
+from shapegcode.io.run_table import table_events
 from shapegcode.io.run_tracks import RunLog
 
 LogFormat = Literal["shdr", "mtconnect", "edge", "csv"]
@@ -111,23 +114,10 @@ def iter_run_logs(
 
 def _runs(path: Path, kind: LogFormat, table: ItemTable, unit: str | None, max_values: int) -> Iterator[RunLog]:
     if kind == "edge":
-        from shapegcode.io.edge_json import edge_runs
-
-        yield from edge_runs(path)
-        return
+        return edge_runs(path)
     cutter = RunCutter(str(path), table, unit, max_values)
-    if kind == "shdr":
-        from shapegcode.io.mtconnect import shdr_events
-
-        yield from cutter.runs(shdr_events(path, table, cutter.notes))
-    elif kind == "mtconnect":
-        from shapegcode.io.mtconnect import mtconnect_events
-
-        yield from cutter.runs(mtconnect_events(path, table, cutter.notes))
-    else:
-        from shapegcode.io.run_table import table_events
-
-        yield from cutter.runs(table_events(path, table, cutter.notes))
+    events = {"shdr": shdr_events, "mtconnect": mtconnect_events, "csv": table_events}[kind]
+    return cutter.runs(events(path, table, cutter.notes))
 
 
 def _format(path: Path, stated: LogFormat | None) -> LogFormat:

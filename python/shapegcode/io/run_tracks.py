@@ -1,4 +1,4 @@
-"""The values of each item while a run goes on, and the run that is made of them."""
+"""One run of a program as a log shows it, and the values of its items while it goes on."""
 
 from __future__ import annotations
 
@@ -32,7 +32,6 @@ class Signal:
     name: str = ""
 
     def __len__(self) -> int:
-        """How many values there are."""
         return len(self.time_s)
 
 
@@ -130,7 +129,6 @@ class Track:
     """The values of one item, as they come."""
 
     def __init__(self, item: Item) -> None:
-        """No value yet."""
         self.item = item
         self.counts = item.role in _COUNTS
         self.times = array("d")
@@ -302,17 +300,20 @@ def _best(part: RunPart, tracks: Sequence[Track], role: Role, notes: FileNotes) 
     return found[0][3] if found else None
 
 
-def _texts(part: RunPart, tracks: Sequence[Track], role: Role) -> tuple[tuple[float, str], ...]:
-    """The values of text of a run, those without anything in them left out."""
-    ranked = sorted((track for track in tracks if track.item.role == role), key=lambda each: each.item.rank)
-    for track in ranked:
+def _text_values(part: RunPart, tracks: Sequence[Track], role: Role) -> Iterator[tuple[Item, list[tuple[float, str]]]]:
+    """The values of text until the end of a run, by item, the best name first; those without anything left out."""
+    for track in sorted((track for track in tracks if track.item.role == role), key=lambda each: each.item.rank):
         pairs = zip(track.times, track.texts or (), strict=True)
-        found = tuple(
-            (time - part.start, text)
-            for time, text in pairs
-            if part.start - _LEAD_IN_S <= time <= part.end and text and text != "UNAVAILABLE"
+        yield (
+            track.item,
+            [(time - part.start, text) for time, text in pairs if time <= part.end and text and text != "UNAVAILABLE"],
         )
-        if found:
+
+
+def _texts(part: RunPart, tracks: Sequence[Track], role: Role) -> tuple[tuple[float, str], ...]:
+    """The values of text of a run."""
+    for _, pairs in _text_values(part, tracks, role):
+        if found := tuple(pair for pair in pairs if pair[0] >= -_LEAD_IN_S):
             return found
     return ()
 
@@ -342,22 +343,13 @@ def _override(signal: Signal | None, notes: FileNotes) -> Signal | None:
 
 def _program(part: RunPart, tracks: Sequence[Track], notes: FileNotes) -> str | None:
     """The name that holds at the start or comes shortly after it."""
-    ranked = sorted((track for track in tracks if track.item.role == "program"), key=lambda each: each.item.rank)
-    for track in ranked:
-        pairs = [
-            (time - part.start, text)
-            for time, text in zip(track.times, track.texts or (), strict=True)
-            if time <= part.end and text and text != "UNAVAILABLE"
-        ]
+    for item, pairs in _text_values(part, tracks, "program"):
         early = [text for time, text in pairs if time <= _NAME_S]
         name = early[-1] if early else pairs[0][1] if pairs else None
         if name is not None:
             for time, text in pairs:
                 if time > _NAME_S and text != name:
-                    notes.add(
-                        "program",
-                        0,
-                        f"{track.item.name} is {text} from {time:.2f} s on: a called program, or another one",
-                    )
+                    said = f"{item.name} is {text} from {time:.2f} s on: a called program, or another one"
+                    notes.add("program", 0, said)
             return name
     return None

@@ -1,4 +1,4 @@
-"""The time between two samples, from the instants that a file gives."""
+"""The time between two samples, from the instants that a file gives; samples off an even grid brought onto one."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ _BETA = 7.86
 _RIDGE = 1e-6
 #: Intervals are widened by this much at least: what the pulse holds above the grid's band is an error beside the noise,
 #: which a fit to the grid does not see.
-_LEAST_WIDENED = 3.0
+_MIN_WIDENED = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +152,7 @@ def even_grid(times_s: FloatArray) -> EvenGrid:
         )
     period = max(mean / _DENSITY, float(steps[row]))
     count = int((times_s[-1] - times_s[0]) / period + 1e-9) + 1
-    widened = max(_LEAST_WIDENED, float(np.sqrt(steps[row] / mean)))
+    widened = max(_MIN_WIDENED, float(np.sqrt(steps[row] / mean)))
     note = (
         f"times are not evenly spaced: steps of {np.min(steps):.4g} to {steps[row]:.4g} s, on average {mean:.4g} s; "
         f"resampled to {1.0 / period:.5g} samples per second, which is good up to {0.4 / period:.4g} Hz; intervals are "

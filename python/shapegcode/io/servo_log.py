@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 _ACTUAL = {"act", "actual", "fb", "feedback", "fbk", "measured", "meas", "ist", "real"}
 _TIME = {"time", "t", "timestamp", "zeit"}
 _EXAMPLE = "time_ms,X,Y,Z or time_ms,X,Y,Z,X_act,Y_act,Z_act"
-_FEWEST_ROWS, _MAX_ROWS = 100, 20_000_000
+_MIN_ROWS, _MAX_ROWS = 100, 20_000_000
 _SHORTEST_S, _LONGEST_S = 2e-5, 0.05
 
 
@@ -122,7 +122,7 @@ def read_log(path: Path, units: tuple[float, float] | None = None) -> ServoLog:
     """Read a servo log."""
     table = TextTable(path)
     columns = _columns(table)
-    values = table.numbers(columns.used, _FEWEST_ROWS)
+    values = table.numbers(columns.used, _MIN_ROWS)
     if len(values) > _MAX_ROWS:
         raise ArgumentError(f"{path}: more than {_MAX_ROWS} rows")
     _refuse_descending(table, values[:, 0])

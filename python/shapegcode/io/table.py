@@ -1,9 +1,5 @@
 """The one reader of text tables: what a file is written in, its header with units, its rows of numbers.
 
->>> table = TextTable(path)
->>> labels = table.labels(tap_label)            # what each column is called, and its unit
->>> values = table.numbers([0, 2], fewest=16)   # (rows, 2)
-
 Delimiter, decimal comma, preamble and a row of units are found out (`shapegcode.io.layout`). What is wrong is said with
 line, column and text of the cell.
 """
@@ -39,7 +35,6 @@ class TextTable:
     """A text file with columns."""
 
     def __init__(self, path: Path, *, by_number: bool = False) -> None:
-        """Read the file, and find out how it is written."""
         self.path = path  # where it was read
         data = utf8_text(path)
         self.layout = find_layout(path, data, by_number)  # how it is written

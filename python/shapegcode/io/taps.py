@@ -1,4 +1,4 @@
-"""Reads records of taps and decays from text files with columns: which column is the time, the force, the response."""
+"""Reads records of taps and decays from text with columns, Klipper's accelerations too."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _REMEDY = (
     "--response-sensitivity 100mV/g) or the scale (--force-scale, --response-scale)"
 )
 #: Fewer samples are no record of a vibration.
-_FEWEST_ROWS = 16
+_MIN_ROWS = 16
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,7 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
         )
         time = None
     columns = [column for column in (time, force, *responses) if column is not None]
-    values = table.numbers([column.index for column in columns], _FEWEST_ROWS)
+    values = table.numbers([column.index for column in columns], _MIN_ROWS)
     stated = options.period_s if options.period_s is not None else layout.period_s
     start_s, widened = 0.0, 1.0
     if time is None:

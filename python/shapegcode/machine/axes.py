@@ -1,4 +1,4 @@
-"""The axes of a machine file: limits and vibration modes."""
+"""The axes of a machine file: limits, vibration modes, feed drives."""
 
 from __future__ import annotations
 

@@ -1,12 +1,13 @@
-"""Every value of a machine with its unit, origin and meaning; and which of those that nobody measured matter."""
+"""Every value of a machine with unit, origin and meaning; those nobody measured; what differs between two machines."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 from shapegcode.machine.machine import Machine
 from shapegcode.results.result import Result
@@ -14,6 +15,7 @@ from shapegcode.results.table import Column, Table
 from shapegcode.settings.keys import KeyValue
 
 _RANKED = 8
+_Keyed = TypeVar("_Keyed", "KeyValue", "DifferentValue")
 
 
 @dataclass(frozen=True)
@@ -108,10 +110,10 @@ class MachineDescription(Result):
         """
         if self.program is not None and not everything:
             return self._ranking(_RANKED)
-        rows = list(self._rows())
+        rows = list(_by_table(self.keys.values()))
         heads = [rank for rank, row in enumerate(rows) if isinstance(row, str)]
         columns = (
-            Column("key", value=lambda row: f"[{row}]" if isinstance(row, str) else _last(row.key), left=True),
+            _KEY,
             Column("value", value=_with_unit, text=True),
             Column("origin", value=_origin, left=True, priority=2),
             Column("meaning", value=lambda row: getattr(row, "meaning", None), text=True),
@@ -120,7 +122,7 @@ class MachineDescription(Result):
         summary = (Column("origin", value=lambda row: row[0], left=True), Column("keys", value=lambda row: row[1]))
         return [
             *self._ranking(),
-            Table("", columns, rows, sections=heads, row_style=lambda row: "bold" if isinstance(row, str) else ""),
+            Table("", columns, rows, sections=heads, row_style=_bold),
             Table("origins", summary, counts.most_common()),
         ]
 
@@ -150,18 +152,23 @@ class MachineDescription(Result):
         )
         return [Table("", by_table, listed)] if listed else []
 
-    def _rows(self) -> Iterator[str | KeyValue]:
-        section = ""
-        for key, value in self.keys.items():
-            table = key.rpartition(".")[0]
-            if table != section:
-                section = table
-                yield table
-            yield value
+
+def _by_table(values: Iterable[_Keyed]) -> Iterator[str | _Keyed]:
+    """Values with the name of their table before the first one of each."""
+    for table, rows in groupby(values, key=lambda value: value.key.rpartition(".")[0]):
+        yield from [table] if table else []
+        yield from rows
 
 
 def _last(key: str) -> str:
     return key.rpartition(".")[2]
+
+
+_KEY = Column("key", value=lambda row: f"[{row}]" if isinstance(row, str) else _last(row.key), left=True)
+
+
+def _bold(row: object) -> str:
+    return "bold" if isinstance(row, str) else ""
 
 
 def _with_unit(row: str | KeyValue) -> str | None:
@@ -171,9 +178,7 @@ def _with_unit(row: str | KeyValue) -> str | None:
 
 
 def _origin(row: str | KeyValue) -> str | None:
-    if isinstance(row, str):
-        return None
-    return "assumed" if row.assumed else row.origin
+    return None if isinstance(row, str) else "assumed" if row.assumed else row.origin
 
 
 def describe_machine(machine: Machine | str | Path) -> MachineDescription:
@@ -189,7 +194,7 @@ def describe_machine(machine: Machine | str | Path) -> MachineDescription:
         MachineError: the file is not TOML or has wrong keys or values; every problem is listed.
         OSError: the file cannot be read.
     """
-    loaded = machine if isinstance(machine, Machine) else Machine.load(machine)
+    loaded = Machine.of(machine)
     keys = {value.key: value for value in loaded.values()}
     warnings = (loaded.origin_warning,) if loaded.origin_warning else ()
     return MachineDescription(loaded.model_dump(mode="json"), keys, warnings)
@@ -260,27 +265,13 @@ class MachineDifference(Result):
 
     def tables(self) -> list[Table]:
         """The keys that differ, those of one table of the file below its name."""
-        rows: list[str | DifferentValue] = []
-        section = ""
-        for each in self.different:
-            table = each.key.rpartition(".")[0]
-            if table != section:
-                rows.append(section := table)
-            rows.append(each)
+        rows = list(_by_table(self.different))
         columns = (
-            Column("key", value=lambda row: f"[{row}]" if isinstance(row, str) else _last_change(row), left=True),
+            _KEY,
             Column(Path(self.first).name, value=lambda row: _shown(row, "first"), text=True),
             Column(Path(self.second).name, value=lambda row: _shown(row, "second"), text=True),
         )
         return [Table("", columns, rows, row_style=_bold)] if rows else []
-
-
-def _last_change(row: DifferentValue) -> str:
-    return row.key.rpartition(".")[2]
-
-
-def _bold(row: str | DifferentValue) -> str:
-    return "bold" if isinstance(row, str) else ""
 
 
 def _shown(row: str | DifferentValue, which: Literal["first", "second"]) -> str | None:
@@ -307,7 +298,7 @@ def machine_difference(first: Machine | str | Path, second: Machine | str | Path
         MachineError: a file is not TOML or has wrong keys or values; every problem is listed.
         OSError: a file cannot be read.
     """
-    machines = [each if isinstance(each, Machine) else Machine.load(each) for each in (first, second)]
+    machines = [Machine.of(each) for each in (first, second)]
     names = [each.name if isinstance(each, Machine) else str(each) for each in (first, second)]
     ours, theirs = ({value.key: value for value in machine.values()} for machine in machines)
     keys = list(dict.fromkeys([*ours, *theirs]))

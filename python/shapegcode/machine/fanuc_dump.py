@@ -1,7 +1,9 @@
-"""Text of a FANUC parameter dump (CNC-PARA.TXT) as records: which value stands for which axis, in which line.
+"""What a FANUC control punches out: its parameters as records, its tables of offsets and macro variables.
 
-Both grammars are read: ``N01420Q1A1P24000.0A2P24000.0`` (30i, 0i-D, 0i-F; the 15i leaves Q1 out) and
-``N01825 A1 P 3000 A2 P 3000`` (16, 18, 21). Lines end in LF, CR-LF or LF-CR-CR.
+Both grammars of CNC-PARA.TXT are read: ``N01420Q1A1P24000.0A2P24000.0`` (30i, 0i-D, 0i-F; the 15i leaves Q1 out) and
+``N01825 A1 P 3000 A2 P 3000`` (16, 18, 21). Tables: ``G10G90L10P1R185.676`` (TOOLOFST.TXT),
+``G10L2P1X-865.475Y-934.435Z-833.845`` (EXT_WKZ.TXT), ``G10L85P500(4044000000000000)`` (MACRO.TXT: the value as a double
+in hexadecimal), ``#500=[25283*65536]/134217728`` (the same of older series). Lines end in LF, CR-LF or LF-CR-CR.
 """
 
 from __future__ import annotations
@@ -146,7 +148,7 @@ def _computed(node: ast.expr) -> float:
 
 
 LONGEST_MS = 10_000.0
-_LARGEST = 1e7
+_MAX_VALUE = 1e7
 MM_PER_INCH = 25.4
 
 
@@ -159,7 +161,7 @@ class DumpValues:
         self.problems: list[Problem] = []  # values that cannot be; whoever takes values looks at them at the end
         self.differing: list[tuple[int, float]] = []
 
-    def scalar(self, number: int, high: float = _LARGEST, unit: str = "", low: float = 0.0) -> float | None:
+    def scalar(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> float | None:
         """A parameter without axes; where the dump gives it per axis, the largest of X, Y, Z."""
         entry = self.dump.get(number)
         if entry is not None:
@@ -169,7 +171,7 @@ class DumpValues:
             self.differing.append((number, max(values)))
         return max(values, default=None)
 
-    def per_axis(self, number: int, high: float = _LARGEST, unit: str = "", low: float = 0.0) -> list[float] | None:
+    def per_axis(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> list[float] | None:
         """The values of X, Y, Z; one without an axis stands for all three. None where the dump lacks one."""
         entries = self.entries(number)
         if len(entries) < 3:

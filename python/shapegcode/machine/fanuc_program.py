@@ -66,11 +66,6 @@ def _increment_parameter(draft: Draft) -> int | None:
     return next((n for n in (1013, 1004) if draft.values.bit(n, 1) is not None), None)
 
 
-def is_inch(draft: Draft) -> bool:
-    """Whether the control's setting is inch input (0000#2): values without a unit of their own are inch then."""
-    return bool(draft.values.bit(0, 2))
-
-
 def _increments(draft: Draft) -> None:
     number = _increment_parameter(draft)
     if number is None:
@@ -201,5 +196,5 @@ def _serial_line(draft: Draft) -> None:
 
 
 def inch_factor(draft: Draft) -> float:
-    """What values without a unit of their own are multiplied by to be mm."""
-    return MM_PER_INCH if is_inch(draft) else 1.0
+    """What values without a unit of their own are multiplied by to be mm: the setting may be inch input (0000#2)."""
+    return MM_PER_INCH if draft.values.bit(0, 2) else 1.0

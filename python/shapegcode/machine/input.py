@@ -122,12 +122,7 @@ class Input(TomlTable):
         return offsets
 
     @field_validator(
-        "tool_radius_mm",
-        "tool_radius_wear_mm",
-        "tool_length_mm",
-        "tool_length_wear_mm",
-        "m_macros",
-        "m_subprograms",
+        "tool_radius_mm", "tool_radius_wear_mm", "tool_length_mm", "tool_length_wear_mm", "m_macros", "m_subprograms"
     )
     @classmethod
     def _numbers(cls, table: dict[str, Any]) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Time
 from shapegcode.machine.input import Input
 from shapegcode.machine.output import Emission, Price, Shaping, Tolerance, Verdict
 from shapegcode.settings import edit
-from shapegcode.settings.describe import documentation, values_of, write_short_toml, write_toml
+from shapegcode.settings.describe import documentation, values_of, write_toml
 from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml
 from shapegcode.settings.load import MAX_PROBLEMS, KeyProblem, further_problems, line_of, parsed, read_text, validated
 from shapegcode.settings.remarks import (
@@ -363,7 +363,7 @@ class Machine(TomlTable):
         """
         if short:
             held = {value.key: value.remark for value in self.values() if value.remark}
-            return write_short_toml(self, held | dict(remarks or {}))
+            return write_toml(self, held | dict(remarks or {}), short=True)
         return write_toml(self, self.all_remarks() | dict(remarks or {}))
 
     @overload
@@ -440,8 +440,4 @@ def _several(modes: float | Mode | Sequence[float | Mode]) -> Sequence[float | M
 def _table_of(mode: float | Mode) -> dict[str, float]:
     if not isinstance(mode, Mode):
         return {"frequency_hz": mode, "damping_ratio": _ASSUMED_DAMPING_RATIO}
-    return {
-        "frequency_hz": mode.frequency_hz,
-        "damping_ratio": mode.damping_ratio,
-        "participation": mode.participation,
-    }
+    return {"frequency_hz": mode.frequency_hz, "damping_ratio": mode.damping_ratio, "participation": mode.participation}

@@ -125,32 +125,17 @@ class Emission(TomlTable):
         return bool(last) and last[-1] == "0"
 
 
+_Family = Literal[
+    "auto", "zv", "zvd", "zvdd", "mzv", "ei", "ei2", "ei3", "si", "negative-zv", "polynomial", "non-negative",
+    "robust", "mirrored", "smooth-zv", "smooth-mzv", "smooth-ei", "smooth-ei2", "smooth-si", "smooth-zvd-ei",
+]  # fmt: skip
+
+
 class Shaping(TomlTable):
     """What is shaped, and how."""
 
     max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", default=0.25)
-    family: Literal[
-        "auto",
-        "zv",
-        "zvd",
-        "zvdd",
-        "mzv",
-        "ei",
-        "ei2",
-        "ei3",
-        "si",
-        "negative-zv",
-        "polynomial",
-        "non-negative",
-        "robust",
-        "mirrored",
-        "smooth-zv",
-        "smooth-mzv",
-        "smooth-ei",
-        "smooth-ei2",
-        "smooth-si",
-        "smooth-zvd-ei",
-    ] = key(
+    family: _Family = key(
         'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative impulses, '
         "exact at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
         default="auto",

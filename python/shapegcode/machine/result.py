@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
-from shapegcode.machine.axes import Axis
 from shapegcode.machine.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Result, Xyz
@@ -156,7 +155,8 @@ class ParameterImport(Result):
         find = f"shapegcode identify TAP.csv --update {file}"
         if not any(axis.modes for axis in self.machine.axes.as_tuple()):
             return f"find the vibration modes, which no dump holds: {find}."
-        open_axes = [letter for letter in "xyz" if _is_open(getattr(self.machine.axes, letter))]
+        axes = zip("xyz", self.machine.axes.as_tuple(), strict=True)
+        open_axes = [letter for letter, axis in axes if not axis.modes and not axis.rigid]
         if open_axes:
             names = ", ".join(open_axes).upper()
             return f"tap {names}, whose modes nobody knows: {find}."
@@ -187,11 +187,7 @@ class ParameterImport(Result):
             Column("values", value="count"),
             Column("from", value=lambda row: f"{row.file}, lines {row.first_line} to {row.last_line}", text=True),
         )
-        assumed = (
-            Column("key", left=True),
-            Column("value", value=_shown, text=True),
-            Column("why", text=True),
-        )
+        assumed = (Column("key", left=True), Column("value", value=_shown, text=True), Column("why", text=True))
         missing = (Column("parameter"), Column("line"), Column("why", text=True))
         found = [
             Table("read", read, [list(rows) for _, rows in groupby(self.read, key=lambda row: row.key)]),
@@ -239,11 +235,6 @@ class ParameterImport(Result):
 def _first_of(names: Sequence[str]) -> str:
     shown = ", ".join(names[:_SHOWN])
     return shown if len(names) <= _SHOWN else f"{shown} and {len(names) - _SHOWN} more"
-
-
-def _is_open(axis: Axis) -> bool:
-    """Whether nobody knows of a mode of it, nor that it has none."""
-    return not axis.modes and not axis.rigid
 
 
 def _origins(rows: list[ReadParameter]) -> str:

@@ -29,14 +29,14 @@ from shapegcode.program.compensation import paired_regions
 FloatArray = npt.NDArray[np.float64]
 _CHUNK_SAMPLES = 65_536
 _LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
-_LEAST_REST_S = 0.25
+_MIN_REST_S = 0.25
 _MILLIONTH = math.log(1e6)
-_MOST_PROFILE_STATIONS = 200_000  # kept of each program for pictures
-_LARGEST_TOOL_MM = 1000.0
-_LEAST_SPACING_MM = 1e-3
+_MAX_PROFILE_STATIONS = 200_000  # kept of each program for pictures
+_MAX_TOOL_MM = 1000.0
+_MIN_SPACING_MM = 1e-3
 _SHORT_MM = 0.5
-_MOST_SECTIONS = 20_000  # of a program: each is a row with its walls
-_LARGEST_FACTOR = 2.0**20
+_MAX_SECTIONS = 20_000  # of a program: each is a row with its walls
+_MAX_FACTOR = 2.0**20
 _LAST_LINE = 2**32 - 1
 _BLOCKS_PER_CURVE = 2.5  # a shaped program's own blocks are shorter than this many block periods at its feed
 
@@ -91,8 +91,7 @@ def measure(
     several = [given_program(each, machine) for each in given]
     if not several:
         raise _core.ArgumentError("no program to measure")
-    settings = _Settings(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
-    settings.check()
+    options = _options(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
     shaped = [program.shaped_regions > 0 for program in several]
     if against is not None:
         against = given_program(against, machine)
@@ -114,7 +113,7 @@ def measure(
     for program, is_shaped, counts in zip(several, shaped, _judged(beside), strict=True):
         nominal = against or program
         jobs = jobs_of(program, nominal, machine, lines)
-        regions = list(_measured_regions(jobs, machine, plant, settings, one_done))
+        regions = list(_measured_regions(jobs, machine, plant, options, one_done))
         measured.append(
             MeasuredProgram.of(
                 regions,
@@ -181,43 +180,29 @@ def _section_warnings(jobs: Iterable[Job]) -> Iterator[str]:
         )
 
 
-@dataclass(frozen=True)
-class _Settings:
-    """With what programs are measured; see `measure`."""
-
-    tool_diameter_mm: float
-    band_um: float
-    station_spacing_mm: float
-    cutoff_mm: float | None
-    lambda_s_mm: float
-
-    def check(self) -> None:
-        """Refuse what nobody can measure with, before anything is played."""
-        for name, value in (("tool diameter", self.tool_diameter_mm), ("station spacing", self.station_spacing_mm)):
-            if not (math.isfinite(value) and value > 0.0):
-                raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
-        if self.tool_diameter_mm > _LARGEST_TOOL_MM:
-            raise _core.ArgumentError(
-                f"tool diameter is {self.tool_diameter_mm:g} mm, must be at most {_LARGEST_TOOL_MM:g} mm"
-            )
-        if self.station_spacing_mm < _LEAST_SPACING_MM:
-            raise _core.ArgumentError(
-                f"station spacing is {self.station_spacing_mm:g} mm, must be at least {_LEAST_SPACING_MM:g} mm"
-            )
-        for name, value in (("cut-off", self.cutoff_mm or 0.0), ("lambda s", self.lambda_s_mm)):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
-
-    def core(self, period_s: float) -> _core.MetrologyOptions:
-        """The same for the core."""
-        options = _core.MetrologyOptions()
-        options.period_s = period_s
-        options.tool_radius_mm = self.tool_diameter_mm / 2.0
-        options.station_spacing_mm = self.station_spacing_mm
-        options.band_mm = self.band_um * 1e-3
-        options.cutoff_mm = self.cutoff_mm or 0.0
-        options.lambda_s_mm = self.lambda_s_mm
-        return options
+def _options(
+    tool_diameter_mm: float, band_um: float, station_spacing_mm: float, cutoff_mm: float | None, lambda_s_mm: float
+) -> _core.MetrologyOptions:
+    """With what is measured; what nobody can measure with is refused before anything is simulated."""
+    for name, value in (("tool diameter", tool_diameter_mm), ("station spacing", station_spacing_mm)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
+    if tool_diameter_mm > _MAX_TOOL_MM:
+        raise _core.ArgumentError(f"tool diameter is {tool_diameter_mm:g} mm, must be at most {_MAX_TOOL_MM:g} mm")
+    if station_spacing_mm < _MIN_SPACING_MM:
+        raise _core.ArgumentError(
+            f"station spacing is {station_spacing_mm:g} mm, must be at least {_MIN_SPACING_MM:g} mm"
+        )
+    for name, value in (("cut-off", cutoff_mm or 0.0), ("lambda s", lambda_s_mm)):
+        if not (math.isfinite(value) and value >= 0.0):
+            raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
+    options = _core.MetrologyOptions()
+    options.tool_radius_mm = tool_diameter_mm / 2.0
+    options.station_spacing_mm = station_spacing_mm
+    options.band_mm = band_um * 1e-3
+    options.cutoff_mm = cutoff_mm or 0.0
+    options.lambda_s_mm = lambda_s_mm
+    return options
 
 
 def measure_samples(
@@ -251,25 +236,20 @@ def measure_samples(
     Raises:
         ArgumentError: a value outside its range, arrays of other shapes, or values that are not finite.
     """
-    settings = _Settings(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
-    settings.check()
-    return _measured(chunks, path, _core.path_sections(path), settings, period_s, lines)
+    options = _options(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
+    return _measured(chunks, path, _core.path_sections(path), options, period_s, lines)
 
 
 def _measured_regions(
-    jobs: Iterable[Job],
-    machine: Machine,
-    plant: str,
-    settings: _Settings,
-    on_done: Callable[[], None],
+    jobs: Iterable[Job], machine: Machine, plant: str, options: _core.MetrologyOptions, on_done: Callable[[], None]
 ) -> Iterator[MeasuredRegion]:
     """Every region of a program, played and measured."""
     kept = 0
     for number, job in enumerate(jobs, start=1):
         samples = _samples(job, machine, plant)
         lines = (job.nominal.first_line, job.nominal.last_line)
-        period_s, keep = machine.controller.interpolation_period_s, kept < _MOST_PROFILE_STATIONS
-        region = _measured(samples, job.path, job.sections, settings, period_s, lines, number, keep_walls=keep)
+        period_s, keep = machine.controller.interpolation_period_s, kept < _MAX_PROFILE_STATIONS
+        region = _measured(samples, job.path, job.sections, options, period_s, lines, number, keep_walls=keep)
         kept += sum(each.walls.distance_mm.size for each in region.sections if each.walls is not None)
         yield region
         on_done()
@@ -279,20 +259,21 @@ def _measured(
     chunks: Iterable[tuple[FloatArray, FloatArray]],
     path: _core.Path,
     sections: list[_core.PathSection],
-    settings: _Settings,
+    options: _core.MetrologyOptions,
     period_s: float,
     lines: tuple[int, int],
     region: int = 1,
     *,
     keep_walls: bool = True,
 ) -> MeasuredRegion:
-    metrology = _core.SectionMetrology(path, sections, settings.core(period_s))
+    options.period_s = period_s
+    metrology = _core.SectionMetrology(path, sections, options)
     for command, response in chunks:
         metrology.feed(command, response)
     walls = [_wall(metrology, index) if keep_walls else None for index in range(len(sections))]
     figures = metrology.finish()
     found = (
-        MeasuredSection.of(each, region, settings.tool_diameter_mm, wall)
+        MeasuredSection.of(each, region, 2.0 * options.tool_radius_mm, wall)
         for each, wall in zip(figures.sections, walls, strict=True)
     )
     return MeasuredRegion(lines, path, figures, tuple(found), metrology.station_spacing_mm)
@@ -307,7 +288,7 @@ def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
 def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Command and response of a region, and what follows the stop until vibration and servo lag have decayed."""
     model = MachineModel(machine)
-    memory_s = max(model.vibration_memory_s, _LEAST_REST_S)
+    memory_s = max(model.vibration_memory_s, _MIN_REST_S)
     if plant != "modal":
         # The position loop takes the lag off as exp(-gain t): to a millionth, as the vibration.
         memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
@@ -357,9 +338,9 @@ def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequenc
 def _joined(pairs: Sequence[tuple[_core.Region, _core.Region]], machine: Machine, *, own_blocks: bool) -> float:
     """How many times longer than elsewhere runs must be to stand alone, so that a program has a number of sections
     that somebody may look at; a region has one at least."""
-    most = max(_MOST_SECTIONS, len(pairs))
+    most = max(_MAX_SECTIONS, len(pairs))
     factor = 1.0
-    while factor < _LARGEST_FACTOR:
+    while factor < _MAX_FACTOR:
         count = sum(
             len(_core.path_sections(region.path, factor * _short_mm(region.path, machine, own_blocks=own_blocks)))
             for _, region in pairs

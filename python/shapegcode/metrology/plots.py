@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 _SHARE_OF_TOOL = 0.8  # of the tool's radius that the largest deviation takes in the drawing
 _SHARE_OF_PART = 0.03
-_LEAST_DRAWN_UM = 1e-3
-_MOST_MARKED = 12
+_MIN_DRAWN_UM = 1e-3
+_MAX_MARKED = 12
 
 
 def plots_of(measurement: Measurement) -> dict[str, Plot]:
@@ -49,7 +50,9 @@ def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int |
     everything = np.concatenate([wall.point_mm for wall in _walls(drawn[0][1])])
     extent = float(np.ptp(everything, axis=0).max())
     largest_mm = max(_largest_um(each) for _, each in drawn) * 1e-3
-    magnified = _round(max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent) / max(largest_mm, _LEAST_DRAWN_UM * 1e-3))
+    magnified = plot.round_below(
+        max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent) / max(largest_mm, _MIN_DRAWN_UM * 1e-3)
+    )
     title = (
         f"Walls cut by a tool of {measurement.tool_diameter_mm:g} mm, deviations magnified {magnified:g} times "
         f"(1 mm drawn is {1e3 / magnified:g} µm)"
@@ -108,7 +111,7 @@ def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int 
 
 
 def _mark_sections(panels: list[Axes], region: MeasuredRegion) -> None:
-    if len(region.sections) > _MOST_MARKED:
+    if len(region.sections) > _MAX_MARKED:
         return
     for panel in panels:
         for section in region.sections[1:]:
@@ -155,13 +158,7 @@ def _joined(region: MeasuredRegion) -> WallProfile:
     walls = _walls(region)
     gap = WallProfile(*(np.full(1, np.nan) for _ in range(3)), *(np.full((1, 2), np.nan) for _ in range(2)))
     with_gaps = [each for wall in walls for each in (wall, gap)]
-    return WallProfile(
-        np.concatenate([each.distance_mm for each in with_gaps]),
-        np.concatenate([each.left_um for each in with_gaps]),
-        np.concatenate([each.right_um for each in with_gaps]),
-        np.concatenate([each.point_mm for each in with_gaps]),
-        np.concatenate([each.normal for each in with_gaps]),
-    )
+    return WallProfile(*(np.concatenate([getattr(each, field.name) for each in with_gaps]) for field in fields(gap)))
 
 
 def _largest_um(region: MeasuredRegion) -> float:
@@ -181,9 +178,3 @@ def _colour(number: int) -> str:
 
 def _part(region: MeasuredRegion) -> str:
     return "lines {} to {}".format(*region.lines)
-
-
-def _round(factor: float) -> float:
-    """The next lower 1, 2 or 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(factor))
-    return float(next(step for step in (5.0, 2.0, 1.0) if step * power <= factor * (1.0 + 1e-9)) * power)

@@ -16,7 +16,7 @@ from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result, Xyz
 from shapegcode.results.table import Column, Table
 
-_MOST_SECTIONS = 12
+_MAX_SECTIONS = 12
 _SHOWN_UM = 0.005  # less is shown as 0.00
 
 Sections = Sequence[MeasuredSection]
@@ -136,7 +136,7 @@ def section_table(
     """The figures of each section, one column per program."""
     count = min(len(sections) for sections in programs.values())
     worst = [max(each[index].contour_error_um.response.max for each in programs.values()) for index in range(count)]
-    shown = sorted(range(count), key=lambda index: -worst[index])[: None if every else _MOST_SECTIONS]
+    shown = sorted(range(count), key=lambda index: -worst[index])[: None if every else _MAX_SECTIONS]
     rows: list[_Row] = []
     for index in sorted(shown):
         beside = [sections[index] for sections in programs.values()]

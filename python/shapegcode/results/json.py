@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import hashlib
+import io
 import json
 import math
 import types
@@ -19,7 +21,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path, PurePath
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -27,8 +29,6 @@ from shapegcode.io.data_file import open_file
 
 FORMAT = 1
 """Of the JSON of results: raised where an older file can no longer be read."""
-
-_PIECE_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -51,14 +51,11 @@ class MadeFile:
     def of(cls, role: str, name: str | Path, content: bytes | memoryview | None = None) -> MadeFile:
         """Of a file, or of what is about to be written into it."""
         if content is not None:
-            import hashlib
-
             return cls(role, str(name), hashlib.sha256(content).hexdigest(), len(content))
         try:
-            sha256, size = file_hash(name)
+            return cls(role, str(name), *file_hash(name))
         except OSError:
             return cls(role, str(name), "", 0)
-        return cls(role, str(name), sha256, size)
 
 
 @dataclass(frozen=True)
@@ -86,14 +83,8 @@ class Made:
 
 def file_hash(name: str | Path) -> tuple[str, int]:
     """SHA-256 of a file, and its size."""
-    import hashlib
-
-    digest, size = hashlib.sha256(), 0
     with open_file(name) as stream:
-        while piece := stream.read(_PIECE_BYTES):
-            digest.update(piece)
-            size += len(piece)
-    return digest.hexdigest(), size
+        return hashlib.file_digest(cast(io.BufferedReader, stream), "sha256").hexdigest(), stream.tell()
 
 
 @cache
@@ -141,7 +132,6 @@ class Streamed(list[Any]):
         self._entries = entries
 
     def __len__(self) -> int:
-        """How many there are."""
         return len(self._entries)
 
     def __iter__(self) -> Iterator[Any]:

@@ -1,4 +1,4 @@
-"""A path and what was driven of it, from above, with the deviations magnified."""
+"""A path and what was driven of it, from above, deviations magnified; the pictures of the worst place of a region."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def plot_path(
     drawn = [(trace, *_deviation(trace, polyline, quantity, whole is None)) for trace in traces]
     largest_mm = max(float(np.linalg.norm(deviation, axis=1).max()) for *_, deviation in drawn)
     size_mm = float(np.linalg.norm(np.ptp(polyline, axis=0)))
-    factor = magnification or _round_factor(0.1 * size_mm / largest_mm if largest_mm > 0 else 1.0)
+    factor = magnification or plot.round_below(max(0.1 * size_mm / largest_mm, 1.0) if largest_mm > 0 else 1.0)
 
     cut = False
     what = "table" if quantity == "response" else "command"
@@ -182,14 +182,6 @@ def _only_along(polyline: FloatArray, deviations: Sequence[FloatArray]) -> bool:
     return across(polyline - polyline[0]) < _MOVES_MM and max(map(across, deviations)) < _SHOWN_MM
 
 
-def _round_factor(factor: float) -> float:
-    """The largest of 1, 2, 5, 10, 20, ... that is not above the factor; at least 1."""
-    if factor <= 1:
-        return 1.0
-    decade = 10.0 ** math.floor(math.log10(factor))
-    return max(step * decade for step in (1, 2, 5) if step * decade <= factor * (1 + 1e-9))
-
-
 def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
     """The whole path, small, and where the piece lies on it."""
     axes.plot(whole[:, 0], whole[:, 1], color=plot.GREY, linewidth=0.8)
@@ -210,9 +202,7 @@ def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:
 
     if largest_mm <= 0:
         return
-    target_um = largest_mm * 1e3
-    decade = 10.0 ** math.floor(math.log10(target_um))
-    length_um = max(step * decade for step in (1, 2, 5) if step * decade <= target_um * (1 + 1e-9))
+    length_um = plot.round_below(largest_mm * 1e3)
     length_mm = factor * length_um / 1e3
     bar = AuxTransformBox(axes.transData)
     bar.add_artist(Line2D([0, length_mm], [0, 0], color="black", linewidth=2.5, solid_capstyle="butt"))

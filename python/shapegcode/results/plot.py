@@ -14,6 +14,7 @@ import io
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,6 +104,12 @@ def number(value: float, digits: int = 3) -> str:
     return text.rstrip("0").rstrip(".") if places else text
 
 
+def round_below(value: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above a value."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return float(max(step * decade for step in (1, 2, 5) if step * decade <= value * (1 + 1e-9)))
+
+
 def legend_above(panel: Axes, *, columns: int = 4) -> None:
     """Legend between the panel and what is above it, where it hides no curve."""
     panel.legend(
@@ -170,9 +177,6 @@ def svg_text(drawn: Axes | Figure, key: str, *, label: str) -> str:
 
     What has very many points is drawn as pixels inside of it, so that a page stays small.
     """
-    import io
-    from html import escape
-
     import matplotlib
 
     figure: Any = drawn.figure.figure

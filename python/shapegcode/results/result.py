@@ -1,22 +1,17 @@
-"""What every result is: a frozen dataclass that says whether it is good, caution, before you run, and what to do next.
-
->>> time = sg.cycle_time("part.nc", machine)
->>> time.ok, time.warnings, time.next_step
->>> time.to_dict()                       # what --json writes
->>> print(time.tables()[0])              # what the command shows
->>> time.plots()["time"](ax)             # draws into the caller's axes
->>> time.report("time.html")             # the page that --html writes
->>> time.to_pandas("regions")            # a table for pandas
-"""
+"""Base of every result: what it offers beside its fields: page, pictures, tables for pandas and xarray."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from shapegcode.results.outcome import Outcome, Pair, Plot, Xyz
-from shapegcode.results.values import NotKeptError
+import numpy as np
+
+from shapegcode._core import ArgumentError
+from shapegcode.results.json import plain
+from shapegcode.results.outcome import NotKeptError, Outcome, Pair, Plot, Xyz
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,6 +23,12 @@ if TYPE_CHECKING:
     from shapegcode.results.page.scene import Scene
 
 __all__ = ["Pair", "Playable", "Plot", "Result", "Xyz"]
+
+_UNITS = {
+    "_mm_per_min": "mm/min", "_mm_per_s2": "mm/s²", "_mm_per_s": "mm/s", "_percent": "%", "_um": "µm", "_mm": "mm",
+    "_ms": "ms", "_s": "s", "_hz": "Hz", "_n": "N", "_kg": "kg", "_rad": "rad", "_deg": "°",
+}  # fmt: skip
+_AXES = ("x", "y", "z")
 
 
 class Playable(Protocol):
@@ -165,8 +166,6 @@ class Result(Outcome):
         plots = self.plots()
         if not plots or (name and name not in plots):
             there = f"one of {', '.join(plots)}" if plots else "there is no picture of this"
-            from shapegcode._core import ArgumentError
-
             raise ArgumentError(f"plot {name}: {there}" if name else there)
         return plots[name or next(iter(plots))](ax)
 
@@ -183,9 +182,14 @@ class Result(Outcome):
             ArgumentError: the result has no such list; the message has those that there are.
             ModuleNotFoundError: pandas is not installed.
         """
-        from shapegcode.results.study import data_frame
+        import pandas as pd
 
-        return data_frame(self, what)
+        lists = {field.name: getattr(self, field.name) for field in _fields(self)}
+        lists = {name: rows for name, rows in lists.items() if _is_list_of_rows(rows)}
+        name = _chosen(what, lists, "a list of rows")
+        table = pd.json_normalize([plain(row) for row in lists[name]])
+        table.attrs = {"of": name, "units": {str(column): unit for column in table if (unit := _unit(str(column)))}}
+        return table
 
     def to_xarray(self, what: str = "") -> xr.Dataset:
         """Its arrays for xarray, with dimensions and units; needs `shapegcode[study]`.
@@ -200,12 +204,67 @@ class Result(Outcome):
             ArgumentError: the result has no arrays; the message has those attributes that have.
             ModuleNotFoundError: xarray is not installed.
         """
-        from shapegcode.results.study import data_set
+        import xarray as xr
 
-        return data_set(self, what)
+        parts: dict[str, dict[str, np.ndarray[Any, Any]]] = {}
+        own = _arrays(self)
+        if own:
+            parts[type(self).__name__] = own
+        for field in _fields(self):
+            value = getattr(self, field.name)
+            if dataclasses.is_dataclass(value) and not isinstance(value, type) and (found := _arrays(value)):
+                parts[field.name] = found
+        name = _chosen(what, parts, "arrays")
+        arrays = parts[name]
+        # They share the dimension that is as long as the times or frequencies; one of length three is the axis.
+        index = next((key for key in arrays if key.startswith(("times_", "time_", "frequency_", "frequencies_"))), None)
+        length = len(arrays[index]) if index is not None else -1
+        variables = {}
+        for key, array in arrays.items():
+            dimensions = [
+                (index or key) if size == length and rank == 0 else ("axis" if size == len(_AXES) else f"{key}_{rank}")
+                for rank, size in enumerate(array.shape)
+            ]
+            variables[key] = xr.DataArray(array, dims=dimensions, attrs={"units": unit} if (unit := _unit(key)) else {})
+        whole = xr.Dataset(variables, attrs={"of": name})
+        return whole.assign_coords(axis=list(_AXES)) if "axis" in whole.dims else whole
 
     def _repr_html_(self) -> str:
         """Answer and tables, for notebooks."""
         from shapegcode.results.page.default import short_html
 
         return short_html(self)
+
+
+def _fields(value: object) -> Sequence[dataclasses.Field[Any]]:
+    return dataclasses.fields(value) if dataclasses.is_dataclass(value) else ()
+
+
+def _is_list_of_rows(value: object) -> bool:
+    if not isinstance(value, Sequence) or isinstance(value, str | bytes) or not value:
+        return False
+    return all(dataclasses.is_dataclass(row) or isinstance(row, Mapping) for row in value)
+
+
+def _arrays(value: object) -> dict[str, np.ndarray[Any, Any]]:
+    """Arrays among the fields, also those that no JSON holds."""
+    found = {field.name: getattr(value, field.name) for field in _fields(value)}
+    return {name: array for name, array in found.items() if isinstance(array, np.ndarray) and array.ndim > 0}
+
+
+def _chosen(what: str, there: Mapping[str, object], kind: str) -> str:
+    if what in there:
+        return what
+    if there and not what:
+        return next(iter(there))
+    has = f"it has {', '.join(there)}" if there else f"it has no {kind}"
+    raise ArgumentError(f"{what or 'this result'}: not {kind} of this result; {has}" if what else f"this result: {has}")
+
+
+def _unit(name: str) -> str:
+    """Of a plain number, as its name ends; of a nested one by the name that says it."""
+    for part in reversed(name.split(".")):
+        for ending, unit in _UNITS.items():
+            if part.endswith(ending):
+                return unit
+    return ""

@@ -25,16 +25,14 @@ import numpy as np
 from shapegcode._core import ArgumentError
 from shapegcode.io.data_file import DataFile
 from shapegcode.results.json import FORMAT, Made
-from shapegcode.results.outcome import Outcome
+from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.result import Result
-from shapegcode.results.values import NotKeptError
 
 
 class NotKept:
     """Stands for what the JSON does not hold."""
 
     def __init__(self, name: str) -> None:
-        """Of a field."""
         self._name = name
 
     def _refuse(self, *_: object) -> typing.NoReturn:
@@ -43,13 +41,11 @@ class NotKept:
     __bool__ = __call__ = __float__ = __getitem__ = __iter__ = __len__ = _refuse
 
     def __getattr__(self, attribute: str) -> typing.NoReturn:
-        """What it would have."""
         if attribute.startswith("__"):  # asked for by Python itself, such as by copy
             raise AttributeError(attribute)
         self._refuse()
 
     def __repr__(self) -> str:
-        """What is missing."""
         return f"<{self._name}: not in the JSON>"
 
 

@@ -1,8 +1,5 @@
 """Tables, declared once: columns with name, unit, value and digits; for the terminal.
 
->>> COLUMNS = (Column("lines", value="lines"), Column("time", "s", "duration_s", digits=3))
->>> console.print(Table("slowest", COLUMNS, regions))
-
 A table fits 80 columns: numbers stay whole, texts wrap between words, and a column without any entry is left out.
 """
 
@@ -120,7 +117,6 @@ class Table:
         return stream.getvalue().rstrip("\n")
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """How rich prints it."""
         from rich.text import Text
 
         # On lines of their own: rich would wrap them at the width of the table.
@@ -160,9 +156,7 @@ class Table:
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        table = RichTable(
-            box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0),
-        )  # fmt: skip
+        table = RichTable(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
         rows = self._texts(shown)
         widths = _widths(shown, rows, width)
         for column, place in zip(shown, widths, strict=True):

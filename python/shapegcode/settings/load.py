@@ -24,7 +24,6 @@ class KeyProblem(ValueError):
     """What a validator raises of a key that does not fit another one: found again in the file by its name."""
 
     def __init__(self, key: str, value: object, limit: str) -> None:
-        """Name the key, dotted, from the table of the validator on; its value; what it must be."""
         self.key = key
         self.value = value
         self.limit = limit

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_bytes, write_text
+from shapegcode.results.json import this_version
 from shapegcode.results.page.markup import json_script, light_sign, prose, section_of
 from shapegcode.results.page.model import Page, Script
 from shapegcode.results.page.scene import packed
@@ -71,7 +72,7 @@ def to_html(page: Page, script: Script = "inline") -> str:
 <meta http-equiv="Content-Security-Policy" content="{policy}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
-<meta name="generator" content="shapegcode {_version()}">
+<meta name="generator" content="{this_version()}">
 <meta name="referrer" content="no-referrer">
 <title>{escape(page.title)}</title>
 <style>{_assets(STYLES)}</style>
@@ -92,7 +93,7 @@ def to_html(page: Page, script: Script = "inline") -> str:
 <main>
 {body}
 </main>
-<footer><p>Made by shapegcode {_version()}. The numbers are those of the JSON that this file holds:
+<footer><p>Made by {this_version()}. The numbers are those of the JSON that this file holds:
 <button type="button" id="save-json" class="needs-script">Save the JSON</button></p></footer>
 {chr(10).join(scripts)}
 <script>{own}</script>
@@ -161,11 +162,6 @@ def _assets(names: tuple[str, ...]) -> str:
 def _own_ids() -> set[str]:
     own = {"top", "theme", "print", "save-json", "result", "scene-head", "scene-data", "plotly-data"}
     return own | set(re.findall(r'\bid="([^"]+)"', _asset("scene.html")))
-
-
-@cache
-def _version() -> str:
-    return metadata.version("shapegcode")
 
 
 def _hash(script: str) -> str:

@@ -29,6 +29,7 @@ from shapegcode.results.page.model import (
     Section,
     Text,
 )
+from shapegcode.results.plot import svg_text
 from shapegcode.results.table import NO_BREAK, Column, Table
 
 LIGHT_WORDS: dict[Light, str] = {
@@ -212,8 +213,6 @@ def _command(text: str) -> str:
 
 
 def _picture(picture: Picture, key: str) -> str:
-    from shapegcode.results.plot import svg_text
-
     name = escape(picture.name.replace("-", " "))
     svg = svg_text(picture.plot(), key, label=picture.name.replace("-", " "))
     how = f"<b>How to read this:</b> {prose(picture.how)}" if picture.how else name

@@ -180,7 +180,6 @@ class Thinner:
     """Takes samples piece by piece and keeps at most so many."""
 
     def __init__(self, scales: Mapping[str, float], most: int) -> None:
-        """Keep at most so many samples."""
         self._scales = scales
         self._most = most
         self._names: list[str] = []
@@ -283,7 +282,6 @@ class AccelerationSpectrum:
     """Welch's mean of the spectra of windows that overlap by half (P. D. Welch 1967), window of Hann."""
 
     def __init__(self, period_s: float) -> None:
-        """Of samples that are one period apart."""
         self._period_s = period_s
         self._length = max(2 * round(0.5 * _SEGMENT_S / period_s), 8)
         self._window = np.hanning(self._length + 1)[:-1]

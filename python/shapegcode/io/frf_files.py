@@ -1,14 +1,20 @@
-"""Reads frequency responses from text files with columns: frequency, real and imaginary part or magnitude and phase."""
+"""Reads frequency responses from text with columns, and from MATLAB files (versions 4 to 7, by SciPy)."""
 
 from __future__ import annotations
 
+import io
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from shapegcode.errors import RecordError
 from shapegcode.io.columns import Label, tap_label
+from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse, checked_lines, scale_of
 from shapegcode.io.layout import utf8_text
 from shapegcode.io.record import FloatArray, ReadOptions
@@ -178,3 +184,155 @@ def _polar(
         degrees = bool(np.ptp(phase) > 4.0 * np.pi)
         warnings.append(f"the phase has no unit: {'degrees' if degrees else 'radians'} are taken")
     return np.asarray(magnitude * np.exp(1j * (np.radians(phase) if degrees else phase)), dtype=np.complex128)
+
+
+_FREQUENCIES = ("f", "freq", "frequency", "freqs", "frequencies", "f_hz", "freq_hz", "hz")
+_ANGULAR = ("w", "omega", "om")
+_COHERENCES = ("coh", "coherence", "gamma2", "c")
+#: Runs in a process of its own, with limits: SciPy's reader crashes on damaged files, and takes what sizes they state.
+_READER = """
+import os, sys, io, warnings
+try:
+    import resource
+    size = os.fstat(0).st_size
+    resource.setrlimit(resource.RLIMIT_AS, (768 * 2**20 + 4 * size,) * 2)
+    resource.setrlimit(resource.RLIMIT_CPU, (6 + size // 2**20,) * 2)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+except ImportError:  # a system without limits
+    pass
+try:
+    import numpy as np
+    from scipy.io import loadmat
+    warnings.simplefilter("ignore")
+    held = {}
+    for name, value in loadmat(sys.stdin.buffer, squeeze_me=True, struct_as_record=False).items():
+        fields = getattr(value, "_fieldnames", None)
+        if not name.startswith("__"):
+            held |= {name: value} if fields is None else {field: getattr(value, field) for field in fields}
+    kinds = dict.fromkeys("biuf", "f8") | {"c": "c16", "U": str}
+    arrays = [np.asarray(value) for value in held.values()]
+    arrays = [
+        each.astype(kinds[each.dtype.kind]) if each.dtype.kind in kinds else np.array("no numbers") for each in arrays
+    ]
+    if sum(each.nbytes for each in arrays) > 200 * 2**20:
+        raise ValueError("its variables take more than 200 MB: save the frequency response alone")
+    stream = io.BytesIO()
+    np.savez(stream, *arrays, names=np.array(list(held), dtype=str))
+    sys.stdout.buffer.write(stream.getbuffer())
+except MemoryError:
+    sys.exit("its variables need too much memory")
+except Exception as error:  # SciPy raises what its parts do
+    sys.exit(str(error) or type(error).__name__)
+"""
+
+
+def is_mat(path: Path, head: bytes) -> bool:
+    """Whether it is a MATLAB file."""
+    return head[:6] == b"MATLAB" or path.suffix.lower() == ".mat"
+
+
+def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
+    """Read a frequency response from a MATLAB file: a vector of frequencies, a complex one of the response."""
+    held = _variables(path)
+    listed = ", ".join(f"{name} {_shape(value)}" for name, value in held.items()) or "nothing"
+    name = next((each for each in held if each.lower() in (*_FREQUENCIES, *_ANGULAR)), None)
+    if name is None:
+        raise RecordError(
+            f"{path}: no vector of frequencies (f, freq, frequency, or w in rad/s); the file holds {listed}"
+        )
+    frequency = np.ravel(np.asarray(held[name], dtype=np.float64))
+    if name.lower() in _ANGULAR:
+        frequency = frequency / (2.0 * np.pi)
+    found, response = _response(path, held, len(frequency), options, listed)
+    coherence = next(
+        (np.ravel(np.asarray(held[each], float)) for each in held if each.lower() in _COHERENCES and each != found),
+        None,
+    )
+    if coherence is not None and len(coherence) != len(frequency):
+        coherence = None
+    label = " ".join(str(value) for key, value in held.items() if isinstance(value, str) and "unit" in key.lower())
+    quantity, factor, warnings = scale_of(f"{path}: {found}", label or found, options)
+    frequency, response, coherence, notes = checked_lines(str(path), frequency, response, coherence)
+    return [
+        FrequencyResponse(
+            str(path), frequency, response * factor, quantity, coherence, options.axis, tuple(warnings), tuple(notes)
+        )
+    ]
+
+
+def _variables(path: Path) -> dict[str, Any]:
+    """The variables of the file; those of a structure by the names of their fields."""
+    with open_file(path) as file:
+        head = file.read(1024)
+        if b"MATLAB 7.3" in head[:128] or b"\x89HDF" in head:
+            raise RecordError(
+                f"{path}: a MATLAB file of version 7.3 (HDF5), which is not read: in MATLAB save it again with "
+                "save('file.mat', 'f', 'H', '-v7'), or export frequency, real and imaginary part as text"
+            )
+        file.seek(0)
+        # -P: no module of the folder in which the command happens to run.
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", _READER], stdin=file, capture_output=True, check=False, env=environment
+        )
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip()[-200:] if done.returncode > 0 else "it is damaged"
+        raise RecordError(f"{path}: the MATLAB file cannot be read: {said}")
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as held:
+        values = [held[f"arr_{rank}"] for rank in range(len(held.files) - 1)]
+        names = [str(name) for name in held["names"]]
+    return {
+        name: str(value[()]) if value.dtype.kind == "U" and value.ndim == 0 else value
+        for name, value in zip(names, values, strict=True)
+    }
+
+
+def _shape(value: Any) -> str:
+    if isinstance(value, str):
+        return repr(value)
+    array = np.asarray(value)
+    return f"({' x '.join(map(str, array.shape)) or '1'}{', complex' if np.iscomplexobj(array) else ''})"
+
+
+def _response(path: Path, held: dict[str, Any], lines: int, options: ReadOptions, listed: str) -> tuple[str, Any]:
+    """Name and values of the response."""
+    wanted = options.response_columns[0] if options.response_columns else None
+    if wanted is None:
+        complex_ones = [name for name, value in held.items() if np.iscomplexobj(value) and np.size(value) >= lines]
+        pairs = [(re_, im) for re_ in held for im in held if _is_pair(re_, im)]
+        if not complex_ones and len(pairs) == 1:
+            real, imaginary = (np.ravel(np.asarray(held[each], float)) for each in pairs[0])
+            if len(real) == len(imaginary) == lines:
+                return pairs[0][0], real + 1j * imaginary
+        if len(complex_ones) != 1:
+            what = "no complex variable" if not complex_ones else f"{len(complex_ones)} complex variables"
+            raise RecordError(
+                f"{path}: {what} of {lines} lines: name one with --response-column NAME (or NAME:2 for its 2nd "
+                f"column); the file holds {listed}"
+            )
+        wanted = complex_ones[0]
+    name, _, column = wanted.partition(":")
+    if name not in held or isinstance(held[name], str):
+        raise RecordError(f"{path}: --response-column {name!r}: no such variable; the file holds {listed}")
+    values = np.asarray(held[name], dtype=np.complex128)
+    if values.ndim == 1 and not column:
+        columns = values[:, None]
+    else:
+        columns = values if values.ndim == 2 and values.shape[0] == lines else values.reshape(-1, lines).T
+    if columns.shape[0] != lines:
+        raise RecordError(f"{path}: {name} has {values.size} values for {lines} frequencies: must be as many")
+    if not column and columns.shape[1] > 1:
+        raise RecordError(
+            f"{path}: {name} has {columns.shape[1]} columns: choose one with --response-column {name}:1 "
+            f"to {name}:{columns.shape[1]}"
+        )
+    number = int(column) if column.isdigit() else 1
+    if (column and not column.isdigit()) or not 1 <= number <= columns.shape[1]:
+        raise RecordError(f"{path}: --response-column {wanted}: {name} has columns 1 to {columns.shape[1]}")
+    return name, columns[:, number - 1]
+
+
+def _is_pair(real: str, imaginary: str) -> bool:
+    """Whether two names are of a real and an imaginary part: Re and Im, H_real and H_imag."""
+    one, other = re.sub(r"(?i)real|re", "@", real), re.sub(r"(?i)imag|im", "@", imaginary)
+    return real != imaginary and "@" in one and one == other
