@@ -12,13 +12,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode.characterization.air_tests import AXES, AirTest, Part
 from shapegcode.errors import ArgumentError
+from shapegcode.io.record import FloatArray
 from shapegcode.io.servo_log import ServoLog
 
-Array = npt.NDArray[np.float64]
 _HOLD_SHARE = 0.9
 _BEND_SHARE = 0.85
 _LONGEST_HOLD = 64
@@ -85,7 +84,7 @@ def bend_samples(logs: Sequence[ServoLog]) -> int:
     return best
 
 
-def ticks(log: ServoLog, bend: int) -> tuple[Array, Array]:
+def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
     """Times and positions, one for each interpolation period where that shows."""
     count, first = held_samples(log)
     if count == 1 and bend > 1:
@@ -109,7 +108,7 @@ def ticks(log: ServoLog, bend: int) -> tuple[Array, Array]:
 _PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
 _SHORTEST_BOX_S = 2e-5
 _STAMP = 0.03
-_MOST_SAMPLES = 1500
+_MAX_SAMPLES = 1500
 
 
 @dataclass(frozen=True)
@@ -117,11 +116,11 @@ class PartLog:
     """The samples of one part."""
 
     part: Part
-    times_s: Array
-    way_mm: Array  # way of the part's axis from its start, in the direction of the first move
+    times_s: FloatArray
+    way_mm: FloatArray  # way of the part's axis from its start, in the direction of the first move
     noise_mm: float  # standard deviation of a sample at rest
 
-    def middles_s(self) -> Array:
+    def middles_s(self) -> FloatArray:
         """The times at which a there-and-back part passes the middle of its way, (n,)."""
         length = abs(self.part.length_mm) * self.part.stride
         u = self.way_mm / length - 0.5
@@ -189,7 +188,7 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
     return out
 
 
-def smoothed_share(times: Array, boxes: Sequence[float] | Array) -> Array:
+def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
     """Share of the way at the times after the start, for a rectangle and moving averages of these lengths in s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power = len(used)
@@ -202,11 +201,11 @@ def smoothed_share(times: Array, boxes: Sequence[float] | Array) -> Array:
     return np.asarray(out / (math.factorial(power) * math.prod(used)))
 
 
-def lagged_share(times: Array, values: Array) -> Array:
+def lagged_share(times: FloatArray, values: FloatArray) -> FloatArray:
     """The same for a rectangle and an exponential: duration and time constant in s."""
     rectangle_s, lag_s = values
 
-    def ramp(t: Array) -> Array:
+    def ramp(t: FloatArray) -> FloatArray:
         late = np.maximum(t, 0.0)
         return np.asarray(late + lag_s * np.expm1(-late / lag_s))
 
@@ -217,14 +216,14 @@ def lagged_share(times: Array, values: Array) -> Array:
 class ShapeFit:
     """A curve fitted to the moves of a part."""
 
-    values: Array  # the fitted parameters, without the start
-    half: Array  # half-widths of their 95 % intervals
+    values: FloatArray  # the fitted parameters, without the start
+    half: FloatArray  # half-widths of their 95 % intervals
     rms_mm: float  # what the fit leaves
 
 
 def fit_shape(
     log: PartLog,
-    share: Callable[[Array, Array], Array],
+    share: Callable[[FloatArray, FloatArray], FloatArray],
     guess: Sequence[float],
     low: Sequence[float],
     high: Sequence[float],
@@ -242,10 +241,10 @@ def fit_shape(
         pieces_t.append(log.times_s[inside] - middle)
         pieces_y.append(way if k % 2 == 0 else 1.0 - way)
     t, y = np.concatenate(pieces_t), np.concatenate(pieces_y)
-    every = -(-len(t) // _MOST_SAMPLES)
+    every = -(-len(t) // _MAX_SAMPLES)
     t, y = t[::every], y[::every]
 
-    def residual(p: Array) -> Array:
+    def residual(p: FloatArray) -> FloatArray:
         return np.asarray((share(t - p[-1], p[:-1]) - y) * length)
 
     grid = np.linspace(0.0, 2.0, 20001)

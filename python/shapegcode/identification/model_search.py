@@ -6,7 +6,7 @@ only the last digits need) to them or to what is left of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -16,23 +16,24 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.errors import RecordError
 from shapegcode.identification.frf_model import FrfFit
+from shapegcode.identification.result import ChartPole
 
-FloatArray = npt.NDArray[np.float64]
 Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 
 # A further mode must explain this share of the response's energy: sensors are not linear beyond .1 % of amplitude.
-_LEAST_SHARE = 1e-6
+_MIN_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
-_PEAKS = 2  # of the residual's spectrum that are tried
+PEAKS = 2  # of the residual's spectrum that are tried
 _TWINS = 0.25  # of the half width of a resonance
+_STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of the chart: the model one order lower has the pole too
 _APART = np.pi  # rad: two modes must come half a turn apart in the record
 _CHART_ORDERS = 20  # of the stabilisation chart
 _SAME_PLACE = 0.2  # of the half width of a resonance: two poles of the chart are one start
 _SAME_DAMPING = 0.2  # and in the logarithm of their damping
-_MOST_DAMPING = 0.7  # of a pole to begin with
-# Two models in a row that the data do not ask for end the search: one may only have missed its place.
-_PATIENCE = 2
+_MAX_DAMPING = 0.7  # of a pole to begin with
+_PATIENCE = 2  # Two models in a row that the data do not ask for end the search: one may only have missed its place
 
 
 Fit = _core.ModalFit | _core.DecayFit | FrfFit
@@ -41,34 +42,45 @@ Fit = _core.ModalFit | _core.DecayFit | FrfFit
 class FitProblem(Protocol):
     """Records of one point, over time or over frequency."""
 
+    # ruff: noqa: D102
     @property
-    def squares(self) -> float: ...  # noqa: D102
+    def squares(self) -> float: ...
     @property
-    def samples(self) -> int: ...  # noqa: D102
+    def samples(self) -> int: ...
     @property
-    def constants(self) -> int: ...  # noqa: D102
+    def constants(self) -> int: ...
     @property
-    def duration_s(self) -> float: ...  # noqa: D102
+    def duration_s(self) -> float: ...
     @property
-    def period_s(self) -> float: ...  # noqa: D102
+    def period_s(self) -> float: ...
     @property
-    def band_hz(self) -> tuple[float, float]: ...  # noqa: D102
+    def band_hz(self) -> tuple[float, float]: ...
     @property
-    def white_share(self) -> float: ...  # noqa: D102
+    def white_share(self) -> float: ...
     @property
-    def chart_orders(self) -> int: ...  # noqa: D102
+    def chart_orders(self) -> int: ...
+    def fit(self, starts: Starts) -> Fit: ...
+    def fit_quickly(self, starts: Starts) -> Fit: ...
+    def fit_left(self, starts: Starts, last: Fit | None) -> Fit: ...
+    def peaks_left(self, last: Fit | None) -> Sequence[float]: ...
+    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]: ...
+    def rank(self, candidates: Starts, kept: int) -> Sequence[int]: ...
 
-    def fit(self, starts: Starts) -> Fit: ...  # noqa: D102
 
-    def fit_quickly(self, starts: Starts) -> Fit: ...  # noqa: D102
+@dataclass(frozen=True)
+class Sought:
+    """What is looked for."""
 
-    def fit_left(self, starts: Starts, last: Fit | None) -> Fit: ...  # noqa: D102
+    band_hz: tuple[float, float] | None  # frequencies of interest; None: all
+    most_modes: int
+    modes: int | None  # their number; None: by evidence
+    accepted_percent: float  # see `identify.identify`
 
-    def peaks_left(self, last: Fit | None, most: int) -> Sequence[float]: ...  # noqa: D102
-
-    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]: ...  # noqa: D102
-
-    def rank(self, candidates: Starts, kept: int) -> Sequence[int]: ...  # noqa: D102
+    def order(self, models: Search) -> int:
+        """Number of modes that is taken; refused where the data hold fewer than were asked for."""
+        if self.modes is not None and len(models.fits) < self.modes:
+            raise RecordError(f"{self.modes} modes are asked for, and the data hold no more than {len(models.fits)}")
+        return self.modes or models.order
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,61 +99,65 @@ class Search:
         return int(np.argmin(self.evidence))
 
 
-def search(problem: FitProblem, most_modes: int) -> Search:
+def search(problem: FitProblem, sought: Sought) -> Search:
     """Fit models of 0, 1, 2, ... modes until the data ask for no more."""
-    squares, share = problem.squares, problem.white_share
-    evidence = [evidence_of_none(problem)]
+    squares = problem.squares
+    evidence = [evidence_of(problem, None)]
     fits: list[Fit] = []
     pool = _pool(problem)
-    while len(fits) < most_modes:
+    while len(fits) < (sought.modes or sought.most_modes):
         best = _next_fit(problem, fits[-1] if fits else None, pool)
         if best is None:
             break
         explained = (fits[-1].sum_of_squares if fits else squares) - best.sum_of_squares
-        if explained < _LEAST_SHARE * squares:
+        if explained < _MIN_SHARE * squares:
             break
         fits.append(best)
-        evidence.append(evidence_of(best, share))
+        evidence.append(evidence_of(problem, best))
         if len(fits) - int(np.argmin(evidence)) >= _PATIENCE:
             break
     return Search(tuple(fits), tuple(evidence))
 
 
-def evidence_of_none(problem: FitProblem) -> float:
-    """Evidence of a model without modes."""
-    return _evidence(problem.squares, problem.white_share * problem.samples, problem.constants, 0)
-
-
-def evidence_of(fit: Fit, white_share: float) -> float:
-    """Evidence of a fit, as in `Search.evidence`."""
-    return _evidence(fit.sum_of_squares, white_share * fit.samples, fit.parameters, len(fit.omega_rad_s))
-
-
-def _evidence(squares: float, samples: float, parameters: int, modes: int) -> float:
-    tiny = np.finfo(float).tiny
+def evidence_of(problem: FitProblem, fit: Fit | None) -> float:
+    """Evidence of a fit, as in `Search.evidence`; None: of a model without modes."""
+    squares, count, parameters, modes = problem.squares, problem.samples, problem.constants, 0
+    if fit is not None:
+        squares, count, parameters = fit.sum_of_squares, fit.samples, fit.parameters
+        modes = len(fit.omega_rad_s)
+    samples, tiny = problem.white_share * count, np.finfo(float).tiny
     return float(samples * np.log(max(squares / samples, tiny)) + (parameters + modes) * np.log(samples))
 
 
-def chart_poles(problem: FitProblem) -> Sequence[npt.NDArray[np.complex128]]:
-    """Poles of the models of a stabilisation chart, by number of modes from 1."""
-    return problem.poles(max(1, min(_CHART_ORDERS, problem.chart_orders)))
+def _chart_modes(problem: FitProblem) -> Iterator[Starts]:
+    """Modes of the models of a stabilisation chart, by number of modes from 1."""
+    for poles in problem.poles(max(1, min(_CHART_ORDERS, problem.chart_orders))):
+        omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
+        yield list(zip(map(float, omega), map(float, zeta), strict=True))
+
+
+def stabilisation_chart(problem: FitProblem) -> tuple[ChartPole, ...]:
+    """Poles of models with 1, 2, ... modes, each held against the model one order lower."""
+    chart: list[ChartPole] = []
+    before: Starts = []
+    for order, now in enumerate(_chart_modes(problem), start=1):
+        for w, z in now:
+            near = [(wb, zb) for wb, zb in before if abs(w / wb - 1.0) <= _STABLE_FREQUENCY]
+            damped_alike = any(abs(z - zb) <= _STABLE_DAMPING * zb for _, zb in near)
+            chart.append(ChartPole(order, w / (2.0 * np.pi), z, bool(near), damped_alike))
+        before = now
+    return tuple(chart)
 
 
 def _pool(problem: FitProblem) -> Starts:
-    """Poles of the stabilisation chart that lie in the band: each mode is among them several times."""
+    """Poles of the stabilisation chart that lie in the band, each mode once, as the models of higher order have it."""
     low, high = problem.band_hz
-    found: Starts = []
-    for of_model in chart_poles(problem):
-        omega, zeta = _core.poles_to_modes(list(of_model), problem.period_s)
-        found += [(w, z) for w, z in zip(map(float, omega), map(float, zeta), strict=True) if z < _MOST_DAMPING]
-    return _apart([(w, z) for w, z in found if low <= w / (2.0 * np.pi) <= high])
-
-
-def _apart(found: Starts) -> Starts:
-    """Those that are no repetition of another one: of models of higher order, which know the weak modes too."""
     kept: Starts = []
-    for w, z in reversed(found):
-        if not any(abs(w - v) < _SAME_PLACE * min(z, y) * w and abs(np.log(z / y)) < _SAME_DAMPING for v, y in kept):
+    for w, z in reversed([mode for modes in _chart_modes(problem) for mode in modes]):
+        inside = z < _MAX_DAMPING and low <= w / (2.0 * np.pi) <= high
+        if inside and not any(
+            abs(w - v) < _SAME_PLACE * min(z, y) * w and abs(np.log(z / y)) < _SAME_DAMPING for v, y in kept
+        ):
             kept.append((w, z))
     return kept
 
@@ -153,7 +169,7 @@ def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None
     """
     so_far = [] if last is None else starts_of(last)
     candidates: list[Starts] = []
-    for omega in problem.peaks_left(last, _PEAKS):
+    for omega in problem.peaks_left(last):
         alone = [_attempt(partial(problem.fit_left, [(omega, zeta)], last)) for zeta in _START_DAMPING]
         usable = [fit for fit in alone if fit is not None]
         if usable:

@@ -3,52 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy import stats
 
 from shapegcode import _core
-from shapegcode.identification.mode import Estimate
 from shapegcode.identification.model_search import Fit
-
-FloatArray = npt.NDArray[np.float64]
+from shapegcode.identification.result import Estimate, IdentifiedMode
+from shapegcode.io.record import FloatArray
 
 #: A damping ratio or stiffness less certain than this is refused: 10 % are then four standard deviations off.
 ACCEPTED_PERCENT = 5.0
 _FREQUENCY_PERCENT = 2.0
 _NOT_AT_ALL_PERCENT = 1000.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
-#: Swings of a mode in the record: fewer do not tell its frequency.
-LEAST_SWINGS = 2.0
+MIN_SWINGS = 2.0  # Swings of a mode in the record: fewer do not tell its frequency
 #: What has not fallen to this share at the end of the record does not decay: mains hum, a pump, a turning spindle.
 _LASTING = 0.8
 #: A model with one mode more counts as a rival while it fits better by more than chance alone does in one case of 20.
 _RIVAL_PROBABILITY = 0.05
 _UNKNOWN = 7.0  # half width of a logarithm that says nothing: a factor of a thousand
 _SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """One mode of a fit. SI units; the last three are None for a free decay."""
-
-    frequency_hz: Estimate  # undamped natural frequency
-    damping_ratio: Estimate  # no unit
-    mass_kg: Estimate | None  # equivalent mass
-    damping_n_s_per_m: Estimate | None  # equivalent viscous damping
-    stiffness_n_per_m: Estimate | None  # equivalent stiffness
-    opposed: bool = False  # the residue is negative: the mode moves against the push
-
-
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """Another model that the data do not clearly refuse."""
-
-    fit: Fit  # of the same records
-    condition: str  # under which it would be the right one
-    remedy: str  # what would decide
+_VALUES = ("frequency_hz", "damping_ratio", "mass_kg", "damping_n_s_per_m", "stiffness_n_per_m")
+_OPPOSED = "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +36,7 @@ class Doubts:
     limit_percent: float  # least certainty of damping ratio and stiffness
     band_hz: tuple[float, float]  # frequencies that were searched
     record_s: float  # length of the longest record
-    rivals: Sequence[Rival] = ()  # models of nearly the same evidence
+    rival: Fit | None = None  # another model of nearly the same evidence
     aliased: Callable[[float], float] = lambda _hz: 0.0  # see `estimates_of`
 
 
@@ -69,8 +47,8 @@ def estimates_of(
     aliased: Callable[[float], float] = lambda _hz: 0.0,
     white_share: float = 1.0,
     least: tuple[float, float] = (0.0, 0.0),
-) -> list[Estimates]:
-    """Values and 95 % intervals of each mode of a fit.
+) -> list[IdentifiedMode]:
+    """Values and 95 % intervals of each mode of a fit; one that moves against the push has that as its refusal.
 
     The intervals are those of the fit's covariance, in logarithms. Where taps differ by more than that explains, their
     scatter takes its place. What the force does between its samples is not known to the covariance: the intervals
@@ -94,10 +72,8 @@ def estimates_of(
             Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
             for value, half in zip(np.exp(row.values), np.minimum(spread, _UNKNOWN), strict=True)
         ]
-        if len(values) == 2:
-            found.append(Estimates(values[0], values[1], None, None, None))
-        else:
-            found.append(Estimates(values[0], values[1], values[2], values[3], values[4], row.opposed))
+        named = dict(zip(_VALUES, values, strict=False))
+        found.append(IdentifiedMode(**named, refusal=_OPPOSED if row.opposed else ""))
     return found
 
 
@@ -148,36 +124,38 @@ def _scatter(taps: Sequence[_Logarithms], white_share: float) -> FloatArray:
     return np.where(more, half, 0.0)
 
 
-def rivals_of(order: int, fits: Sequence[Fit], white_share: float) -> list[Rival]:
-    """Models beside the chosen one that the data do not clearly refuse.
-
-    That is the one with a mode more, if chance alone would seldom make it fit so much better.
-    """
-    chosen = fits[order - 1]
+def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
+    """The model with a mode more than the chosen one, if chance alone would seldom make it fit so much better."""
     if len(fits) <= order:
-        return []
-    larger = fits[order]
-    gain = (
-        white_share * chosen.samples * np.log(chosen.sum_of_squares / max(larger.sum_of_squares, np.finfo(float).tiny))
-    )
-    if gain <= stats.chi2.ppf(1.0 - _RIVAL_PROBABILITY, larger.parameters - chosen.parameters):
-        return []
-    return [Rival(larger, "with one mode more in the model", "more taps or less noise")]
+        return None
+    chosen, larger = fits[order - 1 : order + 1]
+    better = chosen.sum_of_squares / max(larger.sum_of_squares, np.finfo(float).tiny)
+    gain = white_share * chosen.samples * np.log(better)
+    by_chance = stats.chi2.ppf(1.0 - _RIVAL_PROBABILITY, larger.parameters - chosen.parameters)
+    return larger if gain > by_chance else None
 
 
-def is_background(mode: Estimates, doubts: Doubts) -> bool:
-    """Whether a part of the model is drift or lies outside the band: it helps the fit, and is no mode to speak of."""
+def judged_modes(modes: Sequence[IdentifiedMode], doubts: Doubts) -> list[IdentifiedMode]:
+    """The modes of a fit by ascending frequency, each with its refusal where there is one.
+
+    Drift, and what lies outside the band, helps the fit and is left out: no mode to speak of.
+    """
     low, high = doubts.band_hz
-    return mode.damping_ratio.value > _NO_VIBRATION or not low <= mode.frequency_hz.value <= high
+    found = [
+        replace(mode, refusal=_refusal_of(mode, doubts))
+        for mode in modes
+        if mode.damping_ratio.value <= _NO_VIBRATION and low <= mode.frequency_hz.value <= high
+    ]
+    return sorted(found, key=lambda mode: mode.frequency_hz.value)
 
 
-def refusal_of(mode: Estimates, doubts: Doubts) -> str:
+def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
     """Why the data do not support a mode; empty if they do."""
     frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
-    if frequency.value * doubts.record_s < LEAST_SWINGS:
+    if frequency.value * doubts.record_s < MIN_SWINGS:
         return (
             f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
-            f"{LEAST_SWINGS:g} or more are needed"
+            f"{MIN_SWINGS:g} or more are needed"
         )
     lasting = float(np.exp(-2.0 * np.pi * frequency.value * damping.value * doubts.record_s))
     if lasting > _LASTING:
@@ -203,24 +181,18 @@ def refusal_of(mode: Estimates, doubts: Doubts) -> str:
             if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:
                 known = "not at all"
             return f"{name} is known {known} (limit {limit:g} %): more taps, a longer record or less noise"
-    if mode.opposed:
-        return "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
-    return _rival_refusal(mode, doubts)
-
-
-def _rival_refusal(mode: Estimates, doubts: Doubts) -> str:
-    for rival in doubts.rivals:
-        # A rival that splits the mode in two or lacks it disagrees as much as one can.
-        rows = [_logarithms(rival.fit, i) for i in range(len(rival.fit.omega_rad_s))]
-        nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(mode.frequency_hz.value)))
-        named = [("frequency", mode.frequency_hz, 0), ("damping ratio", mode.damping_ratio, 1)]
-        if mode.stiffness_n_per_m is not None:
-            named.append(("stiffness", mode.stiffness_n_per_m, 4))
-        for name, estimate, index in named:
+    if mode.refusal or doubts.rival is None:
+        return mode.refusal
+    # A rival that splits the mode in two or lacks it disagrees as much as one can.
+    rows = [_logarithms(doubts.rival, i) for i in range(len(doubts.rival.omega_rad_s))]
+    nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(frequency.value)))
+    for (name, estimate, _), index in zip(limits, (0, 1, 4), strict=True):
+        change = 0.0
+        if estimate is not None:
             change = 100.0 * abs(float(np.expm1(nearest.values[index] - np.log(estimate.value))))
-            if change > doubts.limit_percent:
-                return (
-                    f"{name} would change by {change:.0f} % {rival.condition}, which the data cannot decide "
-                    f"(limit {doubts.limit_percent:g} %): {rival.remedy}"
-                )
+        if change > doubts.limit_percent:
+            return (
+                f"{name} would change by {change:.0f} % with one mode more in the model, which the data cannot decide "
+                f"(limit {doubts.limit_percent:g} %): more taps or less noise"
+            )
     return ""

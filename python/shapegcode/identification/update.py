@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from shapegcode.errors import ArgumentError, MachineError
-from shapegcode.identification.mode import IdentifiedMode
 from shapegcode.identification.mode_tables import ModeTables
-from shapegcode.identification.other_axes import decide_axes, open_modes, require_decisions
-from shapegcode.identification.result import Identification, MachineFile
-from shapegcode.machine import Machine
+from shapegcode.identification.result import Identification, IdentifiedMode, MachineFile
+from shapegcode.machine import Machine, check_axes
 from shapegcode.settings.load import read_text
+from shapegcode.settings.remarks import with_remarks
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class MachineUpdate:
 
 
 def update_machine(path: str | Path, found: Identification, *, keep_modes: str = "", rigid: str = "") -> MachineUpdate:
-    """A machine file with the modes of an identification in it; see `update_machine_file`.
+    """A machine file with the modes of an identification in it.
 
     Args:
         path: of the machine file, which is not touched.
@@ -56,43 +56,22 @@ def update_machine(path: str | Path, found: Identification, *, keep_modes: str =
         The text to write, what it says, and notes of what changed.
 
     Raises:
-        ArgumentError: no axis; see `update_machine_file` too.
+        ArgumentError: no axis, no mode that the data support, or a built-in machine.
         MachineError: the file is bad, or would be.
         OSError: it cannot be read.
     """
     if found.axis is None:
         raise ArgumentError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
-    return update_machine_file(
-        path,
-        found.axis,
-        found.modes,
-        source=found.source,
-        refused=found.refused,
-        keep_modes=keep_modes,
-        rigid=rigid,
-    )
-
-
-def update_machine_file(
-    path: str | Path,
-    axis: str,
-    modes: Sequence[IdentifiedMode],
-    *,
-    source: str,
-    refused: Sequence[IdentifiedMode] = (),
-    keep_modes: str = "",
-    rigid: str = "",
-) -> MachineUpdate:
-    """Read a machine file and put identified modes into it; see `update_modes`. The file itself is not touched."""
     check_updatable(path)
     text = read_text(Path(path), MachineError)
     return update_modes(
-        text, axis, modes, source=source, refused=refused, keep_modes=keep_modes, rigid=rigid, file=str(path)
-    )
+        text, found.axis, found.modes, source=found.source, refused=found.refused, keep_modes=keep_modes, rigid=rigid,
+        file=str(path),
+    )  # fmt: skip
 
 
 def check_updatable(path: str | Path) -> Machine:
-    """Tell before the work what would make `update_machine_file` fail whatever the modes."""
+    """Tell before the work what would make `update_machine` fail whatever the modes."""
     if isinstance(path, str) and path in Machine.builtin_names():
         raise ArgumentError(
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "
@@ -146,3 +125,52 @@ def _unknown(machine: Machine) -> Iterator[str]:
     if names:
         letters = "".join(names)
         yield f"no mode of {', '.join(names)} is known: tap, or say --rigid {letters}; until then taken as rigid"
+
+
+_KEPT = ", kept"
+_ORIGIN = re.compile(r"^(from [^:]*|assumed|not known|not measured)")
+
+
+def open_modes(machine: Machine, measured: str | None) -> dict[str, str]:
+    """Modes of the other axes that nobody measured on this machine, and over which nobody decided."""
+    found: dict[str, list[str]] = {}
+    for value in machine.values():
+        parts = value.key.split(".")
+        is_mode = parts[:1] == ["axes"] and parts[2:3] == ["modes"] and parts[-1] == "frequency_hz"
+        if is_mode and parts[1] != measured and value.unmeasured and _KEPT not in value.remark:
+            found.setdefault(parts[1], []).append(f"{value.value} Hz ({value.remark})")
+    return {axis: ", ".join(modes) for axis, modes in found.items()}
+
+
+def require_decisions(open_axes: Mapping[str, str], keep: str, rigid: str, file: str) -> None:
+    """Refuse modes over which nobody decided."""
+    check_axes(keep, rigid)
+    undecided = {axis: modes for axis, modes in open_axes.items() if axis not in keep + rigid}
+    if undecided:
+        said = "; ".join(f"{axis.upper()}: {modes}" for axis, modes in undecided.items())
+        letters = "".join(undecided).upper()
+        raise ArgumentError(
+            f"{file}: modes that were not measured on this machine would stay, and make shapers longer: {said}. "
+            f"--keep-modes {letters} keeps them (until they are tapped), --rigid {letters} takes them out"
+        )
+
+
+def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[str]]:
+    """Take the modes of rigid axes out of a file, and say of kept ones that they are."""
+    notes: list[str] = []
+    for axis in rigid:
+        tables = ModeTables(text, axis, "", file)
+        text = tables.make_rigid()
+        notes += [f"{axis.upper()}: {note}" for note in tables.notes]
+
+    def remark(key: str, said: str) -> str:
+        parts = key.split(".")
+        frequency = parts[:1] == ["axes"] and parts[1] in keep and parts[-1] == "frequency_hz"
+        if not frequency or _KEPT in said:
+            return said
+        marked = _ORIGIN.sub(rf"\1{_KEPT}", said)
+        if marked != said:
+            notes.append(f"{parts[1].upper()}: kept, though not measured here ({said})")
+        return marked
+
+    return with_remarks(text, remark), notes

@@ -12,25 +12,24 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import nnls
 
 from shapegcode.errors import ArgumentError
+from shapegcode.io.record import FloatArray
 from shapegcode.testcut.cut import COEFFICIENTS, CuttingLaw, CutTool
 from shapegcode.testcut.forces import ForceModel, MeanForces, Thickness, chips_mm
 
-Array = npt.NDArray[np.float64]
-
-#: The thickest mean chip over the thinnest; below it exponents are not told apart from factors.
-LEAST_CHIP_RATIO = 1.5
-#: The same of the feeds, for edge forces.
-LEAST_FEED_RATIO = 1.3
+MIN_CHIP_RATIO = 1.5  # The thickest mean chip over the thinnest; below it exponents are not told apart from factors
+MIN_FEED_RATIO = 1.3  # The same of the feeds, for edge forces
 _ROUNDS = 6
 _HUBER = 2.5
 _OUTLIER = 4.0
-_LEAST_OUTLIER = 0.02
+_MIN_OUTLIER = 0.02
 _LARGEST_SHARE_OUT = 0.25
 _DONE = 1e-7
 _SETTLED = 1e-4
-_MOST_STEPS = 40
+_MAX_STEPS = 40
+_LARGEST_STEPS = np.array([1.0, 0.5, 1.0, 0.5, 1e3, 1e3])
 
 _UNITS = ("N/mm²", "", "", "", "N/mm", "N/mm")  # of COEFFICIENTS
 
@@ -63,10 +62,10 @@ class CoefficientFit:
     middle_chip_mm: float  # geometric mean of the mean chip thicknesses
     # k1 in N/mm² and k2 there: much better known than the factors, which are those of a chip of 1 mm
     at_chip: tuple[Coefficient, ...]
-    chip_mm: Array  # (n,) mean chip thickness of each row
-    predicted_n: Array  # (n, 2) mean force of the fit
+    chip_mm: FloatArray  # (n,) mean chip thickness of each row
+    predicted_n: FloatArray  # (n, 2) mean force of the fit
     outlier: npt.NDArray[np.bool_]  # (n,) rows that were left out, as their force is not that of the others
-    rms_n: Array  # (2,) root mean square of what the fit leaves of the others, along the feed and to its left
+    rms_n: FloatArray  # (2,) root mean square of what the fit leaves of the others, along the feed and to its left
     rms_percent: float  # the same, of both, as a share of the resultant
     correlation: float  # how far neighbours share what the fit leaves, 0 to 1; the intervals allow for it
 
@@ -118,11 +117,11 @@ def fit_coefficients(
     )
 
 
-def _outliers(measured: Array, left: Array, noise: Array) -> npt.NDArray[np.bool_]:
+def _outliers(measured: FloatArray, left: FloatArray, noise: FloatArray) -> npt.NDArray[np.bool_]:
     """(n,) rows whose force is not that of the others."""
     # Noise may be so small that the law itself is off by more than it: that alone makes no outlier.
     size = np.linalg.norm(measured, axis=1)[:, None]
-    outlier = np.any((np.abs(left) > _OUTLIER * noise) & (np.abs(left) > _LEAST_OUTLIER * size), axis=1)
+    outlier = np.any((np.abs(left) > _OUTLIER * noise) & (np.abs(left) > _MIN_OUTLIER * size), axis=1)
     if outlier.mean() > _LARGEST_SHARE_OUT:
         raise ArgumentError(
             f"{100 * outlier.mean():.0f} % of the forces do not follow one law: was the tool worn, did it chatter, or "
@@ -131,7 +130,7 @@ def _outliers(measured: Array, left: Array, noise: Array) -> npt.NDArray[np.bool
     return np.asarray(outlier)
 
 
-def _check(data: MeanForces, chip: Array, count: int, edge: bool) -> None:
+def _check(data: MeanForces, chip: FloatArray, count: int, edge: bool) -> None:
     rows = len(chip)
     if rows < 2 * count:
         raise ArgumentError(f"{rows} mean forces are too few for {count} coefficients: needed are {2 * count} or more")
@@ -139,20 +138,20 @@ def _check(data: MeanForces, chip: Array, count: int, edge: bool) -> None:
         raise ArgumentError("some forces belong to places where the tool meets nothing: leave them out")
     low, high = float(chip.min()), float(chip.max())
     feeds = np.unique(np.round(data.feed_mm_per_min, 3))
-    if high / low < LEAST_CHIP_RATIO:
+    if high / low < MIN_CHIP_RATIO:
         raise ArgumentError(
             f"the exponents cannot be told: the mean chip is {low * 1e3:.2f} to {high * 1e3:.2f} um thick, a ratio of "
-            f"{high / low:.2f}, and must have one of {LEAST_CHIP_RATIO:g} or more: let the radial depth grow from "
+            f"{high / low:.2f}, and must have one of {MIN_CHIP_RATIO:g} or more: let the radial depth grow from "
             "0.05 D to 0.35 D (ratio 2.7), or add passes with other feeds"
         )
-    if edge and feeds.max() / feeds.min() < LEAST_FEED_RATIO:
+    if edge and feeds.max() / feeds.min() < MIN_FEED_RATIO:
         raise ArgumentError(
             f"edge forces cannot be told from the exponents at feeds from {feeds.min():g} to {feeds.max():g} mm/min: "
-            f"measure with feeds of a ratio of {LEAST_FEED_RATIO:g} or more, better 3"
+            f"measure with feeds of a ratio of {MIN_FEED_RATIO:g} or more, better 3"
         )
 
 
-def _start(model: ForceModel, data: MeanForces, count: int) -> Array:
+def _start(model: ForceModel, data: MeanForces, count: int) -> FloatArray:
     """Constant k1 and k2 that fit best: with exponent 0 the force is linear in k1 and k1 k2."""
     along = model.forces_of(CuttingLaw(1.0, chip_thickness=model.thickness))
     across = model.forces_of(CuttingLaw(1.0, ratio=1.0, chip_thickness=model.thickness)) - along
@@ -170,22 +169,22 @@ def _start(model: ForceModel, data: MeanForces, count: int) -> Array:
     return start
 
 
-def _solved(model: ForceModel, start: Array, weights: Array) -> tuple[Array, Array, Array]:
+def _solved(model: ForceModel, start: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Levenberg-Marquardt steps to the weighted least squares: parameters, what they leave, slopes."""
     root = np.sqrt(weights).ravel()
     parameters = start
     predicted = model.forces(parameters)
     left = model.measured - predicted
     error = float(np.sum((root * left.ravel()) ** 2))
-    damping = 1e-3
+    damping, largest = 1e-3, _LARGEST_STEPS[: len(start)]
     slopes = model.slopes(parameters, predicted)
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         weighted = slopes * root[:, None]
         scale = np.linalg.norm(weighted, axis=0)
         matrix = np.vstack([weighted, np.diag(math.sqrt(damping) * scale)])
         step, *_ = np.linalg.lstsq(matrix, np.concatenate([root * left.ravel(), np.zeros(len(start))]), rcond=None)
         # A law whose force does not grow with the chip is none.
-        moved = parameters + np.clip(step, -_largest_step(len(start)), _largest_step(len(start)))
+        moved = parameters + np.clip(step, -largest, largest)
         moved[1], moved[3] = max(moved[1], -0.9), max(moved[3], -0.95 - moved[1])
         moved[4:] = np.maximum(moved[4:], 0.0)
         new = model.forces(moved)
@@ -205,11 +204,11 @@ def _solved(model: ForceModel, start: Array, weights: Array) -> tuple[Array, Arr
     return parameters, left, slopes
 
 
-def _largest_step(count: int) -> Array:
+def _largest_step(count: int) -> FloatArray:
     return np.array([1.0, 0.5, 1.0, 0.5, 1e3, 1e3])[:count]
 
 
-def _covariance(slopes: Array, left: Array, weights: Array, correlation: float) -> Array:
+def _covariance(slopes: FloatArray, left: FloatArray, weights: FloatArray, correlation: float) -> FloatArray:
     weighted = slopes * np.sqrt(weights).ravel()[:, None]
     free = int((weights > 0.0).sum()) - slopes.shape[1]
     square = float(np.sum(weights * left**2)) / max(free, 1)
@@ -218,7 +217,7 @@ def _covariance(slopes: Array, left: Array, weights: Array, correlation: float) 
     return np.asarray(inner / np.outer(scale, scale) * square * (1.0 + correlation) / (1.0 - correlation))
 
 
-def _of_place(model: ForceModel, parameters: Array, slopes: Array, weights: Array) -> Array:
+def _of_place(model: ForceModel, parameters: FloatArray, slopes: FloatArray, weights: FloatArray) -> FloatArray:
     """Covariance that comes from not knowing exactly where the tool was in each group."""
     data, count = model.data, len(parameters)
     found = np.zeros((count, count))
@@ -236,7 +235,7 @@ def _of_place(model: ForceModel, parameters: Array, slopes: Array, weights: Arra
 
 
 def _with_intervals(
-    model: ForceModel, parameters: Array, covariance: Array, free: int, chip_mm: float
+    model: ForceModel, parameters: FloatArray, covariance: FloatArray, free: int, chip_mm: float
 ) -> tuple[Coefficient, ...]:
     """Values with their intervals; the factors k1 and k2 at a chip thickness."""
     from scipy.stats import t as student
@@ -262,7 +261,7 @@ _MEDIAN = 0.4549
 _LARGEST_CORRELATION = 0.95
 
 
-def noise_of(left: Array, predicted: Array, revolutions: Array, robust: Array) -> Array:
+def noise_of(left: FloatArray, predicted: FloatArray, revolutions: FloatArray, robust: FloatArray) -> FloatArray:
     """Standard deviation of each value: a constant and a share of the value, as the residuals show them."""
     found = np.empty_like(left)
     many = revolutions / float(np.mean(revolutions))
@@ -274,7 +273,7 @@ def noise_of(left: Array, predicted: Array, revolutions: Array, robust: Array) -
         observed = robust[:, k] * left[:, k] ** 2 * many
         for _ in range(4):
             weight = 1.0 / np.maximum(level, 1e-300)
-            constant, share = _not_negative(columns * weight[:, None], observed * weight)
+            constant, share = nnls(columns * weight[:, None], observed * weight)[0]
             level = constant + share * square
             level = np.maximum(level, 1e-4 * float(level.max()) + 1e-300)
         # The median is not moved by outliers; of squares of a normal variable it is _MEDIAN of the mean.
@@ -283,17 +282,7 @@ def noise_of(left: Array, predicted: Array, revolutions: Array, robust: Array) -
     return found
 
 
-def _not_negative(matrix: Array, right: Array) -> tuple[float, float]:
-    """Least squares with two unknowns, none below 0."""
-    both, *_ = np.linalg.lstsq(matrix, right, rcond=None)
-    if both.min() >= 0.0:
-        return float(both[0]), float(both[1])
-    alone = [max(float(column @ right) / float(column @ column), 0.0) for column in matrix.T]
-    errors = [float(np.sum((right - value * column) ** 2)) for value, column in zip(alone, matrix.T, strict=True)]
-    return (alone[0], 0.0) if errors[0] <= errors[1] else (0.0, alone[1])
-
-
-def neighbour_correlation(scaled: Array, group: npt.NDArray[np.intp], outlier: npt.NDArray[np.bool_]) -> float:
+def neighbour_correlation(scaled: FloatArray, group: npt.NDArray[np.intp], outlier: npt.NDArray[np.bool_]) -> float:
     """Correlation of neighbours within each group, of what the fit leaves; not below 0."""
     pairs = (group[1:] == group[:-1]) & ~outlier[1:] & ~outlier[:-1]
     if pairs.sum() < 8:

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import ArgumentError
+from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.testcut.cut import (
     FIGURES,
@@ -23,16 +23,18 @@ from shapegcode.testcut.cut import (
     CutTool,
     DeeperStretch,
     Deepest,
+    Edge,
     IntervalDetails,
     MeasuringPass,
     TaperDetails,
     TestCut,
+    offset_line,
+    reduced,
+    unrolled_edge,
 )
-from shapegcode.testcut.edges import Edge, left_edge, reduced, tool_path, unrolled_edge
 from shapegcode.testcut.forces import ForceLaw, engagement, straight_engagement
 from shapegcode.testcut.result import CutDesign
 
-Array = npt.NDArray[np.float64]
 _Sizes = tuple[float, float, float]  # of a corner: allowance, rough and finish radius
 _Block = tuple[float | None, float]  # X up to which a feed holds (None: the end of the pass), feed in mm/min
 
@@ -164,7 +166,7 @@ def taper_cut(
         raise ArgumentError(
             f"{length_mm:g} mm are too short for a taper of {high - low:g} mm: at least 5 times as long"
         )
-    edge = Edge(np.array([0.0, length_mm]), np.array([_rounded(low), _rounded(high)]))
+    edge = Edge(np.array([0.0, length_mm]), np.array([round(low, 3), round(high, 3)]))
     passes = [(f"F{feed:g}", [(None, feed)]) for feed in feeds]
     return _drawn(given, edge, length_mm, passes, TaperDetails((low, high), length_mm))
 
@@ -195,13 +197,13 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     # What the round tool leaves is the edge that the passes meet: where the wanted one is hollow more sharply than
     # the tool is round, it stays higher.
     far = 3.0 * radius
-    path = tool_path(wanted_edge, radius, -far, stock + far)
-    edge = reduced(left_edge(path, radius, -radius, stock + radius), 1e-4)
+    path = offset_line(wanted_edge, radius, -far, stock + far)
+    edge = reduced(offset_line(path, radius, -radius, stock + radius, inwards=True), 1e-4)
     x = np.arange(0.0, stock - radius, _STATION_MM)
     probe = _measuring_pass(given, edge, stock, "probe", [constant])
     met = engagement(given._cut_tool(), probe, x, up=given.up).radial_depth_mm
     off = np.flatnonzero(np.abs(met - sizes[0]) > _FEW_UM)
-    begin, end = _rounded(min(straight, float(x[off[0]]))), max(straight + float(s[-1]), float(x[off[-1]]))
+    begin, end = round(min(straight, float(x[off[0]])), 3), max(straight + float(s[-1]), float(x[off[-1]]))
     blocks = _blocks(x, _corner_feeds(given, met), interval, begin, end)
     given._check_feeds([feed for _, feed in blocks])
     excess = met - np.interp(x, s + straight, depth)
@@ -251,10 +253,10 @@ def interval_cut(
     straight = max(10.0, 4.0 * given.tool.radius_mm)
     longest = max(len(feeds) * step for feeds, step in zip(sequences, intervals_mm, strict=True))
     stock = float(math.ceil(longest + 2.0 * straight))
-    edge = Edge(np.array([0.0, stock]), np.array([_rounded(depth)] * 2))
+    edge = Edge(np.array([0.0, stock]), np.array([round(depth, 3)] * 2))
     passes: list[tuple[str, list[_Block]]] = []
     for feeds, step in zip(sequences, intervals_mm, strict=True):
-        steps = [(_rounded(straight + (k + 1) * step), round(each, 1)) for k, each in enumerate(feeds)]
+        steps = [(round(straight + (k + 1) * step, 3), round(each, 1)) for k, each in enumerate(feeds)]
         passes.append((f"FEED CHANGES EVERY {step:g} MM", [(straight, feed), *steps, (None, feed)]))
     return _drawn(given, edge, stock, passes, IntervalDetails(depth, tuple(intervals_mm), straight))
 
@@ -311,7 +313,7 @@ def _measuring_pass(
     )
 
 
-def _corner_feeds(given: CutConditions, radial_depth_mm: Array) -> Array:
+def _corner_feeds(given: CutConditions, radial_depth_mm: FloatArray) -> FloatArray:
     """Feeds at which the mean resultant is that of the first depth (paper 001, eq. 7), mm/min."""
     tool = given._cut_tool()
     law = ForceLaw(tool, tool.cutting, given.spindle, given.axial_depth_mm)
@@ -320,18 +322,20 @@ def _corner_feeds(given: CutConditions, radial_depth_mm: Array) -> Array:
     return np.asarray(given.feed_mm_per_min * force[0] / force)
 
 
-def _blocks(x_mm: Array, feed: Array, interval_mm: float, begin: float, end: float) -> list[tuple[float, float]]:
+def _blocks(
+    x_mm: FloatArray, feed: FloatArray, interval_mm: float, begin: float, end: float
+) -> list[tuple[float, float]]:
     """Blocks of one length, each with the least feed within it."""
     count = max(1, math.ceil((end - begin) / interval_mm - 1e-9))
     blocks = []
     for k in range(count):
         low, high = begin + k * interval_mm, begin + (k + 1) * interval_mm
         within = feed[(x_mm >= low - 1e-9) & (x_mm <= high + 1e-9)]
-        blocks.append((_rounded(high), round(float(within.min()), 1)))
+        blocks.append((round(high, 3), round(float(within.min()), 1)))
     return blocks
 
 
-def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[Array, Array]:
+def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[FloatArray, FloatArray]:
     """Distance along the corner's path from the beginning of S2 on, and the radial depth until it is constant again."""
     allowance, rough, finish = sizes
     before = 2.0 * (rough + finish)
@@ -347,7 +351,3 @@ def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[Array, Array]:
         raise ArgumentError("the radial depth of this corner does not change: nothing to unroll")
     last = min(int(off[-1]) + 2, len(s))
     return s[:last], depth[:last]
-
-
-def _rounded(value: float) -> float:
-    return round(value, 3)

@@ -11,18 +11,17 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.record import FloatArray
 from shapegcode.testcut.cut import CuttingLaw, CutTool, MeasuringPass, TestCut
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Engagement:
     """What the tool meets where its axis is at each X; azimuths as in ``_core.EngagedArc``."""
 
-    from_rad: Array  # first azimuth in material, from the direction of feed, positive to its left
-    to_rad: Array  # last one; equal to `from_rad` where nothing is met
-    radial_depth_mm: Array  # depth of the outermost point in material below the edge: distance from it to the wall
+    from_rad: FloatArray  # first azimuth in material, from the direction of feed, positive to its left
+    to_rad: FloatArray  # last one; equal to `from_rad` where nothing is met
+    radial_depth_mm: FloatArray  # depth of the outermost point in material below the edge: distance from it to the wall
 
     @classmethod
     def joined(cls, several: Sequence[Engagement]) -> Engagement:
@@ -32,7 +31,7 @@ class Engagement:
         )
 
 
-def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: Array, *, up: bool) -> Engagement:
+def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up: bool) -> Engagement:
     """Engagement of a pass where the tool's axis is at each X, exact for the straight pieces of its edge."""
     radius = tool.radius_mm
     edge_x, edge_y = np.array(measuring.edge_x_mm), np.array(measuring.edge_height_mm)
@@ -48,7 +47,7 @@ def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: Array, *, up: bool
     return Engagement(first, last, depth)
 
 
-def _crossing(x: Array, begin: Array, edge_x: Array, edge_y: Array, radius: float) -> Array:
+def _crossing(x: FloatArray, begin: FloatArray, edge_x: FloatArray, edge_y: FloatArray, radius: float) -> FloatArray:
     """How far before the axis the front of the tool first comes out of the edge; `begin` where it is not in it."""
     found = np.full(len(x), radius)
     open_ = np.ones(len(x), dtype=bool)
@@ -76,14 +75,16 @@ def _crossing(x: Array, begin: Array, edge_x: Array, edge_y: Array, radius: floa
     return found
 
 
-def straight_engagement(tool: CutTool, radial_depth_mm: Array, *, up: bool) -> Engagement:
+def straight_engagement(tool: CutTool, radial_depth_mm: FloatArray, *, up: bool) -> Engagement:
     """Engagement of straight cuts of known radial depth."""
     last = -np.arcsin(1.0 - radial_depth_mm / tool.radius_mm)
     first = np.full(len(last), -0.5 * math.pi)
     return Engagement(-last, -first, radial_depth_mm) if up else Engagement(first, last, radial_depth_mm)
 
 
-def fully_engaged(cut: TestCut, measuring: MeasuringPass, x_mm: Array, margin_mm: float = 0.0) -> npt.NDArray[np.bool_]:
+def fully_engaged(
+    cut: TestCut, measuring: MeasuringPass, x_mm: FloatArray, margin_mm: float = 0.0
+) -> npt.NDArray[np.bool_]:
     """Where the tool is over the stock with all of its engagement, and by a margin within its ends."""
     met = engagement(cut.tool, measuring, x_mm, up=cut.up)
     reach = cut.tool.radius_mm * np.maximum(np.cos(met.to_rad), np.cos(met.from_rad))
@@ -99,10 +100,10 @@ _STEP_MM = 0.1
 class CutForces:
     """Forces on the tool over one revolution, at each of n engagements."""
 
-    mean_n: Array  # (n, 2) mean of the vector along the feed and to its left
-    mean_resultant_n: Array  # (n,) mean of the magnitude
-    peak_resultant_n: Array  # (n,) largest magnitude
-    mean_torque_nm: Array  # (n,)
+    mean_n: FloatArray  # (n, 2) mean of the vector along the feed and to its left
+    mean_resultant_n: FloatArray  # (n,) mean of the magnitude
+    peak_resultant_n: FloatArray  # (n,) largest magnitude
+    mean_torque_nm: FloatArray  # (n,)
 
 
 class ForceLaw:
@@ -114,7 +115,7 @@ class ForceLaw:
         self._force = _core.MillingForce(mill, law.core(), spindle_rev_per_min)
         self._depth = axial_depth_mm
 
-    def forces(self, met: Engagement, feed_mm_per_min: Array | Sequence[float]) -> CutForces:
+    def forces(self, met: Engagement, feed_mm_per_min: FloatArray | Sequence[float]) -> CutForces:
         """Forces at each engagement with the feed at it, in mm/min."""
         rows = np.zeros((len(met.from_rad), 5))
         for k, (begin, end, feed) in enumerate(zip(met.from_rad, met.to_rad, feed_mm_per_min, strict=True)):
@@ -127,8 +128,8 @@ class ForceLaw:
 
 
 def mean_chip_mm(
-    tool: CutTool, spindle_rev_per_min: float, axial_depth_mm: float, met: Engagement, feed_mm_per_min: Array
-) -> Array:
+    tool: CutTool, spindle_rev_per_min: float, axial_depth_mm: float, met: Engagement, feed_mm_per_min: FloatArray
+) -> FloatArray:
     """Mean chip thickness that the force law gives each engagement its coefficients by.
 
     The law itself tells it: with the exponent 1 the force is the mean chip thickness times the force with exponent 0.
@@ -146,10 +147,10 @@ def mean_chip_mm(
 class Expected:
     """What the force law lets expect along a pass, at stations."""
 
-    x_mm: Array  # (n,) ascending, of the tool's axis
-    mean_n: Array  # (n,) magnitude of the mean force
-    mean_resultant_n: Array  # (n,) mean magnitude
-    peak_resultant_n: Array  # (n,) largest magnitude
+    x_mm: FloatArray  # (n,) ascending, of the tool's axis
+    mean_n: FloatArray  # (n,) magnitude of the mean force
+    mean_resultant_n: FloatArray  # (n,) mean magnitude
+    peak_resultant_n: FloatArray  # (n,) largest magnitude
 
 
 def expected(cut: TestCut, measuring: MeasuringPass, law: CuttingLaw | None = None) -> Expected:
@@ -172,18 +173,18 @@ class MeanForces:
     """Mean forces on the tool over whole revolutions, with what it met."""
 
     met: Engagement  # n engagements
-    feed_mm_per_min: Array  # (n,)
-    spindle_rev_per_min: Array  # (n,)
-    force_n: Array  # (n, 2) along the feed and to its left
-    revolutions: Array  # (n,) how many each is the mean of
+    feed_mm_per_min: FloatArray  # (n,)
+    spindle_rev_per_min: FloatArray  # (n,)
+    force_n: FloatArray  # (n, 2) along the feed and to its left
+    revolutions: FloatArray  # (n,) how many each is the mean of
     group: npt.NDArray[np.intp]  # (n,) number of the pass or file, in the order in which it was cut
     # n engagements if the place of the tool were off by its standard error, the same way for all rows of a group;
     # None: the engagements are exact
     displaced: Engagement | None = None
-    torque_nm: Array | None = None  # (n,) mean torque of the spindle; None: not measured
+    torque_nm: FloatArray | None = None  # (n,) mean torque of the spindle; None: not measured
 
 
-def chips_mm(tool: CutTool, depth: float, data: MeanForces) -> Array:
+def chips_mm(tool: CutTool, depth: float, data: MeanForces) -> FloatArray:
     """(n,) mean chip thickness of each row."""
     found = np.zeros(len(data.feed_mm_per_min))
     for speed, at, met in _by_speed(data):
@@ -211,7 +212,7 @@ class ForceModel:
         torque = [] if data.torque_nm is None else [self.at_radius * data.torque_nm]
         self.measured = np.column_stack([data.force_n, *torque])
 
-    def law(self, parameters: Array) -> CuttingLaw:
+    def law(self, parameters: FloatArray) -> CuttingLaw:
         """The coefficients of parameters."""
         k1, k1_exponent, k2, k2_exponent, *edge = parameters.tolist()
         logarithm = math.log(self.reference)
@@ -219,11 +220,11 @@ class ForceModel:
         k_te, k_re = edge or (0.0, 0.0)
         return CuttingLaw(factors[0], k1_exponent, factors[1], k2_exponent, k_te, k_re, self.thickness)
 
-    def forces(self, parameters: Array) -> Array:
+    def forces(self, parameters: FloatArray) -> FloatArray:
         """(n, 2 or 3) forces with the coefficients of parameters."""
         return self.forces_of(self.law(parameters))
 
-    def forces_of(self, law: CuttingLaw) -> Array:
+    def forces_of(self, law: CuttingLaw) -> FloatArray:
         """(n, 2 or 3) forces along the feed, to its left, and the torque's where it was measured."""
         found = np.zeros(self.measured.shape)
         for speed, at, met in _by_speed(self.data):
@@ -232,7 +233,7 @@ class ForceModel:
             found[at, 2:] = self.at_radius * forces.mean_torque_nm[:, None]
         return found
 
-    def slopes(self, parameters: Array, at: Array) -> Array:
+    def slopes(self, parameters: FloatArray, at: FloatArray) -> FloatArray:
         """(all measured values, p) change of the forces with each parameter; the edge forces act as they are."""
         columns = []
         for k in range(len(parameters)):

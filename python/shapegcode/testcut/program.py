@@ -12,8 +12,7 @@ import numpy as np
 from shapegcode.io.atomic import write_text
 from shapegcode.program.operating import OVERRIDE
 from shapegcode.results.json import to_text
-from shapegcode.testcut.cut import CornerDetails, MeasuringPass
-from shapegcode.testcut.edges import Edge, on_increments, tool_path
+from shapegcode.testcut.cut import CornerDetails, Edge, offset_line, on_increments
 from shapegcode.testcut.result import CutDesign
 
 _SKIM_MM = 0.2
@@ -77,7 +76,7 @@ class _Writer:
         self.design, self.cut, self.controller = design, design.cut, design.machine.controller
         self.decimals = max(1, round(-math.log10(self.controller.least_increment_mm)))
         self.radius = self.cut.tool.radius_mm
-        self.side = -1.0 if not self.cut.up else 1.0  # of the material, along Y
+        self.side = -1.0 if not self.cut.up else 1.0  # of the material, along Y: what lies within the raw edge
         self.walls: list[float] = []  # how far each wall lies within the raw edge
         depth = 0.0
         for each in self.cut.passes:
@@ -100,7 +99,7 @@ class _Writer:
         yield "CLAMP IT ON THE DYNAMOMETER, EDGE ALONG X WITHIN 0.1 MM"
         yield f"ZERO G54: X LEFT END, Y {edge}, Z TOP OF STOCK,"
         yield "Z WITH THIS TOOL: NO LENGTH OFFSET IS CALLED"
-        far = self._y(-_RAW_MM - 3.0 * self.radius), self._y(self.walls[-1])
+        far = self.side * (-_RAW_MM - 3.0 * self.radius), self.side * self.walls[-1]
         yield f"TOOL AXIS: X{left:g} TO {right:g}, Y{min(far):.1f} TO {max(far):.1f},"
         yield f"Z-{cut.axial_depth_mm:g} TO {_CLEAR_Z_MM:g}: KEEP IT FREE OF CLAMPS"
         yield OVERRIDE.comment
@@ -114,24 +113,22 @@ class _Writer:
             yield f"X{deeper.from_mm:.2f} TO {deeper.to_mm:.2f}: UP TO {deeper.most_mm:.3f} MM DEEPER"
             yield "THAN THE CORNER: THE ROUND TOOL LEAVES IT"
 
-    def _y(self, within_mm: float) -> float:
-        """Y of a depth below the raw edge."""
-        return self.side * within_mm
-
     def passes(self, k: int) -> Iterator[str]:
         """The edge of a pass, a stop, and the pass."""
         each = self.cut.passes[k]
         wall = self.walls[k]
         before = self.walls[k - 1] if k else -_RAW_MM
+        path = offset_line(self.design.edge, self.radius, each.start_mm, each.end_mm)
+        path = on_increments(path, self.controller.least_increment_mm)
         yield f"(PASS {k + 1}: MILL THE EDGE)"
         for offset in _offsets(self.design.edge, before, wall, self.design.stock_mm, self.cut.tool.diameter_mm):
-            yield from self._edge(each, self.design.edge, wall, offset)
+            yield from self._edge(path, wall, offset, min(feed for _, feed in each.feeds))
         yield f"G00 Z{_text(_CLEAR_Z_MM)}"
         yield f"M00 (START RECORD {k + 1}: {each.name})"
         # The control may have stopped the spindle.
         yield f"S{self.cut.spindle_rev_per_min:g} M03"
         yield "G04 P3000"
-        yield from self._begin(each.start_mm, self._y(wall - self.radius), each.feed_mm_per_min)
+        yield from self._begin(each.start_mm, self.side * (wall - self.radius), each.feed_mm_per_min)
         for end, feed in each.feeds:
             yield f"G01 X{_text(end, self.decimals)} F{_text(feed, 1)}"
         yield f"G00 Z{_text(_CLEAR_Z_MM)}"
@@ -143,19 +140,16 @@ class _Writer:
         yield f"Z{_text(_NEAR_Z_MM)}"
         yield f"G01 Z{_text(-self.cut.axial_depth_mm, self.decimals)} F{_text(max(feed, 100.0), 1)}"
 
-    def _edge(self, each: MeasuringPass, edge: Edge, wall: float, offset: float) -> Iterator[str]:
+    def _edge(self, path: Edge, wall: float, offset: float, feed: float) -> Iterator[str]:
         """One cut along the edge, farther out by an offset."""
-        path = tool_path(edge, self.radius, each.start_mm, each.end_mm)
-        path = on_increments(path, self.controller.least_increment_mm)
         y = wall - path.height_mm - offset
-        feed = min(feed for _, feed in each.feeds)
         shortest = float(np.min(np.hypot(np.diff(path.x_mm), np.diff(y))))
         block_s = max(self.controller.block_time_s, self.controller.interpolation_period_s)
         feed = max(min(feed, shortest / (_BLOCKS_OF_EDGE * block_s) * _PER_MINUTE), 1.0)
-        yield from self._begin(float(path.x_mm[0]), self._y(float(y[0])), feed)
+        yield from self._begin(float(path.x_mm[0]), self.side * float(y[0]), feed)
         first = f" F{_text(math.floor(feed * 10.0) / 10.0, 1)}"
         for px, py in zip(path.x_mm[1:], y[1:], strict=True):
-            yield f"G01 X{_text(float(px), self.decimals)} Y{_text(self._y(float(py)), self.decimals)}{first}"
+            yield f"G01 X{_text(float(px), self.decimals)} Y{_text(self.side * float(py), self.decimals)}{first}"
             first = ""
         yield f"G00 Z{_text(_NEAR_Z_MM)}"
 
