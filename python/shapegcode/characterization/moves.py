@@ -24,10 +24,7 @@ _LONGEST_HOLD = 64
 
 
 def held_samples(log: ServoLog) -> tuple[int, int]:
-    """Over how many samples the command is held, and the index of a first sample; 1 if it is not held.
-
-    A command that changes only once per interpolation period has all its increments there.
-    """
+    """Over how many samples the command is held, and the index of a first sample; 1 if it is not held."""
     command = np.nan_to_num(log.command_mm)
     increments = np.diff(command, axis=0)
     noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
@@ -70,10 +67,7 @@ def _bends(log: ServoLog, count: int) -> _Bends:
 
 
 def bend_samples(logs: Sequence[ServoLog]) -> int:
-    """After how many samples the speed of a command changes that is interpolated between periods; 1: not seen.
-
-    Only periods of three samples or more can be told, and only where the command is not held.
-    """
+    """After how many samples the speed of an interpolated command changes, 3 or more; 1: not seen."""
     best = 1
     for count in range(3, _LONGEST_HOLD // 2):
         every = [_bends(log, count) for log in logs]

@@ -101,10 +101,7 @@ def mean(values: Sequence[float], halves: Sequence[float]) -> tuple[float, float
 
 
 def combine(first: Sequence[ControllerFact], second: Sequence[ControllerFact]) -> list[ControllerFact]:
-    """For each quantity the better of two facts: a known one, then the narrower interval.
-
-    Where the two contradict each other, the note says so.
-    """
+    """For each quantity the better of two facts, known and narrow; the note says where they contradict each other."""
     other = {each.quantity: each for each in second}
     out: list[ControllerFact] = []
     for each in first:

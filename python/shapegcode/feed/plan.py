@@ -231,10 +231,7 @@ def _limits_along(
 
 
 def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
-    """Per station but the last whether the tool goes on from it in much the same direction, (n - 1,).
-
-    At a corner the load of the block before ends with the block.
-    """
+    """Per station but the last, (n - 1,): whether the tool goes on in much the same direction, and its load with it."""
     turn = np.diff(np.asarray(track.direction_rad))
     level = np.asarray(track.horizontal)
     return np.asarray((np.cos(turn) > _SAME_DIRECTION) & (level[1:] > 0.0) & (level[:-1] > 0.0))

@@ -235,11 +235,7 @@ def _decay(record: Record, band_hz: float | None, start_s: float | None, warning
 
 
 def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s: float | None = None) -> Prepared:
-    """Divide recordings into hits, find where decays begin, and leave out what cannot be used.
-
-    The force is set to 0 outside its pulse after its offset is taken away, and the offset of the response where it
-    shows before the hit.
-    """
+    """Divide recordings into hits, find where decays begin, and leave out what cannot be used."""
     if not records:
         raise RecordError("no record: needed is at least one tap or decay")
     _refuse_mixture(records)
@@ -304,11 +300,7 @@ FOLDING = 0.8
 
 
 def is_clipped(values: FloatArray) -> bool:
-    """Whether a signal is cut off at its largest or smallest value.
-
-    A run of three or more samples at the extreme, next to which the signal falls more steeply than a smooth peak of the
-    same width at this resolution would.
-    """
+    """Whether a signal is cut off: three or more samples at its extreme, steeper beside it than a smooth peak is."""
     centred = values - np.median(values)
     largest = float(np.max(np.abs(centred)))
     if largest == 0.0:
@@ -335,10 +327,7 @@ def is_clipped(values: FloatArray) -> bool:
 
 
 def _is_flat_topped(signal: FloatArray) -> bool:
-    """Whether the highest lobe is cut off though noise or a filter behind hide it.
-
-    Of a smooth peak the part above 95 % is .3 of the part above half of it; of one cut at 85 % it is .5.
-    """
+    """Whether the highest lobe is cut off though noise hides it: .5 of its upper half above 95 %, .3 of a smooth one"""
     top = float(np.max(signal))
     crest = int(np.argmax(signal))
     high, half = (_run_around(signal > share * top, crest) for share in (_NEARLY_TOP, 0.5))
@@ -484,11 +473,7 @@ def _has_rested(record: Record, noise: float, hit: Hit, next_hit: Hit) -> bool:
 
 
 def find_hits(record: Record) -> list[Hit]:
-    """The hits of a record, in their order; pulses of a bounce belong to the hit before.
-
-    A pulse is a new hit if it comes 0.1 s or more after the one before, the response has died away to a tenth
-    meanwhile, and it has at least a tenth of the largest force.
-    """
+    """The hits of a record, in their order; pulses of a bounce belong to the hit before."""
     if record.force_n is None or not np.ptp(record.force_n) > 0.0:
         return []
     force = record.force_n - np.median(record.force_n)
@@ -513,10 +498,7 @@ def find_hits(record: Record) -> list[Hit]:
 
 
 def split_hits(record: Record) -> list[Record]:
-    """One record for each hit of a recording, each with some time before the hit.
-
-    A record with one hit, or without force, comes back as it is.
-    """
+    """One record for each hit of a recording, each with some time before the hit; one hit alone stays as it is."""
     hits = find_hits(record)
     if len(hits) < 2:
         return [record]

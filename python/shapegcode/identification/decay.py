@@ -34,10 +34,7 @@ _FEWEST_PERIODS = 3.0
 
 
 def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
-    """Strongest frequency of the differences of the samples, in which the slow motion of the axis weighs little.
-
-    0: there is none.
-    """
+    """Strongest frequency of the differences, in which the slow motion of the axis weighs little; 0: there is none."""
     jerk = np.diff(response)
     count = 4 * len(jerk)
     spectrum = np.abs(np.fft.rfft(jerk - np.mean(jerk), count))
@@ -119,10 +116,7 @@ def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_sample
 
 
 def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
-    """Where the vibration has begun for certain; a window longer than the decay begins before it.
-
-    A period of the strongest vibration from this sample on holds half of its power.
-    """
+    """Where the vibration has begun for certain: a period of the strongest one from there holds half of its power."""
     last = min(end, start + max(2, round(scales.window)))
     one = max(2, round(scales.strongest))
     short = _forward_rms(quiet[start : min(end, last + one)], one)

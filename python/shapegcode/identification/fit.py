@@ -158,10 +158,8 @@ def _thinned_note(ready: Prepared, problem: Taps | Decays, band_hz: tuple[float,
 def _aliased(ready: Prepared, problem: Taps | Decays) -> Callable[[float], float]:
     """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate.
 
-    Without an anti-aliasing filter the spectrum does not end before half the rate: what it still has there, beyond
-    noise, tells how much came from above. A pulse with kinks, a half sine, falls with the square of the frequency: what
-    folds down to the lower frequencies from both sides of the rate is some two thirds of what is left at half of it. A
-    force without any noise that runs straight from sample to sample is no recording: it holds nothing else.
+    Its height at half the rate, beyond noise, tells how much: a half sine falls with the square of the frequency, so
+    that two thirds of it fold down from both sides of the rate. A straight force without noise is no recording.
     """
     if isinstance(problem, Decays):
         return lambda _hz: 0.0
@@ -195,10 +193,7 @@ def _alone(problem: Taps | Decays, fit: Fit) -> list[Fit]:
 
 
 def _mass_check(problem: Taps | Decays, fit: Fit) -> MassCheck | None:
-    """The equivalent mass by paper 003's way, from the first tap, where the model has one mode.
-
-    Wilson's method shortens the frequency unless its steps are short: force and response are resampled.
-    """
+    """The equivalent mass by paper 003's way, from the first tap, where the model has one mode."""
     if isinstance(problem, Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
         return None
     args = (

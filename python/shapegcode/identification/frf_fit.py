@@ -233,10 +233,7 @@ class FrfProblem:
 
 
 def _smoothed(power: FloatArray, omega: FloatArray, quantity: str) -> FloatArray:
-    """Running mean of a power over neighbouring lines, its peaks levelled by a median first.
-
-    As that of an acceleration, whose noise is the most even: that of a displacement made of it falls by 1/f².
-    """
+    """Running mean of a power over neighbouring lines, as an acceleration's, its peaks levelled by a median first."""
     course = omega ** (2.0 * (2.0 - POWERS[quantity]))
     width = max(_SMOOTH_LINES, int(_SMOOTH_SHARE * len(power))) | 1
     level = median_filter(power * course, width, mode="nearest") / np.log(2.0)

@@ -330,10 +330,7 @@ _SHARE_DIGITS = 4
 
 
 def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
-    """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes.
-
-    Those of one point under a motion of its base do so, sum of phi_i Gamma_i = 1, for mode shapes that span the motion.
-    """
+    """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes."""
     masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
     if len(masses) < len(modes):
         return [_share(1.0 / len(modes))] * len(modes), "equal shares"

@@ -163,10 +163,7 @@ def _pool(problem: FitProblem) -> Starts:
 
 
 def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None:
-    """The best fit with one mode more than `last`.
-
-    The further mode is begun at the peaks of what `last` leaves, and at the pole of the pool that explains most of it.
-    """
+    """The best fit with one mode more, from peaks of what the last one leaves and the pole that explains most."""
     so_far = [] if last is None else starts_of(last)
     candidates: list[Starts] = []
     for omega in problem.peaks_left(last):

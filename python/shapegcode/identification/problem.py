@@ -193,10 +193,7 @@ class Decays(_OverTime):
 
 
 def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: bool = False) -> Taps | Decays:
-    """The records of a fit, and the band to look in.
-
-    A strong mode outside the band asked for is part of what is measured within it: it is looked for too.
-    """
+    """The records of a fit, and the band to look in; a strong mode outside is part of what is measured within it."""
     first = ready.records[0]
     responses = [record.response for record in ready.records]
     longest_s = max(len(response) for response in responses) * first.period_s
@@ -266,10 +263,7 @@ class Thinned:
 
 
 def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
-    """Up to where a tap must be sampled for its modes to be found.
-
-    Modes above the band are part of what is measured within it: what stands out of the response is fitted along.
-    """
+    """Up to where a tap must be sampled; what stands out of the response above the band is fitted along."""
     excited = max(each.excited_hz or 0.0 for each in ready.usable)
     margin = _MARGIN
     if are_blows(ready):  # they excite all that the rate holds

@@ -136,10 +136,7 @@ def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
 
 
 def judged_modes(modes: Sequence[IdentifiedMode], doubts: Doubts) -> list[IdentifiedMode]:
-    """The modes of a fit by ascending frequency, each with its refusal where there is one.
-
-    Drift, and what lies outside the band, helps the fit and is left out: no mode to speak of.
-    """
+    """The modes by ascending frequency, each with its refusal if any, without drift and what lies outside the band."""
     low, high = doubts.band_hz
     found = [
         replace(mode, refusal=_refusal_of(mode, doubts))

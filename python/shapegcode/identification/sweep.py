@@ -42,10 +42,7 @@ class _Model:
 
 
 def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> Identification:
-    """Find the modes that a sweep shows; see `identify.identify`.
-
-    Source: this project; the sweep is that of Klipper's resonance tester.
-    """
+    """Find the modes that a sweep of Klipper's resonance tester shows; see `identify.identify`."""
     band, modes = sought.band_hz or SWEPT_HZ, sought.modes
     frequency, power = _spectrum(record, band)
     fits = [_fit(frequency, power, [], free=False)]
