@@ -248,6 +248,7 @@ from shapegcode.testcut.design import (
     corner_cut as corner_cut,
     interval_cut as interval_cut,
     taper_cut as taper_cut,
+    write_test_cut as write_test_cut,
 )
 from shapegcode.testcut.fit import fit_test_cut as fit_test_cut
 from shapegcode.testcut.plots import (
@@ -256,7 +257,6 @@ from shapegcode.testcut.plots import (
     plot_interval as plot_interval,
     plot_taper as plot_taper,
 )
-from shapegcode.testcut.program import write_test_cut as write_test_cut
 from shapegcode.testcut.result import (
     CornerResult as CornerResult,
     CutDesign as CutDesign,

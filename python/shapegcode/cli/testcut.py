@@ -160,7 +160,7 @@ def _written(args: argparse.Namespace, design: CutDesign) -> int:
     from pathlib import Path
 
     from shapegcode.cli import runner
-    from shapegcode.testcut.program import write_test_cut
+    from shapegcode.testcut.design import write_test_cut
 
     runner.check_files(args, also_written=[Path(args.output).with_suffix(".json")])
     design = write_test_cut(design, args.output, args.program)

@@ -11,17 +11,20 @@ from scipy.signal import resample_poly
 from shapegcode import _core
 from shapegcode.identification.checks import Prepared
 from shapegcode.identification.model_search import (
+    Doubts,
     Fit,
     Search,
     Sought,
+    estimates_of,
     evidence_of,
+    judged_modes,
+    rival_of,
     search,
     stabilisation_chart,
     starts_of,
 )
 from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Taps, problem_of
 from shapegcode.identification.result import Identification, MassCheck, by_support
-from shapegcode.identification.support import Doubts, estimates_of, judged_modes, rival_of
 from shapegcode.io.record import FloatArray, Record
 
 _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white

@@ -14,22 +14,20 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.frf_model import POWERS, FrfFit, FrfLines, fit_frf, mode_columns
 from shapegcode.identification.model_search import (
     PEAKS,
+    Doubts,
     Fit,
     Search,
     Sought,
     Starts,
+    estimates_of,
     evidence_of,
+    judged_modes,
+    rival_of,
     search,
     stabilisation_chart,
     starts_of,
 )
 from shapegcode.identification.result import Identification, IdentifiedMode, by_support
-from shapegcode.identification.support import (
-    Doubts,
-    estimates_of,
-    judged_modes,
-    rival_of,
-)
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.record import FloatArray
 

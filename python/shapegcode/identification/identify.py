@@ -13,9 +13,8 @@ from shapegcode.errors import ArgumentError, NumericError, RecordError
 from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.fit import find_modes
 from shapegcode.identification.frf_fit import find_frf_modes
-from shapegcode.identification.model_search import Sought
+from shapegcode.identification.model_search import ACCEPTED_PERCENT, Sought
 from shapegcode.identification.result import Identification
-from shapegcode.identification.support import ACCEPTED_PERCENT
 from shapegcode.identification.sweep import find_swept_modes
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse

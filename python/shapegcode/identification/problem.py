@@ -12,9 +12,8 @@ from scipy.signal import firwin, kaiserord, oaconvolve
 from shapegcode import _core
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import MIN_PULSE, Prepared
-from shapegcode.identification.model_search import PEAKS, Fit, Starts
+from shapegcode.identification.model_search import MIN_SWINGS, PEAKS, Fit, Starts
 from shapegcode.identification.spectra import decay_spectrum
-from shapegcode.identification.support import MIN_SWINGS
 from shapegcode.io.record import FloatArray
 
 HIGHEST_SHARE = 0.45  # Of the sampling rate: the force between samples is known up to there

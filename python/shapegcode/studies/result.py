@@ -1,4 +1,4 @@
-"""What a study found: quantiles, how likely the program stays within tolerance, which value decides."""
+"""What a study found: quantiles, probability of staying within tolerance, what decides; the best of some choices."""
 
 from __future__ import annotations
 

@@ -12,15 +12,16 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.record import FloatArray
-from shapegcode.testcut.coefficient_fit import CoefficientFit, fit_coefficients
 from shapegcode.testcut.cut import CuttingLaw, IntervalDetails, MeasuringPass, TestCut, read_test_cut
 from shapegcode.testcut.forces import (
+    CoefficientFit,
     Engagement,
     ForceLaw,
     MeanForces,
     Thickness,
     engagement,
     expected,
+    fit_coefficients,
     fully_engaged,
     straight_engagement,
 )

@@ -11,9 +11,8 @@ from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
-from shapegcode.testcut.coefficient_fit import Coefficient, CoefficientFit
 from shapegcode.testcut.cut import CuttingLaw, Edge, TestCut
-from shapegcode.testcut.forces import Expected, MeanForces
+from shapegcode.testcut.forces import Coefficient, CoefficientFit, Expected, MeanForces
 from shapegcode.testcut.record import Revolutions
 
 
