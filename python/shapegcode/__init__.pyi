@@ -114,9 +114,7 @@ from shapegcode.feed.survey import (
     survey as survey,
 )
 from shapegcode.identification.identify import identify as identify
-from shapegcode.identification.mode import Estimate as Estimate, IdentifiedMode as IdentifiedMode
-from shapegcode.identification.plan import tap_plan as tap_plan
-from shapegcode.identification.plan_result import TapPlan as TapPlan
+from shapegcode.identification.plan import TapPlan as TapPlan, tap_plan as tap_plan
 from shapegcode.identification.plots import (
     plot_decay as plot_decay,
     plot_response as plot_response,
@@ -125,7 +123,11 @@ from shapegcode.identification.plots import (
     plot_sweep as plot_sweep,
     plot_traces as plot_traces,
 )
-from shapegcode.identification.result import Identification as Identification
+from shapegcode.identification.result import (
+    Estimate as Estimate,
+    Identification as Identification,
+    IdentifiedMode as IdentifiedMode,
+)
 from shapegcode.identification.servo.fit import fit_servo as fit_servo
 from shapegcode.identification.servo.plots import plot_servo as plot_servo
 from shapegcode.identification.servo.record import (
@@ -213,25 +215,25 @@ from shapegcode.simulation.simulate import (
     play_motion as play_motion,
     simulate as simulate,
 )
-from shapegcode.studies.distributions import (
-    listed as listed,
-    lognormal as lognormal,
-    normal as normal,
-    uniform as uniform,
-)
 from shapegcode.studies.optimize import optimize as optimize
-from shapegcode.studies.optimum_result import (
-    Candidate as Candidate,
-    Optimum as Optimum,
-)
 from shapegcode.studies.plots import (
     plot_bands as plot_bands,
     plot_choices as plot_choices,
     plot_tornado as plot_tornado,
 )
-from shapegcode.studies.result import MachineStudy as MachineStudy
+from shapegcode.studies.result import (
+    Candidate as Candidate,
+    MachineStudy as MachineStudy,
+    Optimum as Optimum,
+)
 from shapegcode.studies.study import study as study
 from shapegcode.studies.study_file import load_study as load_study
+from shapegcode.studies.varied import (
+    listed as listed,
+    lognormal as lognormal,
+    normal as normal,
+    uniform as uniform,
+)
 from shapegcode.testcut.cut import (
     TestCut as TestCut,
     read_test_cut as read_test_cut,
@@ -242,6 +244,7 @@ from shapegcode.testcut.design import (
     corner_cut as corner_cut,
     interval_cut as interval_cut,
     taper_cut as taper_cut,
+    write_test_cut as write_test_cut,
 )
 from shapegcode.testcut.fit import fit_test_cut as fit_test_cut
 from shapegcode.testcut.plots import (
@@ -250,7 +253,6 @@ from shapegcode.testcut.plots import (
     plot_interval as plot_interval,
     plot_taper as plot_taper,
 )
-from shapegcode.testcut.program import write_test_cut as write_test_cut
 from shapegcode.testcut.result import (
     CornerResult as CornerResult,
     CutDesign as CutDesign,

@@ -23,7 +23,7 @@ from scipy.signal import freqs
 from table import markdown
 
 from shapegcode.identification.identify import identify
-from shapegcode.identification.mode import Estimate, IdentifiedMode
+from shapegcode.identification.result import Estimate, IdentifiedMode
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.record import Quantity
 from tap_truth import TrueMode, random_modes, tap

@@ -11,9 +11,16 @@ import pytest
 
 import cut_reference as reference
 from shapegcode._core import ArgumentError
-from shapegcode.testcut.coefficient_fit import CoefficientFit, fit_coefficients
 from shapegcode.testcut.cut import COEFFICIENTS, CuttingLaw, CutTool
-from shapegcode.testcut.forces import Engagement, ForceLaw, MeanForces, mean_chip_mm, straight_engagement
+from shapegcode.testcut.forces import (
+    CoefficientFit,
+    Engagement,
+    ForceLaw,
+    MeanForces,
+    fit_coefficients,
+    mean_chip_mm,
+    straight_engagement,
+)
 
 Array = npt.NDArray[np.float64]
 

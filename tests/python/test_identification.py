@@ -11,8 +11,7 @@ import pytest
 from shapegcode.errors import RecordError
 from shapegcode.identification import problem
 from shapegcode.identification.identify import identify
-from shapegcode.identification.mode import Estimate, IdentifiedMode
-from shapegcode.identification.result import Identification
+from shapegcode.identification.result import Estimate, Identification, IdentifiedMode
 from shapegcode.io.record import Record
 from tap_truth import TrueMode, acceleration, random_modes, tap
 

@@ -12,8 +12,8 @@ import scipy.linalg
 
 from shapegcode._core import ArgumentError
 from shapegcode.errors import MachineError
-from shapegcode.identification.mode import Estimate, IdentifiedMode
-from shapegcode.identification.update import update_machine_file, update_modes
+from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, Sweep
+from shapegcode.identification.update import update_machine, update_modes
 from shapegcode.machine import Machine
 
 VX500 = Machine.builtin_text("vx500")
@@ -271,15 +271,17 @@ def test_what_is_refused() -> None:
 
 
 def test_files(tmp_path: Path) -> None:
+    swept = Sweep("s", "x", 0, 1.0, np.empty(0), np.empty(0), np.empty(0))
+    found = Identification(files=("s",), modes=(tap(46.0),), sweep=swept)
     with pytest.raises(ArgumentError, match=r"shapegcode machine init vx500 -o mine\.toml"):
-        update_machine_file("vx500", "x", [tap(46.0)], source="s")
+        update_machine("vx500", found)
     file = tmp_path / "mine.toml"
     file.write_text(VX500.replace("damping_ratio = 0.02", "damping_ratio = 2", 1), encoding="utf-8")
     with pytest.raises(MachineError, match="must be less than 1"):
-        update_machine_file(file, "x", [tap(46.0)], source="s")
+        update_machine(file, found)
     file.write_text(VX500, encoding="utf-8")
-    assert update_machine_file(file, "x", [tap(46.0)], source="s").text == (
-        update_modes(VX500, "x", [tap(46.0)], source="s").text
+    assert update_machine(file, found).text == (
+        update_modes(VX500, "x", [tap(46.0)], source="sweep without force s").text
     )
     assert file.read_text(encoding="utf-8") == VX500
 

@@ -17,7 +17,7 @@ from acceptance import Judged, convert, machine_with
 from judge import Mode, contour_error_um, play, residual_um, response, starts
 from shapegcode.cli import main
 from shapegcode.conversion.rests import _Region
-from shapegcode.identification.mode import Estimate, IdentifiedMode
+from shapegcode.identification.result import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_modes
 from shapegcode.settings.remarks import origin_of, remarks_of, with_remarks
 from shapegcode.shaping.grid import choose_grid

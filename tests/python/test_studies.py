@@ -28,8 +28,8 @@ from shapegcode.machine.output import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.studies import replay as replays
 from shapegcode.studies.replay import DrawsJob, play_all
+from shapegcode.studies.study import decides, interval_of
 from shapegcode.studies.study_file import StudyFileError
-from shapegcode.studies.summary import decides, interval_of
 from shapegcode.studies.varied import drawn, varied_values
 
 ROOT = Path(__file__).resolve().parents[2]

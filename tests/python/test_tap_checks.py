@@ -12,13 +12,9 @@ import pytest
 from scipy import signal
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.checks import prepare
+from shapegcode.identification.checks import Prepared, excited_hz, find_hits, is_clipped, prepare, split_hits
 from shapegcode.identification.decay import find_decay
-from shapegcode.identification.hits import find_hits, split_hits
-from shapegcode.identification.plan import rapid_stop_program, recording_for, tap_plan
-from shapegcode.identification.plan_result import TapPlan
-from shapegcode.identification.prepared import Prepared
-from shapegcode.identification.quality import excited_hz, is_clipped
+from shapegcode.identification.plan import TapPlan, rapid_stop_program, recording_for, tap_plan
 from shapegcode.identification.spectra import decay_spectrum, envelope, frf, mode_envelopes
 from shapegcode.io.record import FloatArray, Record
 from shapegcode.machine import Machine
@@ -87,14 +83,14 @@ def test_a_good_tap_passes_without_a_word() -> None:
     prepared = one(GOOD)
     assert prepared.warnings == ()
     assert prepared.refused == ()
-    hit = prepared.hits[0]
+    hit = prepared.usable[0].hit
     assert hit is not None
     assert 199 <= hit.first <= 201
     assert 212 <= hit.end <= 214
-    assert prepared.force_noise_n[0] == pytest.approx(0.5, rel=0.05)
+    assert prepared.usable[0].force_noise_n == pytest.approx(0.5, rel=0.05)
     truth = acceleration(half_sine(5000, 200, 12, 500.0))
     sigma = float(np.sqrt(np.mean(truth**2))) / 100.0
-    assert prepared.response_noise[0] == pytest.approx(sigma, rel=0.15)
+    assert prepared.usable[0].response_noise == pytest.approx(sigma, rel=0.15)
 
 
 def test_the_force_window_keeps_the_momentum_and_nothing_else() -> None:
@@ -247,7 +243,7 @@ def test_sampling_too_slow_for_the_mode() -> None:
 def test_without_pre_trigger() -> None:
     late = one(tap(half_sine(5000, 0, 12, 500.0)))
     assert any("samples before the hit: noise and offset are measured from 8 or more" in text for text in late.warnings)
-    assert late.response_noise == (None,)
+    assert late.usable[0].response_noise is None
     with pytest.raises(RecordError, match="begins inside the pulse"):
         prepare([tap(half_sine(5000, 200, 12, 500.0)[205:])])
     rng = np.random.default_rng(4)

@@ -210,11 +210,7 @@ class _Maker:
         return Part("rapid", axis, count, self._signed(axis, increments), self.rapid[axis])
 
     def rate_is_reached(self, axis: str) -> bool:
-        """Whether rapids over the box reach their rate.
-
-        Where they may not, each gives only a bracket, so there are more of them. Half a short rapid lasts whole
-        periods: lengths that round differently tell the time constant.
-        """
+        """Whether rapids over the box reach their rate; else each gives a bracket only, so there are more of them."""
         return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode.characterization.air_tests import AXES, AirTest, whole_periods
 from shapegcode.characterization.moves import (
@@ -24,9 +23,9 @@ from shapegcode.characterization.moves import (
 )
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, ControllerFact, Facts, mean
 from shapegcode.identification.servo.models import GAINS, lag_way
+from shapegcode.io.record import FloatArray
 from shapegcode.io.servo_log import ServoLog
 
-Array = npt.NDArray[np.float64]
 _Interval = tuple[float, float]  # a value and its half-width
 _FOLLOWED = 0.9
 _RUN_SETTLE_S = 0.45
@@ -471,14 +470,14 @@ def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
         facts.unknown("position gain", "no actual positions in the logs", "1/s")
 
 
-def _servo_rows(log: ServoLog, index: int) -> tuple[Array, Array, float] | None:
+def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, float] | None:
     """Command, following error and time step, one row for each held command so that its stairs are no error."""
     if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
         return None
     count, first = held_samples(log)
     n = (len(log.times_s) - first) // count
 
-    def rows(values: Array) -> Array:
+    def rows(values: FloatArray) -> FloatArray:
         return np.asarray(values[first : first + n * count].reshape(n, count).mean(axis=1))
 
     way = rows(log.command_mm[:, index] - log.command_mm[0, index])
@@ -489,7 +488,7 @@ def _servo_rows(log: ServoLog, index: int) -> tuple[Array, Array, float] | None:
     return way, error - np.median(error[: max(3, round(0.1 / step))]), step
 
 
-def _lag_of(records: list[tuple[Array, Array, float]]) -> tuple[float, float]:
+def _lag_of(records: list[tuple[FloatArray, FloatArray, float]]) -> tuple[float, float]:
     """Position gain in 1/s and what feed-forward leaves (1 − f), from all records: least squares of the error."""
     from scipy.optimize import minimize_scalar
 

@@ -12,23 +12,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode.characterization.air_tests import AXES, AirTest, Part
 from shapegcode.errors import ArgumentError
+from shapegcode.io.record import FloatArray
 from shapegcode.io.servo_log import ServoLog
 
-Array = npt.NDArray[np.float64]
 _HOLD_SHARE = 0.9
 _BEND_SHARE = 0.85
 _LONGEST_HOLD = 64
 
 
 def held_samples(log: ServoLog) -> tuple[int, int]:
-    """Over how many samples the command is held, and the index of a first sample; 1 if it is not held.
-
-    A command that changes only once per interpolation period has all its increments there.
-    """
+    """Over how many samples the command is held, and the index of a first sample; 1 if it is not held."""
     command = np.nan_to_num(log.command_mm)
     increments = np.diff(command, axis=0)
     noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
@@ -71,10 +67,7 @@ def _bends(log: ServoLog, count: int) -> _Bends:
 
 
 def bend_samples(logs: Sequence[ServoLog]) -> int:
-    """After how many samples the speed of a command changes that is interpolated between periods; 1: not seen.
-
-    Only periods of three samples or more can be told, and only where the command is not held.
-    """
+    """After how many samples the speed of an interpolated command changes, 3 or more; 1: not seen."""
     best = 1
     for count in range(3, _LONGEST_HOLD // 2):
         every = [_bends(log, count) for log in logs]
@@ -85,7 +78,7 @@ def bend_samples(logs: Sequence[ServoLog]) -> int:
     return best
 
 
-def ticks(log: ServoLog, bend: int) -> tuple[Array, Array]:
+def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
     """Times and positions, one for each interpolation period where that shows."""
     count, first = held_samples(log)
     if count == 1 and bend > 1:
@@ -109,7 +102,7 @@ def ticks(log: ServoLog, bend: int) -> tuple[Array, Array]:
 _PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
 _SHORTEST_BOX_S = 2e-5
 _STAMP = 0.03
-_MOST_SAMPLES = 1500
+_MAX_SAMPLES = 1500
 
 
 @dataclass(frozen=True)
@@ -117,11 +110,11 @@ class PartLog:
     """The samples of one part."""
 
     part: Part
-    times_s: Array
-    way_mm: Array  # way of the part's axis from its start, in the direction of the first move
+    times_s: FloatArray
+    way_mm: FloatArray  # way of the part's axis from its start, in the direction of the first move
     noise_mm: float  # standard deviation of a sample at rest
 
-    def middles_s(self) -> Array:
+    def middles_s(self) -> FloatArray:
         """The times at which a there-and-back part passes the middle of its way, (n,)."""
         length = abs(self.part.length_mm) * self.part.stride
         u = self.way_mm / length - 0.5
@@ -189,7 +182,7 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
     return out
 
 
-def smoothed_share(times: Array, boxes: Sequence[float] | Array) -> Array:
+def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
     """Share of the way at the times after the start, for a rectangle and moving averages of these lengths in s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power = len(used)
@@ -202,11 +195,11 @@ def smoothed_share(times: Array, boxes: Sequence[float] | Array) -> Array:
     return np.asarray(out / (math.factorial(power) * math.prod(used)))
 
 
-def lagged_share(times: Array, values: Array) -> Array:
+def lagged_share(times: FloatArray, values: FloatArray) -> FloatArray:
     """The same for a rectangle and an exponential: duration and time constant in s."""
     rectangle_s, lag_s = values
 
-    def ramp(t: Array) -> Array:
+    def ramp(t: FloatArray) -> FloatArray:
         late = np.maximum(t, 0.0)
         return np.asarray(late + lag_s * np.expm1(-late / lag_s))
 
@@ -217,14 +210,14 @@ def lagged_share(times: Array, values: Array) -> Array:
 class ShapeFit:
     """A curve fitted to the moves of a part."""
 
-    values: Array  # the fitted parameters, without the start
-    half: Array  # half-widths of their 95 % intervals
+    values: FloatArray  # the fitted parameters, without the start
+    half: FloatArray  # half-widths of their 95 % intervals
     rms_mm: float  # what the fit leaves
 
 
 def fit_shape(
     log: PartLog,
-    share: Callable[[Array, Array], Array],
+    share: Callable[[FloatArray, FloatArray], FloatArray],
     guess: Sequence[float],
     low: Sequence[float],
     high: Sequence[float],
@@ -242,10 +235,10 @@ def fit_shape(
         pieces_t.append(log.times_s[inside] - middle)
         pieces_y.append(way if k % 2 == 0 else 1.0 - way)
     t, y = np.concatenate(pieces_t), np.concatenate(pieces_y)
-    every = -(-len(t) // _MOST_SAMPLES)
+    every = -(-len(t) // _MAX_SAMPLES)
     t, y = t[::every], y[::every]
 
-    def residual(p: Array) -> Array:
+    def residual(p: FloatArray) -> FloatArray:
         return np.asarray((share(t - p[-1], p[:-1]) - y) * length)
 
     grid = np.linspace(0.0, 2.0, 20001)

@@ -171,8 +171,7 @@ def readme_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
     return "\n".join(text)
 
 
-SHEET = "RESULTS.toml"
-"""Name of the file."""
+SHEET = "RESULTS.toml"  # Name of the file
 
 _Whole = Annotated[Count, Field(ge=1, le=1_000_000)]
 _Length = Annotated[Float, Field(ge=-1e5, le=1e5)]

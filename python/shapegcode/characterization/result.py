@@ -13,8 +13,7 @@ from shapegcode.results.json import hidden
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-#: What a stopwatch sees of the acceleration after interpolation.
-CUTTING_SUM = "cutting time constant + bell time"
+CUTTING_SUM = "cutting time constant + bell time"  # What a stopwatch sees of the acceleration after interpolation
 #: Interpolation periods that controls are built with, s.
 PERIODS_S = tuple(ms / 1000.0 for ms in (0.125, 0.25, 0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16))
 
@@ -103,10 +102,7 @@ def mean(values: Sequence[float], halves: Sequence[float]) -> tuple[float, float
 
 
 def combine(first: Sequence[ControllerFact], second: Sequence[ControllerFact]) -> list[ControllerFact]:
-    """For each quantity the better of two facts: a known one, then the narrower interval.
-
-    Where the two contradict each other, the note says so.
-    """
+    """For each quantity the better of two facts, known and narrow; the note says where they contradict each other."""
     other = {each.quantity: each for each in second}
     out: list[ControllerFact] = []
     for each in first:
@@ -183,18 +179,18 @@ class CharacterisationTests(Result):
 
     def tables(self) -> list[Table]:
         """One row for each test."""
+
+        def run_for(test: WrittenTest) -> str:
+            return test.kind if test.override_percent == 100 else f"{test.kind} {test.override_percent} %"
+
         columns = (
             Column("program", text=True),
             Column("test", value="name", text=True),
-            Column("for", value=_run_for, text=True),
+            Column("for", value=run_for, text=True),
             Column("expected", "s", "expected_s", digits=1),
             Column("purpose", value=lambda test: test.purpose.lower(), text=True),
         )
         return [Table("", columns, self.tests)]
-
-
-def _run_for(test: WrittenTest) -> str:
-    return test.kind if test.override_percent == 100 else f"{test.kind} {test.override_percent} %"
 
 
 @dataclass(frozen=True, repr=False, eq=False)

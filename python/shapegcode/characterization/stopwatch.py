@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode.characterization.air_tests import (
     AXES,
@@ -26,8 +25,8 @@ from shapegcode.characterization.air_tests import (
 )
 from shapegcode.characterization.programs import FilledSheet
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, Facts
+from shapegcode.io.record import FloatArray
 
-Array = npt.NDArray[np.float64]
 _CLEARLY = 9.0  # chi² by which an alternative must fit worse
 _WIDE = 0.5  # of the value: an interval of so much either way determines nothing
 _CONTRADICTS = 4.0  # standard deviations
@@ -59,8 +58,8 @@ class WatchFacts(Facts):
 class _Fit:
     period: float
     end: BlockEnd
-    values: Array
-    covariance: Array
+    values: FloatArray
+    covariance: FloatArray
     chi2: float
 
     def get(self, name: str) -> tuple[float, float]:
@@ -135,7 +134,7 @@ def _used(rows: dict[str, TimedTest], exponential: float) -> list[TimedTest]:
     ]
 
 
-def _timing(values: Array, period: float, end: BlockEnd) -> ControllerTiming:
+def _timing(values: FloatArray, period: float, end: BlockEnd) -> ControllerTiming:
     overhead, cutting, x, y, z, block = values.tolist()
     waits = dict(zip(AXES, (x, y, z), strict=True))
     return ControllerTiming(period, end, block, cutting, in_position_s=waits, overhead_s=overhead)
@@ -149,7 +148,7 @@ def _least_squares(rows: Sequence[TimedTest], period: float, end: BlockEnd) -> _
     block = tiny.time_s / tiny.test.parts[0].count if tiny else 0.005
     begin = np.array([0.3, 0.1, 0.05, 0.05, 0.05, block])
 
-    def residual(p: Array) -> Array:
+    def residual(p: FloatArray) -> FloatArray:
         timing = _timing(p, period, end)
         fits = [(program_time_s(row.test, timing) - row.time_s) / row.sigma_s for row in rows]
         return np.array([*fits, *((p - begin) / _PRIOR_S)])
@@ -317,7 +316,7 @@ def fit_timed_rapids(
     return ""
 
 
-def _ramp(facts: Facts, axis: str, ramps: Array, likely: Array) -> None:
+def _ramp(facts: Facts, axis: str, ramps: FloatArray, likely: FloatArray) -> None:
     """The time constant: mean and ends of those that fit."""
     name = f"rapid time constant {axis}"
     step = float(_RAMPS_S[1] - _RAMPS_S[0])

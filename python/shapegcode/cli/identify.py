@@ -13,7 +13,7 @@ from shapegcode.io.atomic import write_text
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-_MAX_MODES = 8  # as identify.MOST_MODES, which would have to be imported with all that is slow
+_MAX_MODES = 8  # as identify.MAX_MODES, which would have to be imported with all that is slow
 _HELP_TIME = "where the decay begins in the file, for example 250ms (default: found by itself)"
 # What the user says of a file, over what it says itself: option, field of ReadOptions, how it is read, help.
 _OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
@@ -134,7 +134,7 @@ def _identify(args: argparse.Namespace) -> int:
 
 def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> None:
     """Have somebody decide over modes of the other axes that nobody measured on this machine."""
-    from shapegcode.identification.other_axes import open_modes, require_decisions
+    from shapegcode.identification.update import open_modes, require_decisions
 
     found = open_modes(machine, axis)
     args.keep_modes, args.rigid = options.decided_modes(args, found, f"{args.update}: not measured on this machine:")

@@ -122,8 +122,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _write(args: argparse.Namespace) -> int:
     from shapegcode.cutting.tool import Tool
-    from shapegcode.testcut.design import CornerShape, CutConditions, corner_cut, interval_cut, taper_cut
-    from shapegcode.testcut.program import write_test_cut
+    from shapegcode.testcut.design import (
+        CornerShape,
+        CutConditions,
+        corner_cut,
+        interval_cut,
+        taper_cut,
+        write_test_cut,
+    )
 
     feed = args.feeds[0] if args.action == "taper" else args.feed
     conditions = CutConditions(load_machine(args), Tool.load(args.tool), feed, args.axial_depth, args.spindle, args.up)

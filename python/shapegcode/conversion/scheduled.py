@@ -16,11 +16,10 @@ from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.write import filter_tolerance
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.figures import feed_figures
 from shapegcode.feed.load import PathLoad, load_of
 from shapegcode.feed.plan import OrdinaryMotion, Travelled, travel_emitted
 from shapegcode.feed.result import FeedSchedule
-from shapegcode.feed.schedule import MARGIN, schedule_survey
+from shapegcode.feed.schedule import MARGIN, feed_figures, schedule_survey
 from shapegcode.feed.survey import survey
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel

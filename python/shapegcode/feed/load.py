@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.cutting.tool import Limits, Tool
+from shapegcode.cutting.tool import Tool
 from shapegcode.feed.plan import FeedPlan, Mover, Travelled, Vector, goes_on, limits_of
 from shapegcode.feed.survey import Survey, SurveyedMove, SurveyedRegion
 from shapegcode.machine import Machine
@@ -24,8 +24,7 @@ _IN_WORDS = {  # column of Load, which is the name of its limit in the core: nam
     "peak_torque_nm": ("torque", "N m"),
     "mean_power_w": ("power", "W"),
 }
-LOADS = tuple(_IN_WORDS)
-"""Names of what is limited: columns of `Load`."""
+LOADS = tuple(_IN_WORDS)  # Names of what is limited: columns of `Load`
 _COLUMNS = 400
 _ROWS = 31
 
@@ -136,7 +135,10 @@ def feed_traces(
     length = np.concatenate(lengths)
     counts = np.array([len(each) for each in lengths])
     limits = [_limits(part) for part, *_ in parts]
-    programmed = [_programmed(part, track) for part, track, *_ in parts]
+    programmed = [
+        np.asarray(part.region.path.segment_feeds_mm_per_s * 60.0)[np.asarray(track.segment)]
+        for part, track, *_ in parts
+    ]
     written = [
         was if plan is None else _written(plan, load) for was, (*_, plan, load) in zip(programmed, parts, strict=True)
     ]
@@ -156,22 +158,17 @@ def feed_traces(
     )
 
 
-def _programmed(part: SurveyedRegion, track: _core.EngagementTrack) -> Vector:
-    feeds: Vector = (part.region.path.segment_feeds_mm_per_s * 60.0)[np.asarray(track.segment)]
-    return feeds
-
-
 def _written(plan: FeedPlan, load: PathLoad) -> Vector:
     ends = np.array([stretch.end_mm for stretch in plan.stretches])
     # The middle of a stretch: its end may be the place where the feed changes.
     middles = load.s_mm - 0.5 * np.diff(load.s_mm, prepend=0.0)
     inside = np.minimum(np.searchsorted(ends, middles), len(ends) - 1)
-    feeds: Vector = np.array([stretch.feed_mm_per_min for stretch in plan.stretches])[inside]
-    return feeds
+    return np.array([stretch.feed_mm_per_min for stretch in plan.stretches])[inside]
 
 
 def _limits(part: SurveyedRegion) -> dict[str, float]:
-    limits = Limits() if part.tool is None else part.tool.limits
+    assert part.tool is not None
+    limits = part.tool.limits
     peak = limits.resultant == "peak"
     values = {
         "peak_resultant_n": limits.resultant_n if peak else None,

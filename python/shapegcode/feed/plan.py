@@ -20,12 +20,12 @@ _ATTEMPTS = 12
 _LONGEST_REACH = 2.0  # of the lag, beyond which waiting longer changes nothing
 _LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered too
 _SAME_DIRECTION = 0.95  # cosine of a turn after which the load is still that of before
-_LEAST_SHARE = 0.9  # of a feed that is lowered once
+_MIN_SHARE = 0.9  # of a feed that is lowered once
 _TOO_FAST = 1e-4  # relative: rounding of the travel, far below the margin
 _DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
 _AIR_MM2 = 1e-9
 _STEEPEST_AIR = 0.7  # share of the travel in XY from which on a move in air is no plunge
-_LEAST_PROGRAMMED = 0.1  # of the programmed feed, where the tool file says no least chip
+_MIN_PROGRAMMED = 0.1  # of the programmed feed, where the tool file says no least chip
 _STEP = 0.005  # feeds that differ by less are one: a border for less gains nothing
 _LIMIT_NAMES = np.array(
     [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
@@ -135,7 +135,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
     least = max((tool.limits.feed_per_tooth_min_mm or 0.0) * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
     kept = _kept_segments(surveyed, programmed, least, tool)
     # Without a least chip nobody wants the tool to rub for hours to keep a limit that cannot be kept.
-    share = 0.0 if tool.limits.feed_per_tooth_min_mm else _LEAST_PROGRAMMED
+    share = 0.0 if tool.limits.feed_per_tooth_min_mm else _MIN_PROGRAMMED
     slowest = np.maximum(least, share * programmed)
     lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # what F can say
     limit, holds, load = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
@@ -144,18 +144,9 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
     limit = np.where(frozen[segment], programmed[segment], limit)
     holds[frozen[segment]] = KEPT
     window_s = 60.0 / teeth_per_min
+    stations_mm, stays = np.asarray(track.s_mm), np.where(frozen, programmed, 0.0)
     task = _Task(
-        path=path,
-        stations_mm=np.asarray(track.s_mm),
-        segment=segment,
-        limit=limit,
-        load=load,
-        kept=np.where(frozen, programmed, 0.0),
-        programmed=programmed,
-        divisible=divisible,
-        lowest=lowest,
-        feed_unit=feed_unit_mm_per_min,
-        window_s=window_s,
+        path, stations_mm, segment, limit, load, stays, programmed, divisible, lowest, feed_unit_mm_per_min, window_s
     )
     stretches = _stretches_that_keep(task, machine, motion)
     return FeedPlan(surveyed, limit, holds, kept, tuple(stretches), at_minimum, window_s)
@@ -204,10 +195,9 @@ def _limits_along(
             f"feed.max_feed_mm_per_min = {most:g} of {tool.tool.name}: must not be below "
             f"controller.minimum_feed_mm_per_min = {least:g}"
         )
-    fastest = min(axes.x.max_feed_mm_per_min, axes.y.max_feed_mm_per_min)
-    fastest = min(fastest, tool.feed.max_feed_mm_per_min or fastest)
+    fastest = min(axes.x.max_feed_mm_per_min, axes.y.max_feed_mm_per_min, most or math.inf)
     # Without a largest chip nobody said that more than the programmed feed is wanted in material.
-    raised = tool.limits.feed_per_tooth_max_mm is not None or tool.feed.max_feed_mm_per_min is not None
+    raised = tool.limits.feed_per_tooth_max_mm is not None or most is not None
     ceiling = np.full(len(programmed), fastest) if raised else np.minimum(programmed, fastest)
     force = tool.force(surveyed.spindle_rev_per_min, surveyed.sense)
     highest = max(fastest, float(ceiling.max()))
@@ -233,8 +223,7 @@ def _limits_along(
     load[1:] = np.where(passed, np.minimum(load[1:], load[:-1]), load[1:])
     if tool.feed.air_feed_mm_per_min is not None:
         level = np.asarray(track.horizontal) > _STEEPEST_AIR  # nobody wants a tool to come down faster than he said
-        certain = air if surveyed.clear is None else surveyed.clear
-        certain = air & certain
+        certain = air if surveyed.clear is None else air & surveyed.clear
         near = _near_material(np.asarray(track.s_mm), certain, tool.feed.approach_mm)
         clear = certain & (holds == AIR) & level & ~near
         feeds[clear] = np.maximum(programmed[clear], min(tool.feed.air_feed_mm_per_min, fastest))
@@ -242,30 +231,24 @@ def _limits_along(
 
 
 def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
-    """Per station but the last whether the tool goes on from it in much the same direction, (n - 1,).
-
-    At a corner the load of the block before ends with the block.
-    """
+    """Per station but the last, (n - 1,): whether the tool goes on in much the same direction, and its load with it."""
     turn = np.diff(np.asarray(track.direction_rad))
     level = np.asarray(track.horizontal)
-    on: npt.NDArray[np.bool_] = (np.cos(turn) > _SAME_DIRECTION) & (level[1:] > 0.0) & (level[:-1] > 0.0)
-    return on
+    return np.asarray((np.cos(turn) > _SAME_DIRECTION) & (level[1:] > 0.0) & (level[:-1] > 0.0))
 
 
 def _stepped(limit: Vector, programmed: Vector) -> Vector:
     """Feeds rounded down to steps of half a percent below the programmed one, or the largest if that is more."""
     top = np.where(limit > programmed, limit.max(initial=0.0), programmed)
     steps = np.ceil(np.log(top / limit) / math.log1p(_STEP) - 1e-9)
-    down: Vector = top * (1.0 + _STEP) ** -steps
-    return down
+    return np.asarray(top * (1.0 + _STEP) ** -steps)
 
 
 def _near_material(s_mm: Vector, air: npt.NDArray[np.bool_], approach_mm: float) -> npt.NDArray[np.bool_]:
     """Stations from which the next material is no farther than the approach."""
     contact = np.where(air, np.inf, np.concatenate(([0.0], s_mm[:-1])))  # where the stretch of a station begins
     following = np.minimum.accumulate(contact[::-1])[::-1]
-    near: npt.NDArray[np.bool_] = following - s_mm <= approach_mm
-    return near
+    return np.asarray(following - s_mm <= approach_mm)
 
 
 def _stretches_that_keep(task: _Task, machine: Machine, motion: Mover) -> list[_core.FeedStretch]:
@@ -294,6 +277,6 @@ def _stretches_that_keep(task: _Task, machine: Machine, motion: Mover) -> list[_
         for reach in (before, behind):
             reach[over] = np.minimum(1.5 * reach[over] + task.window_s, longest)
         if attempt >= _LOWERING:
-            planned[over] *= np.maximum(task.load[over] / run[over], _LEAST_SHARE)
+            planned[over] *= np.maximum(task.load[over] / run[over], _MIN_SHARE)
             planned = np.maximum(planned, floor)
     return stretches

@@ -44,7 +44,6 @@ _LOADS = (
 )
 _ALWAYS = ("peak_resultant_n", "mean_resultant_n")
 _NO_WALL = "#c9c9c9"
-FloatArray = npt.NDArray[np.float64]
 
 
 def plots_of(schedule: FeedSchedule) -> dict[str, Plot]:
@@ -109,10 +108,9 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
         along.draw(panel, getattr(traces.load.original, name), _BEFORE, "before")
         along.draw(panel, getattr(traces.load.emitted, name), _AFTER, "after")
         limit = traces.limit[name]
-        if np.isfinite(limit).any():
-            along.draw(
-                panel, np.where(np.isfinite(limit), limit, np.nan), _LIMIT, _limit_label(limit, unit), dashed=True
-            )
+        if len(values := np.unique(limit[np.isfinite(limit)])):
+            said = f"limit {plot.number(values[0], 4)} {unit}" if len(values) == 1 else "limit"
+            along.draw(panel, np.where(np.isfinite(limit), limit, np.nan), _LIMIT, said, dashed=True)
         panel.set_ylim(bottom=0.0)
         panel.set_ylabel(label)
         plot.legend_above(panel)
@@ -120,11 +118,6 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
     for panel in panels:
         panel.margins(x=0.01)
     return plot.aligned(panels)
-
-
-def _limit_label(limit: Vector, unit: str) -> str:
-    values = np.unique(limit[np.isfinite(limit)])
-    return f"limit {plot.number(values[0], 4)} {unit}" if len(values) == 1 else "limit"
 
 
 def _feed_axis(panel: Axes, feeds: Vector) -> None:
@@ -352,7 +345,7 @@ def with_forces(scene: Scene, schedule: FeedSchedule) -> Scene:
     return replace(scene, variants=tuple(variants))
 
 
-def _along(variant: Variant, known: Sequence[tuple[Region, FloatArray, FloatArray]]) -> FloatArray:
+def _along(variant: Variant, known: Sequence[tuple[Region, Vector, Vector]]) -> Vector:
     """Force at each kept sample: by its share of the way through its region."""
     force = np.zeros(len(variant.sample))
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(variant.command_mm, axis=0), axis=1))])

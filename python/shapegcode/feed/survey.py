@@ -25,7 +25,7 @@ Progress = Callable[[int, int], None]
 _SHOWN_COLLISIONS = 5
 _SLACK_MM = 1e-6
 _TOOL_CHANGE, _CLOCKWISE, _COUNTER_CLOCKWISE, _STOP = 6, 3, 4, 5
-_COMMENT = re.compile(rb"\([^)]*\)")
+COMMENT = re.compile(rb"\([^)]*\)")
 _CODE = re.compile(rb"G0*(52|53|54\.1|54|55|56|57|58|59|92|10)(?![\d.])")
 _P = re.compile(rb"P0*(\d+)")
 _SHIFT_WORD = re.compile(rb"[XYZIJK]\s*([+-]?[\d.]+)")
@@ -303,10 +303,8 @@ class Walk:
     def tell_collisions(self) -> None:
         """A warning for each place at which a rapid runs into material; of many the first ones."""
         places = list(dict.fromkeys(self._collisions))
-        told = [
-            f"{place}: rapid into material: is Z 0 of the stock file that of the program?"
-            for place in places[:_SHOWN_COLLISIONS]
-        ]
+        why = "rapid into material: is Z 0 of the stock file that of the program?"
+        told = [f"{place}: {why}" for place in places[:_SHOWN_COLLISIONS]]
         if len(places) > _SHOWN_COLLISIONS:
             told.append(f"{self._program.source}: {len(places) - _SHOWN_COLLISIONS} more rapids into material")
         self.warnings[:0] = told
@@ -361,9 +359,6 @@ class ZeroPoints:
 
     The stock lies in the coordinates that hold at the first cutting move; where others hold, positions are not
     comparable.
-
-    Args:
-        program: the program.
     """
 
     def __init__(self, program: Program) -> None:
@@ -374,7 +369,7 @@ class ZeroPoints:
         for number, raw in enumerate(program.core.text.split(b"\n"), start=1):
             if b"G" not in raw and b"g" not in raw:
                 continue
-            line = _COMMENT.sub(b"", raw).upper().replace(b" ", b"")
+            line = COMMENT.sub(b"", raw).upper().replace(b" ", b"")
             for code in (match.group(1) for match in _CODE.finditer(line)):
                 if code == b"53":
                     self._machine.add(number)

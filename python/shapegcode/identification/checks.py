@@ -6,36 +6,87 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.decay import find_decay
-from shapegcode.identification.hits import Hit, find_hits, split_hits
-from shapegcode.identification.prepared import Prepared, Refused
-from shapegcode.identification.quality import DECAYED, excited_hz, is_clipped, refuse_short
-from shapegcode.io.record import UNITS, FloatArray, Record
+from shapegcode.identification.spectra import decay_spectrum
+from shapegcode.io.record import UNITS, FloatArray, Quantity, Record
+
+
+@dataclass(frozen=True)
+class RecordUse:
+    """What became of one tap or decay.
+
+    Attributes:
+        source: file, and which hit or channel of it.
+        used: whether the modes come from it too.
+        reason: why it is not used; empty: it is.
+        samples: that were recorded; null where it is not used, as for the others.
+        period_s: time between two samples.
+        start_s: time of the first sample in the file.
+        quantity: what the sensor measured.
+        excited_hz: up to where the hit excites (-20 dB); null for a decay.
+        resolution_hz: distance of two lines of a frequency response without time record, whose lines are its samples.
+    """
+
+    source: str
+    used: bool
+    reason: str = ""
+    samples: int | None = None
+    period_s: float | None = None
+    start_s: float | None = None
+    quantity: Quantity | None = None
+    excited_hz: float | None = None
+    resolution_hz: float | None = None
+
+    @property
+    def duration_s(self) -> float | None:
+        """How long it lasts; None where it is not used."""
+        return None if self.samples is None or self.period_s is None else self.samples * self.period_s
+
+
+@dataclass(frozen=True, eq=False)
+class Usable:
+    """A record that can be used, and what is known of it; all but the record is None of a free decay."""
+
+    record: Record  # without offset; the force is 0 outside the pulse; a free decay from where it begins
+    force_noise_n: float | None = None  # RMS noise of the force off the pulse
+    response_noise: float | None = None  # RMS noise of the response before the hit, in its unit; None: not measured
+    excited_hz: float | None = None  # frequency up to which the force excites (-20 dB)
+    hit: Hit | None = None  # the pulse
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Records of taps or decays that were looked through."""
+
+    usable: tuple[Usable, ...]
+    refused: tuple[RecordUse, ...]  # the others
+    warnings: tuple[str, ...]  # what the user should know
+    notes: tuple[str, ...]  # what was left out of the files
+
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """Those that can be used."""
+        return tuple(each.record for each in self.usable)
+
 
 #: A second pulse above this share of the first is refused: the momentum, and so the mass, would be off by as much.
 #: Below, it may be the ringing of an anti-aliasing filter, which reaches 9 %.
 DOUBLE_HIT = 0.1
-#: The force must stand out of its noise by this factor: the mass would be off by about the inverse.
-LEAST_FORCE = 10.0
-#: A pulse of fewer samples does not tell its momentum: with three, a half sine is known to about 10 %.
-LEAST_PULSE = 3
-#: Samples before the hit from which noise and offset are measured: a standard deviation to 25 %.
-LEAST_LEAD = 8
+MIN_FORCE = 10.0  # The force must stand out of its noise by this factor: the mass would be off by about the inverse
+MIN_PULSE = 3  # A pulse of fewer samples does not tell its momentum: with three, a half sine is known to about 10 %
+MIN_LEAD = 8  # Samples before the hit from which noise and offset are measured: a standard deviation to 25 %
 #: A record that begins inside the pulse at more than this share of its peak has lost too much of the momentum.
 _CUT_PULSE = 0.2
-#: The machine was at rest before the hit if it shook less than this share of what it did afterwards.
-_AT_REST = 0.1
+_AT_REST = 0.1  # The machine was at rest before the hit if it shook less than this share of what it did afterwards
 #: The force counts for half a pulse on either side of it, and for so many samples at least: the feet of the pulse hold
 #: some tenths of a percent of its momentum.
-_LEAST_MARGIN = 3
-#: An offset is taken away where it exceeds so many standard errors of its mean.
-_OFFSET_ERRORS = 2.0
-#: An offset of the force above this share of the peak is told.
-_OFFSET_TOLD = 0.05
-#: Correlation of force and response below which the two point against one another.
-_OPPOSED = -0.7
+_MIN_MARGIN = 3
+_OFFSET_ERRORS = 2.0  # An offset is taken away where it exceeds so many standard errors of its mean
+_OFFSET_TOLD = 0.05  # An offset of the force above this share of the peak is told
+_OPPOSED = -0.7  # Correlation of force and response below which the two point against one another
 #: Sampling periods may differ by this share: a file of six digits is off by less than a sample in a whole record.
 _SAME_PERIOD = 1e-5
 
@@ -49,7 +100,7 @@ def _mean_to_remove(values: FloatArray) -> float:
 
 def _orient(record: Record, hit: Hit, response: FloatArray, force: FloatArray, warnings: list[str]) -> FloatArray:
     """The response with the sign that the push of the hammer gives it at the point of the tap."""
-    if hit.end - hit.first < LEAST_PULSE:
+    if hit.end - hit.first < MIN_PULSE:
         return response
     stretch = slice(hit.first, min(hit.end + (hit.end - hit.first), len(force)))
     push = force[stretch]
@@ -68,18 +119,7 @@ def _orient(record: Record, hit: Hit, response: FloatArray, force: FloatArray, w
     return response
 
 
-@dataclass(frozen=True, eq=False)
-class _Usable:
-    """A record that passed, and its figures."""
-
-    record: Record
-    force_noise_n: float | None
-    response_noise: float | None
-    excited_hz: float | None
-    hit: Hit | None
-
-
-def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> _Usable:
+def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
     """Check a record with force."""
     force = record.force_n
     assert force is not None
@@ -99,11 +139,11 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> _Usable:
     for each in hits:
         off_pulse[each.first : each.end] = False
     quiet = force[off_pulse]
-    sigma = float(np.std(quiet)) if quiet.size >= LEAST_LEAD else 0.0
-    if not hits or abs(hits[0].peak_n) < LEAST_FORCE * sigma:
+    sigma = float(np.std(quiet)) if quiet.size >= MIN_LEAD else 0.0
+    if not hits or abs(hits[0].peak_n) < MIN_FORCE * sigma:
         peak = float(np.max(np.abs(force - np.median(force))))
         raise RecordError(
-            f"no hit stands out: the largest force, {peak:.4g} N, is less than {LEAST_FORCE:g} times its noise of "
+            f"no hit stands out: the largest force, {peak:.4g} N, is less than {MIN_FORCE:g} times its noise of "
             f"{sigma:.3g} N; hit harder or choose a smaller range"
         )
     hit = hits[0]
@@ -115,7 +155,7 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> _Usable:
     if hit.first == 0 and hit.peak > 0 and (force[0] - np.median(force)) / hit.peak_n > _CUT_PULSE:
         raise RecordError(
             "the record begins inside the pulse: part of the force is missing; needed is a pre-trigger of some "
-            f"{LEAST_LEAD} samples or more"
+            f"{MIN_LEAD} samples or more"
         )
     if hit.second_share > 0.0:
         warnings.append(
@@ -127,14 +167,14 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> _Usable:
 
 def _windowed(
     record: Record, hit: Hit, quiet: FloatArray, sigma: float, band_hz: float | None, warnings: list[str]
-) -> _Usable:
+) -> Usable:
     assert record.force_n is not None
     where = record.source
-    offset = _mean_to_remove(quiet) if quiet.size >= LEAST_LEAD else 0.0
+    offset = _mean_to_remove(quiet) if quiet.size >= MIN_LEAD else 0.0
     if abs(offset) > _OFFSET_TOLD * abs(hit.peak_n):
         warnings.append(f"{where}: offset of the force, {offset:.4g} N, taken away")
     force = np.zeros(len(record.force_n))
-    margin = max(_LEAST_MARGIN, (hit.end - hit.first) // 2)
+    margin = max(_MIN_MARGIN, (hit.end - hit.first) // 2)
     window = slice(max(hit.first - margin, 0), hit.end + margin)
     force[window] = record.force_n[window] - offset
     if hit.peak_n < 0.0:
@@ -142,9 +182,9 @@ def _windowed(
         force = -force
     response, noise = record.response, None
     lead = response[: max(hit.first - 1, 0)]
-    if len(lead) < LEAST_LEAD:
+    if len(lead) < MIN_LEAD:
         warnings.append(
-            f"{where}: {len(lead)} samples before the hit: noise and offset are measured from {LEAST_LEAD} or more "
+            f"{where}: {len(lead)} samples before the hit: noise and offset are measured from {MIN_LEAD} or more "
             "(pre-trigger)"
         )
     else:
@@ -157,13 +197,13 @@ def _windowed(
                 "noise, or the machine was not at rest"
             )
     width = int(np.count_nonzero(np.abs(force) > 0.1 * abs(hit.peak_n)))
-    if width < LEAST_PULSE:
+    if width < MIN_PULSE:
         warnings.append(
-            f"{where}: the pulse has {width} samples above a tenth of its peak: below {LEAST_PULSE} its momentum, and "
+            f"{where}: the pulse has {width} samples above a tenth of its peak: below {MIN_PULSE} its momentum, and "
             "so the mass, is uncertain; sample faster or take a softer tip"
         )
     strongest = refuse_short(
-        record, response[hit.first if hit.end - hit.first > LEAST_PULSE else hit.end :], noise or 0.0, band_hz, warnings
+        record, response[hit.first if hit.end - hit.first > MIN_PULSE else hit.end :], noise or 0.0, band_hz, warnings
     )
     reached = excited_hz(force, record.period_s)
     wanted = band_hz or strongest
@@ -174,10 +214,10 @@ def _windowed(
             f"{' asked for' if band_hz else ''}: take a harder tip"
         )
     response = _orient(record, hit, response, force, warnings)
-    return _Usable(replace(record, response=response, force_n=force), sigma, noise, reached, hit)
+    return Usable(replace(record, response=response, force_n=force), sigma, noise, reached, hit)
 
 
-def _decay(record: Record, band_hz: float | None, start_s: float | None, warnings: list[str]) -> _Usable:
+def _decay(record: Record, band_hz: float | None, start_s: float | None, warnings: list[str]) -> Usable:
     """Check a record without force."""
     free = find_decay(record, start_s)
     if is_clipped(free.response):
@@ -186,27 +226,23 @@ def _decay(record: Record, band_hz: float | None, start_s: float | None, warning
             f"{UNITS[record.quantity]}; needed is a larger range of the input"
         )
     refuse_short(free, free.response, 0.0, band_hz, warnings)
-    tenth = free.response[-max(len(free.response) // 10, LEAST_LEAD) :]
+    tenth = free.response[-max(len(free.response) // 10, MIN_LEAD) :]
     offset = float(np.mean(tenth))
     still = float(np.std(tenth)) < DECAYED * float(np.std(free.response[: len(tenth)]))
     if still and _mean_to_remove(tenth):
         free = replace(free, response=free.response - offset)
-    return _Usable(free, None, None, None, None)
+    return Usable(free)
 
 
 def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s: float | None = None) -> Prepared:
-    """Divide recordings into hits, find where decays begin, and leave out what cannot be used.
-
-    The force is set to 0 outside its pulse after its offset is taken away, and the offset of the response where it
-    shows before the hit.
-    """
+    """Divide recordings into hits, find where decays begin, and leave out what cannot be used."""
     if not records:
         raise RecordError("no record: needed is at least one tap or decay")
     _refuse_mixture(records)
     warnings = list(dict.fromkeys(text for record in records for text in record.warnings))
     notes = tuple(dict.fromkeys(text for record in records for text in record.notes))
-    usable: list[_Usable] = []
-    refused: list[Refused] = []
+    usable: list[Usable] = []
+    refused: list[RecordUse] = []
     for record in (part for each in records for part in split_hits(each)):
         try:
             if record.force_n is not None:
@@ -214,19 +250,10 @@ def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s:
             else:
                 usable.append(_decay(record, band_hz, start_s, warnings))
         except RecordError as error:
-            refused.append(Refused(record.source, str(error).removeprefix(f"{record.source}: ")))
+            refused.append(RecordUse(record.source, False, str(error).removeprefix(f"{record.source}: ")))
     if not usable:
         raise RecordError("no record can be used:\n" + "\n".join(f"{each.source}: {each.reason}" for each in refused))
-    return Prepared(
-        records=tuple(each.record for each in usable),
-        refused=tuple(refused),
-        warnings=tuple(warnings),
-        notes=notes,
-        force_noise_n=tuple(each.force_noise_n for each in usable),
-        response_noise=tuple(each.response_noise for each in usable),
-        excited_hz=tuple(each.excited_hz for each in usable),
-        hits=tuple(each.hit for each in usable),
-    )
+    return Prepared(tuple(usable), tuple(refused), tuple(warnings), notes)
 
 
 def _refuse_mixture(records: Sequence[Record]) -> None:
@@ -249,3 +276,244 @@ def _refuse_mixture(records: Sequence[Record]) -> None:
                 f"{first.source} has a sample every {first.period_s:.9g} s, {other.source} every "
                 f"{other.period_s:.9g} s: must be sampled alike"
             )
+
+
+_CLIPPED_RUN = 3  # So many equal extreme samples on end may be an overload; two can lie on either side of a smooth peak
+#: Values closer than this share of the range are equal: converters with filters do not clip to one value.
+_CLIPPED_STEP = 1e-4
+#: At a smooth peak the curve has fallen by four resolutions where it is twice as far from the top as the run's ends.
+_SMOOTH_FALL = 6.0
+#: A lobe is flat if more than this share of what lies above half of it lies above 95 %, in so many samples at least.
+_NEARLY_TOP = 0.95
+_FLAT_SHARE = 0.5
+_FLAT_RUN = 5
+_EXCITED = 0.1  # Where the force's spectrum has fallen to this share (-20 dB), noise counts tenfold
+#: A half sine falls to that share at this many over its duration: cos(pi x) / (1 - 4 x²) = 0.1 in size.
+EXCITED_HALF_SINE = 1.3033
+#: Periods that tell a damping ratio though the response has not decayed; fewer do not tell decay from beat.
+MIN_PERIODS = 8.0
+_STRONG_PEAK = 0.3  # ... of the lowest vibration whose peak in the spectrum has this share of the largest
+DECAYED = 0.1  # Decayed: the last tenth of the record is below this share of the beginning
+_MIN_SAMPLES = 32  # Samples after the hit below which no model has data enough
+#: The strongest frequency must lie below this share of half the sampling rate: above, filters cut and modes fold.
+FOLDING = 0.8
+
+
+def is_clipped(values: FloatArray) -> bool:
+    """Whether a signal is cut off: three or more samples at its extreme, steeper beside it than a smooth peak is."""
+    centred = values - np.median(values)
+    largest = float(np.max(np.abs(centred)))
+    if largest == 0.0:
+        return False
+    if any(_is_flat_topped(signal) for signal in (centred, -centred) if np.max(signal) >= 0.5 * largest):
+        return True
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 0.0]
+    step = max(_CLIPPED_STEP * float(np.ptp(values)), float(np.min(steps)))
+    for signal in (centred, -centred):
+        top = float(np.max(signal))
+        if top < 0.5 * largest:
+            continue
+        high = np.flatnonzero(signal >= top - 0.5 * step)
+        for run in np.split(high, np.flatnonzero(np.diff(high) > 1) + 1):
+            if len(run) < _CLIPPED_RUN:
+                continue
+            reach = (len(run) + 1) // 2
+            sides = [k for k in (int(run[0]) - reach, int(run[-1]) + reach) if 0 <= k < len(signal)]
+            # A cut falls on both sides; a peak with a kink, where the force begins or ends, on one.
+            if sides and top - max(float(signal[k]) for k in sides) > _SMOOTH_FALL * step:
+                return True
+    return False
+
+
+def _is_flat_topped(signal: FloatArray) -> bool:
+    """Whether the highest lobe is cut off though noise hides it: .5 of its upper half above 95 %, .3 of a smooth one"""
+    top = float(np.max(signal))
+    crest = int(np.argmax(signal))
+    high, half = (_run_around(signal > share * top, crest) for share in (_NEARLY_TOP, 0.5))
+    return high >= _FLAT_RUN and high > _FLAT_SHARE * half
+
+
+def _run_around(inside: npt.NDArray[np.bool_], at: int) -> int:
+    """Length of the run of True that holds a place."""
+    outside = np.flatnonzero(~inside)
+    place = int(np.searchsorted(outside, at))
+    before = int(outside[place - 1]) if place > 0 else -1
+    after = int(outside[place]) if place < len(outside) else len(inside)
+    return after - before - 1
+
+
+def excited_hz(force_n: FloatArray, period_s: float) -> float:
+    """Frequency up to which a pulse excites: where its spectrum has fallen by 20 dB, at most half the sampling rate."""
+    pulse = np.trim_zeros(force_n)
+    if pulse.size == 0:
+        return 0.0
+    count = max(4096, 16 * len(pulse))
+    spectrum = np.abs(np.fft.rfft(pulse, count))
+    low = np.flatnonzero(spectrum < _EXCITED * spectrum[0])
+    if not low.size:
+        return 0.5 / period_s
+    at = int(low[0])
+    above, below = spectrum[at - 1] - _EXCITED * spectrum[0], spectrum[at] - _EXCITED * spectrum[0]
+    return float(at - below / (below - above)) / (count * period_s)
+
+
+def refuse_short(
+    record: Record, response: FloatArray, noise: float, band_hz: float | None, warnings: list[str]
+) -> float:
+    """Refuse what is too short or sampled too slowly for the strongest mode."""
+    half_rate = 0.5 / record.period_s
+    if len(response) < _MIN_SAMPLES:
+        raise RecordError(
+            f"{len(response)} samples of response: too short; needed are {_MIN_SAMPLES} at the very least, and "
+            f"{MIN_PERIODS:g} periods of the lowest mode"
+        )
+    if band_hz is not None and band_hz > FOLDING * half_rate:
+        raise RecordError(
+            f"{1.0 / record.period_s:g} samples per second are too slow for {band_hz:g} Hz: needed are "
+            f"{2.0 * band_hz / FOLDING:.4g} or more, better {5.0 * band_hz:.4g}"
+        )
+    if not np.ptp(response) > 0.0:
+        raise RecordError(f"every sample of the response is {response[0]:g}: is the sensor connected?")
+    duration = len(response) * record.period_s
+    peaks = decay_spectrum(replace(record, response=response, force_n=None)).peaks
+    if not peaks:
+        raise RecordError(f"no vibration stands out of the spectrum of {duration:.4g} s: too short, or noise only")
+    frequency = peaks[0].frequency_hz
+    if frequency > FOLDING * half_rate:
+        text = (
+            f"the strongest vibration, {frequency:.4g} Hz, is above {FOLDING * half_rate:.4g} Hz, "
+            f"{100 * FOLDING:g} % of half the sampling rate: sampling may be too slow and the mode folded; needed are "
+            f"{5.0 * frequency:.4g} samples per second or more, with an anti-aliasing filter"
+        )
+        if band_hz is None:
+            raise RecordError(text)
+        warnings.append(f"{record.source}: {text}")
+    tenth = max(len(response) // 10, 1)
+    ends = response - np.mean(response)
+    power = (float(np.mean(part**2)) - noise**2 for part in (ends[:tenth], ends[-tenth:]))
+    first, last = (float(np.sqrt(max(each, 0.0))) for each in power)
+    lowest = min(peak.frequency_hz for peak in peaks if peak.amplitude > _STRONG_PEAK * peaks[0].amplitude)
+    periods = lowest * duration
+    if last > DECAYED * first:
+        if periods < MIN_PERIODS:
+            raise RecordError(
+                f"{duration:.4g} s hold {periods:.1f} periods of {lowest:.4g} Hz, and the response is still "
+                f"at {100 * last / first:.0f} %: too short; needed are {MIN_PERIODS / lowest:.4g} s "
+                f"({MIN_PERIODS:g} periods) or more"
+            )
+        if record.force_n is not None:
+            warnings.append(
+                f"{record.source}: the response is still at {100 * last / first:.0f} % at the end of the record: its "
+                " FRF is smeared, the fit in time is not"
+            )
+    return frequency
+
+
+#: A pulse ends where it falls below this share of its peak; a half sine has then lost 0.01 % of its momentum.
+_PULSE_ENDS = 0.01
+_NOISE_ENDS = 3.0  # ... or into the noise, so many standard deviations
+_SMALLEST_PULSE = 0.03  # Pulses are looked for above this share of the largest force
+_SMALLEST_HIT = 0.1  # A pulse is a hit above this share of the largest force; below, somebody has touched the hammer
+_PULSE_NOISE = 7.0  # ... and above so many standard deviations of noise, which a million samples of noise do not reach
+#: A pulse that comes again within so many samples belongs to the one before: anti-aliasing filters ring for a few
+#: samples, in force and response alike.
+_RINGING_SAMPLES = 8
+_BOUNCE_S = 0.1  # Nobody hits twice on purpose within this time: a hammer that comes down again sooner has bounced
+_RESTED = 0.1  # Between two hits on purpose the response has fallen to this share of its peak
+_LEAD_SHARE = 0.1  # A record cut out of a recording begins before its hit by this share of the time between the hits
+_MAD = 1.4826  # Normal noise: standard deviation over median absolute deviation
+
+
+@dataclass(frozen=True)
+class Hit:
+    """One hit of the hammer."""
+
+    first: int  # first sample of the pulse
+    peak: int  # sample of its largest force
+    end: int  # first sample after the pulse
+    peak_n: float  # largest force over the offset; negative where the force is
+    second_share: float = 0.0  # largest later pulse before the next hit, as a share of this one; 0: none
+    second_s: float = 0.0  # how long after this one it comes
+
+
+def robust_sigma(values: FloatArray) -> float:
+    """Standard deviation of the noise of a signal that is quiet most of the time."""
+    return _MAD * float(np.median(np.abs(values - np.median(values))))
+
+
+def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
+    """Every pulse of a force without offset whose largest value is positive."""
+    peak = float(np.max(force))
+    level = max(_SMALLEST_PULSE * peak, _PULSE_NOISE * sigma)
+    above = np.flatnonzero(force > level)
+    if above.size == 0:
+        return []
+    parts = np.split(above, np.flatnonzero(np.diff(above) > _RINGING_SAMPLES) + 1)
+    floor = max(_PULSE_ENDS * peak, _NOISE_ENDS * sigma)
+    low = np.flatnonzero(force <= floor)
+    found = []
+    for part in parts:
+        first, last = int(part[0]), int(part[-1])
+        before = np.searchsorted(low, first)
+        after = np.searchsorted(low, last)
+        start = int(low[before - 1]) if before else 0
+        end = int(low[after]) + 1 if after < low.size else len(force)
+        top = first + int(np.argmax(force[first : last + 1]))
+        found.append(Hit(start, top, end, float(force[top])))
+    return found
+
+
+def _has_rested(record: Record, noise: float, hit: Hit, next_hit: Hit) -> bool:
+    """Whether the response has died away between two hits, or down to its noise."""
+    between = (record.response - np.median(record.response))[hit.end : next_hit.first]
+    peak = float(np.max(np.abs(between)))
+    power = float(np.mean(between[-max(1, len(between) // 10) :] ** 2)) - noise**2
+    return bool(np.sqrt(2.0 * max(power, 0.0)) <= _RESTED * peak)
+
+
+def find_hits(record: Record) -> list[Hit]:
+    """The hits of a record, in their order; pulses of a bounce belong to the hit before."""
+    if record.force_n is None or not np.ptp(record.force_n) > 0.0:
+        return []
+    force = record.force_n - np.median(record.force_n)
+    sign = 1.0 if np.max(force) >= -np.min(force) else -1.0
+    hits: list[Hit] = []
+    largest = float(np.max(sign * force))
+    noise = 0.0
+    for pulse in _pulses(sign * force, robust_sigma(force)):
+        if not hits and pulse.first > 1:
+            noise = float(np.std(record.response[: pulse.first - 1]))
+        if hits:
+            gap = (pulse.first - hits[-1].end) * record.period_s
+            small = pulse.peak_n < _SMALLEST_HIT * largest
+            if small or gap < _BOUNCE_S or not _has_rested(record, noise, hits[-1], pulse):
+                share = pulse.peak_n / abs(hits[-1].peak_n)
+                if share > hits[-1].second_share:
+                    late = (pulse.peak - hits[-1].peak) * record.period_s
+                    hits[-1] = replace(hits[-1], second_share=share, second_s=late)
+                continue
+        hits.append(pulse)
+    return [replace(hit, peak_n=sign * hit.peak_n) for hit in hits]
+
+
+def split_hits(record: Record) -> list[Record]:
+    """One record for each hit of a recording, each with some time before the hit; one hit alone stays as it is."""
+    hits = find_hits(record)
+    if len(hits) < 2:
+        return [record]
+    assert record.force_n is not None
+    gaps = np.diff([hit.first for hit in hits])
+    lead = int(_LEAD_SHARE * float(np.min(gaps)))
+    starts = [max(0, hit.first - lead) for hit in hits]
+    ends = [*starts[1:], len(record.response)]
+    return [
+        replace(
+            record,
+            source=f"{record.source} hit {number}",
+            response=record.response[start:end],
+            force_n=record.force_n[start:end],
+            start_s=record.start_s + start * record.period_s,
+        )
+        for number, (start, end) in enumerate(zip(starts, ends, strict=True), start=1)
+    ]

@@ -16,23 +16,17 @@ from shapegcode.io.record import FloatArray, Record
 
 #: The envelope is the RMS over so many periods of the slowest mode, and over a beat of the two closest modes.
 _ENVELOPE_PERIODS = 2.0
-#: While the modes are not known, it is the RMS over this share of the record, at least.
-_ENVELOPE_SHARE = 0.05
-#: Something happens where the envelope rises by this factor ...
-_EVENT_RISES = 1.3
-#: ... to this share of its maximum; weaker rises are beats of modes.
-_EVENT_SHARE = 0.3
-#: The tail of a decay, in which no command is left, begins after this share of it.
-_TAIL = 0.3
-#: Samples below which a tail tells no frequency.
-_LEAST_TAIL = 16
+_ENVELOPE_SHARE = 0.05  # While the modes are not known, it is the RMS over this share of the record, at least
+_EVENT_RISES = 1.3  # Something happens where the envelope rises by this factor
+_EVENT_SHARE = 0.3  # ... to this share of its maximum; weaker rises are beats of modes
+_TAIL = 0.3  # The tail of a decay, in which no command is left, begins after this share of it
+_MIN_TAIL = 16  # Samples below which a tail tells no frequency
 #: Modes above this share of the tail's largest peak are vibration, whatever is slower is the axis's own motion.
 _MODE_SHARE = 0.2
 #: A window of one period that holds this share of the largest RMS begins half a period early at most: so the decay
 #: begins this share of a period later.
 _ONSET = 0.7
-#: What is slower than this share of the slowest mode is motion of the axis.
-_SLOWER = 0.8
+_SLOWER = 0.8  # What is slower than this share of the slowest mode is motion of the axis
 #: The axis moves where its mean over a period of the lowest mode is above this share of the envelope.
 _MOTION_SHARE = 0.4
 #: The search for the strongest frequency leaves out what has fewer than so many periods in the record.
@@ -40,10 +34,7 @@ _FEWEST_PERIODS = 3.0
 
 
 def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
-    """Strongest frequency of the differences of the samples, in which the slow motion of the axis weighs little.
-
-    0: there is none.
-    """
+    """Strongest frequency of the differences, in which the slow motion of the axis weighs little; 0: there is none."""
     jerk = np.diff(response)
     count = 4 * len(jerk)
     spectrum = np.abs(np.fft.rfft(jerk - np.mean(jerk), count))
@@ -114,7 +105,7 @@ def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_sample
     """
     rate = 1.0 / record.period_s
     tail = quiet[start + int(_TAIL * (end - start)) : end]
-    peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _LEAST_TAIL else ()
+    peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _MIN_TAIL else ()
     modes = sorted(peak.frequency_hz for peak in peaks if peak.amplitude > _MODE_SHARE * peaks[0].amplitude)
     if not modes:
         return _Scales(fast_samples, fast_samples, _ENVELOPE_PERIODS * fast_samples)
@@ -125,10 +116,7 @@ def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_sample
 
 
 def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
-    """Where the vibration has begun for certain; a window longer than the decay begins before it.
-
-    A period of the strongest vibration from this sample on holds half of its power.
-    """
+    """Where the vibration has begun for certain: a period of the strongest one from there holds half of its power."""
     last = min(end, start + max(2, round(scales.window)))
     one = max(2, round(scales.strongest))
     short = _forward_rms(quiet[start : min(end, last + one)], one)

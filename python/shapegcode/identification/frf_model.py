@@ -6,20 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
+from shapegcode.io.frequency_response import ComplexArray
+from shapegcode.io.record import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
-
-#: Power of s in the numerator.
-POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
+POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}  # Power of s in the numerator
 _LARGEST_STEP = 0.5  # of a logarithm
 _STEP_FLOOR = 1e-9
 _GAIN_FLOOR = 1e-10  # of the sum of squares: a step that gains less is the last one
 _NEWTON = 1e-4  # damping below which a step is one of Gauss and Newton
-_LEAST_DAMPING, _MOST_DAMPING = 1e-6, 0.99
+_MIN_DAMPING, _MAX_DAMPING = 1e-6, 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +44,6 @@ class FrfFit:
     parameters: int  # fitted ones
     residual_autocorrelation: float  # of the weighted residuals between neighbouring lines
     fitted: list[ComplexArray]  # the model's lines, (n,) complex
-    converged: bool  # whether a minimum was found
 
 
 def mode_columns(
@@ -90,9 +86,8 @@ def fit_frf(lines: FrfLines, starts: Sequence[tuple[float, float]], most_iterati
     parameters = 3 * modes + rest.shape[1]
     if samples <= parameters + 1:
         raise ArgumentError(f"{samples // 2} lines are too few for {modes} modes")
-    bounds = np.log([0.3 * lines.omega[0], 3.0 * lines.omega.max()]), np.log([_LEAST_DAMPING, _MOST_DAMPING])
-    at = _linearised(lines, theta, rest, goal)
-    damping, converged = 1e-3, False
+    bounds = np.log([0.3 * lines.omega[0], 3.0 * lines.omega.max()]), np.log([_MIN_DAMPING, _MAX_DAMPING])
+    at, damping = _linearised(lines, theta, rest, goal), 1e-3
     for _ in range(most_iterations):
         gram = at.jacobian.T @ at.jacobian
         scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
@@ -113,9 +108,8 @@ def fit_frf(lines: FrfLines, starts: Sequence[tuple[float, float]], most_iterati
             damping = max(10.0 * damping, 1e-6)
         gained = before - at.squares
         if moved <= _STEP_FLOOR or (following is at and gained <= _GAIN_FLOOR * at.squares and damping < _NEWTON):
-            converged = True
             break
-    return _finished(lines, theta, at, parameters, converged)
+    return _finished(lines, theta, at, parameters)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +138,7 @@ def _linearised(lines: FrfLines, theta: FloatArray, rest: FloatArray, goal: Floa
     return _Linearised(linear, columns, raw, raw - basis @ (basis.T @ raw), residual, float(residual @ residual))
 
 
-def _finished(lines: FrfLines, theta: FloatArray, at: _Linearised, parameters: int, converged: bool) -> FrfFit:
+def _finished(lines: FrfLines, theta: FloatArray, at: _Linearised, parameters: int) -> FrfFit:
     omega, zeta = np.exp(theta[::2]), np.exp(theta[1::2])
     modes, samples = len(omega), len(at.residual)
     jacobian = np.hstack((at.columns, at.raw))
@@ -171,5 +165,4 @@ def _finished(lines: FrfLines, theta: FloatArray, at: _Linearised, parameters: i
         parameters,
         float(np.sum((left[1:] * np.conj(left[:-1])).real) / power),
         [fitted],
-        converged,
     )

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shapegcode.errors import ArgumentError, NumericError, RecordError
-from shapegcode.identification.checks import prepare
+from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.fit import find_modes
 from shapegcode.identification.frf_fit import find_frf_modes
-from shapegcode.identification.prepared import Prepared
+from shapegcode.identification.model_search import ACCEPTED_PERCENT, Sought
 from shapegcode.identification.result import Identification
-from shapegcode.identification.support import ACCEPTED_PERCENT
 from shapegcode.identification.sweep import find_swept_modes
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse
@@ -24,10 +23,9 @@ from shapegcode.io.record import Quantity, ReadOptions, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.taps import is_klipper, read_sweep
 
-MOST_MODES = 8
-"""Largest number of modes that is tried unless asked otherwise."""
+MAX_MODES = 8  # Largest number of modes that is tried unless asked otherwise
 _LARGEST_MODEL = 99
-_LEAST_SAMPLES = 3
+_MIN_SAMPLES = 3
 
 
 def identify(
@@ -37,7 +35,7 @@ def identify(
     *,
     options: ReadOptions | None = None,
     quantity: Quantity = "acceleration",
-    most_modes: int = MOST_MODES,
+    most_modes: int = MAX_MODES,
     modes: int | None = None,
     band_hz: tuple[float, float] | None = None,
     start_s: float | None = None,
@@ -83,11 +81,12 @@ def identify(
         raise ArgumentError("force is given without a response: identify(time_s, response, force)")
     sources: Sequence[Any] = [source] if isinstance(source, str | Path) else source  # type: ignore[assignment]
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
+    sought = Sought(band_hz, most_modes, modes, accepted_percent)
     ready: Prepared | None = None
     try:
         swept = _swept(sources, options or ReadOptions())
         if swept is not None:
-            return find_swept_modes(swept, names, band_hz=band_hz, most_modes=most_modes, modes=modes)
+            return find_swept_modes(swept, names, sought)
         records: list[Record] = []
         responses: list[FrequencyResponse] = []
         for each in sources:
@@ -102,31 +101,24 @@ def identify(
                 "apart"
             )
         if responses:
-            return find_frf_modes(
-                responses, names, band_hz=band_hz, most_modes=most_modes, modes=modes, accepted_percent=accepted_percent
-            )
+            return find_frf_modes(responses, names, sought)
         ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
-        return find_modes(
-            ready, names, band_hz=band_hz, most_modes=most_modes, modes=modes, accepted_percent=accepted_percent
-        )
+        return find_modes(ready, names, sought)
     except (ArgumentError, NumericError) as error:
         if strict:
             raise
-        if ready is None:
-            return Identification(files=names, reason=str(error))
-        return Identification(
-            files=names, prepared=ready, reason=str(error), warnings=ready.warnings, notes=ready.notes
-        )
+        told: dict[str, Any] = {} if ready is None else {"warnings": ready.warnings, "notes": ready.notes}
+        return Identification(files=names, prepared=ready, reason=str(error), **told)
 
 
 def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:
     """Arrays as a record."""
     times = np.asarray(time_s, dtype=np.float64)
     samples = np.asarray(response, dtype=np.float64)
-    if times.shape != samples.shape or times.ndim != 1 or len(times) < _LEAST_SAMPLES:
+    if times.shape != samples.shape or times.ndim != 1 or len(times) < _MIN_SAMPLES:
         raise RecordError(
             f"arrays: {times.shape} instants and {samples.shape} samples of the response: one of each is needed, at "
-            f"least {_LEAST_SAMPLES}"
+            f"least {_MIN_SAMPLES}"
         )
     if not np.isfinite(times).all():
         raise RecordError(f"arrays: instant {np.flatnonzero(~np.isfinite(times))[0]} is not finite")
@@ -142,14 +134,13 @@ def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quanti
 def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
     """The record of a resonance sweep, if that is what the file holds; None: it is anything else."""
     paths = [Path(each) for each in sources if isinstance(each, str | Path)]
-    found = [path for path in paths if path.is_file() and is_klipper(_beginning(path))]
+    found = []
+    for path in paths:
+        if path.is_file():
+            with open_file(path) as file:
+                found += [path] if is_klipper(file.read(400)) else []
     if not found or options.ignore_force:
         return None
     if len(sources) > 1:
         raise RecordError(f"{found[0]}: a sweep is identified alone: one file at a time")
     return read_sweep(found[0], options)
-
-
-def _beginning(path: Path) -> bytes:
-    with open_file(path) as file:
-        return file.read(400)

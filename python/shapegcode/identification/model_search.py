@@ -1,4 +1,4 @@
-"""How many modes the data hold: models of growing order, each started where the last one left something unexplained.
+"""How many modes the data hold, by models of growing order, and whether they support each: values, intervals, refusals.
 
 A search knows nothing of taps or decays: a `FitProblem` fits a number of modes to its records, or quickly (without what
 only the last digits need) to them or to what is left of them.
@@ -6,33 +6,36 @@ only the last digits need) to them or to what is left of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 from shapegcode import _core
+from shapegcode.errors import RecordError
 from shapegcode.identification.frf_model import FrfFit
+from shapegcode.identification.result import ChartPole, Estimate, IdentifiedMode
+from shapegcode.io.record import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 
 # A further mode must explain this share of the response's energy: sensors are not linear beyond .1 % of amplitude.
-_LEAST_SHARE = 1e-6
+_MIN_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
-_PEAKS = 2  # of the residual's spectrum that are tried
+PEAKS = 2  # of the residual's spectrum that are tried
 _TWINS = 0.25  # of the half width of a resonance
+_STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of the chart: the model one order lower has the pole too
 _APART = np.pi  # rad: two modes must come half a turn apart in the record
 _CHART_ORDERS = 20  # of the stabilisation chart
 _SAME_PLACE = 0.2  # of the half width of a resonance: two poles of the chart are one start
 _SAME_DAMPING = 0.2  # and in the logarithm of their damping
-_MOST_DAMPING = 0.7  # of a pole to begin with
-# Two models in a row that the data do not ask for end the search: one may only have missed its place.
-_PATIENCE = 2
+_MAX_DAMPING = 0.7  # of a pole to begin with
+_PATIENCE = 2  # Two models in a row that the data do not ask for end the search: one may only have missed its place
 
 
 Fit = _core.ModalFit | _core.DecayFit | FrfFit
@@ -41,34 +44,45 @@ Fit = _core.ModalFit | _core.DecayFit | FrfFit
 class FitProblem(Protocol):
     """Records of one point, over time or over frequency."""
 
+    # ruff: noqa: D102
     @property
-    def squares(self) -> float: ...  # noqa: D102
+    def squares(self) -> float: ...
     @property
-    def samples(self) -> int: ...  # noqa: D102
+    def samples(self) -> int: ...
     @property
-    def constants(self) -> int: ...  # noqa: D102
+    def constants(self) -> int: ...
     @property
-    def duration_s(self) -> float: ...  # noqa: D102
+    def duration_s(self) -> float: ...
     @property
-    def period_s(self) -> float: ...  # noqa: D102
+    def period_s(self) -> float: ...
     @property
-    def band_hz(self) -> tuple[float, float]: ...  # noqa: D102
+    def band_hz(self) -> tuple[float, float]: ...
     @property
-    def white_share(self) -> float: ...  # noqa: D102
+    def white_share(self) -> float: ...
     @property
-    def chart_orders(self) -> int: ...  # noqa: D102
+    def chart_orders(self) -> int: ...
+    def fit(self, starts: Starts) -> Fit: ...
+    def fit_quickly(self, starts: Starts) -> Fit: ...
+    def fit_left(self, starts: Starts, last: Fit | None) -> Fit: ...
+    def peaks_left(self, last: Fit | None) -> Sequence[float]: ...
+    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]: ...
+    def rank(self, candidates: Starts, kept: int) -> Sequence[int]: ...
 
-    def fit(self, starts: Starts) -> Fit: ...  # noqa: D102
 
-    def fit_quickly(self, starts: Starts) -> Fit: ...  # noqa: D102
+@dataclass(frozen=True)
+class Sought:
+    """What is looked for."""
 
-    def fit_left(self, starts: Starts, last: Fit | None) -> Fit: ...  # noqa: D102
+    band_hz: tuple[float, float] | None  # frequencies of interest; None: all
+    most_modes: int
+    modes: int | None  # their number; None: by evidence
+    accepted_percent: float  # see `identify.identify`
 
-    def peaks_left(self, last: Fit | None, most: int) -> Sequence[float]: ...  # noqa: D102
-
-    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]: ...  # noqa: D102
-
-    def rank(self, candidates: Starts, kept: int) -> Sequence[int]: ...  # noqa: D102
+    def order(self, models: Search) -> int:
+        """Number of modes that is taken; refused where the data hold fewer than were asked for."""
+        if self.modes is not None and len(models.fits) < self.modes:
+            raise RecordError(f"{self.modes} modes are asked for, and the data hold no more than {len(models.fits)}")
+        return self.modes or models.order
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,73 +101,74 @@ class Search:
         return int(np.argmin(self.evidence))
 
 
-def search(problem: FitProblem, most_modes: int) -> Search:
+def search(problem: FitProblem, sought: Sought) -> Search:
     """Fit models of 0, 1, 2, ... modes until the data ask for no more."""
-    squares, share = problem.squares, problem.white_share
-    evidence = [evidence_of_none(problem)]
+    squares = problem.squares
+    evidence = [evidence_of(problem, None)]
     fits: list[Fit] = []
     pool = _pool(problem)
-    while len(fits) < most_modes:
+    while len(fits) < (sought.modes or sought.most_modes):
         best = _next_fit(problem, fits[-1] if fits else None, pool)
         if best is None:
             break
         explained = (fits[-1].sum_of_squares if fits else squares) - best.sum_of_squares
-        if explained < _LEAST_SHARE * squares:
+        if explained < _MIN_SHARE * squares:
             break
         fits.append(best)
-        evidence.append(evidence_of(best, share))
+        evidence.append(evidence_of(problem, best))
         if len(fits) - int(np.argmin(evidence)) >= _PATIENCE:
             break
     return Search(tuple(fits), tuple(evidence))
 
 
-def evidence_of_none(problem: FitProblem) -> float:
-    """Evidence of a model without modes."""
-    return _evidence(problem.squares, problem.white_share * problem.samples, problem.constants, 0)
-
-
-def evidence_of(fit: Fit, white_share: float) -> float:
-    """Evidence of a fit, as in `Search.evidence`."""
-    return _evidence(fit.sum_of_squares, white_share * fit.samples, fit.parameters, len(fit.omega_rad_s))
-
-
-def _evidence(squares: float, samples: float, parameters: int, modes: int) -> float:
-    tiny = np.finfo(float).tiny
+def evidence_of(problem: FitProblem, fit: Fit | None) -> float:
+    """Evidence of a fit, as in `Search.evidence`; None: of a model without modes."""
+    squares, count, parameters, modes = problem.squares, problem.samples, problem.constants, 0
+    if fit is not None:
+        squares, count, parameters = fit.sum_of_squares, fit.samples, fit.parameters
+        modes = len(fit.omega_rad_s)
+    samples, tiny = problem.white_share * count, np.finfo(float).tiny
     return float(samples * np.log(max(squares / samples, tiny)) + (parameters + modes) * np.log(samples))
 
 
-def chart_poles(problem: FitProblem) -> Sequence[npt.NDArray[np.complex128]]:
-    """Poles of the models of a stabilisation chart, by number of modes from 1."""
-    return problem.poles(max(1, min(_CHART_ORDERS, problem.chart_orders)))
+def _chart_modes(problem: FitProblem) -> Iterator[Starts]:
+    """Modes of the models of a stabilisation chart, by number of modes from 1."""
+    for poles in problem.poles(max(1, min(_CHART_ORDERS, problem.chart_orders))):
+        omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
+        yield list(zip(map(float, omega), map(float, zeta), strict=True))
+
+
+def stabilisation_chart(problem: FitProblem) -> tuple[ChartPole, ...]:
+    """Poles of models with 1, 2, ... modes, each held against the model one order lower."""
+    chart: list[ChartPole] = []
+    before: Starts = []
+    for order, now in enumerate(_chart_modes(problem), start=1):
+        for w, z in now:
+            near = [(wb, zb) for wb, zb in before if abs(w / wb - 1.0) <= _STABLE_FREQUENCY]
+            damped_alike = any(abs(z - zb) <= _STABLE_DAMPING * zb for _, zb in near)
+            chart.append(ChartPole(order, w / (2.0 * np.pi), z, bool(near), damped_alike))
+        before = now
+    return tuple(chart)
 
 
 def _pool(problem: FitProblem) -> Starts:
-    """Poles of the stabilisation chart that lie in the band: each mode is among them several times."""
+    """Poles of the stabilisation chart that lie in the band, each mode once, as the models of higher order have it."""
     low, high = problem.band_hz
-    found: Starts = []
-    for of_model in chart_poles(problem):
-        omega, zeta = _core.poles_to_modes(list(of_model), problem.period_s)
-        found += [(w, z) for w, z in zip(map(float, omega), map(float, zeta), strict=True) if z < _MOST_DAMPING]
-    return _apart([(w, z) for w, z in found if low <= w / (2.0 * np.pi) <= high])
-
-
-def _apart(found: Starts) -> Starts:
-    """Those that are no repetition of another one: of models of higher order, which know the weak modes too."""
     kept: Starts = []
-    for w, z in reversed(found):
-        if not any(abs(w - v) < _SAME_PLACE * min(z, y) * w and abs(np.log(z / y)) < _SAME_DAMPING for v, y in kept):
+    for w, z in reversed([mode for modes in _chart_modes(problem) for mode in modes]):
+        inside = z < _MAX_DAMPING and low <= w / (2.0 * np.pi) <= high
+        if inside and not any(
+            abs(w - v) < _SAME_PLACE * min(z, y) * w and abs(np.log(z / y)) < _SAME_DAMPING for v, y in kept
+        ):
             kept.append((w, z))
     return kept
 
 
 def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None:
-    """The best fit with one mode more than `last`.
-
-    The further mode is begun at the peaks of what `last` leaves, and at the pole of the pool that explains most of it.
-    """
+    """The best fit with one mode more, from peaks of what the last one leaves and the pole that explains most."""
     so_far = [] if last is None else starts_of(last)
     candidates: list[Starts] = []
-    for omega in problem.peaks_left(last, _PEAKS):
+    for omega in problem.peaks_left(last):
         alone = [_attempt(partial(problem.fit_left, [(omega, zeta)], last)) for zeta in _START_DAMPING]
         usable = [fit for fit in alone if fit is not None]
         if usable:
@@ -193,3 +208,185 @@ def _attempt(task: Callable[[], Fit]) -> Fit | None:
     except (_core.ArgumentError, _core.NumericError):
         return None
     return fit if np.isfinite(fit.sum_of_squares) else None
+
+
+#: A damping ratio or stiffness less certain than this is refused: 10 % are then four standard deviations off.
+ACCEPTED_PERCENT = 5.0
+_FREQUENCY_PERCENT = 2.0
+_NOT_AT_ALL_PERCENT = 1000.0
+_NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
+MIN_SWINGS = 2.0  # Swings of a mode in the record: fewer do not tell its frequency
+#: What has not fallen to this share at the end of the record does not decay: mains hum, a pump, a turning spindle.
+_LASTING = 0.8
+#: A model with one mode more counts as a rival while it fits better by more than chance alone does in one case of 20.
+_RIVAL_PROBABILITY = 0.05
+_UNKNOWN = 7.0  # half width of a logarithm that says nothing: a factor of a thousand
+_SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
+_VALUES = ("frequency_hz", "damping_ratio", "mass_kg", "damping_n_s_per_m", "stiffness_n_per_m")
+_OPPOSED = "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
+
+
+@dataclass(frozen=True, eq=False)
+class Doubts:
+    """What a mode must stand up to."""
+
+    limit_percent: float  # least certainty of damping ratio and stiffness
+    band_hz: tuple[float, float]  # frequencies that were searched
+    record_s: float  # length of the longest record
+    rival: Fit | None = None  # another model of nearly the same evidence
+    aliased: Callable[[float], float] = lambda _hz: 0.0  # see `estimates_of`
+
+
+def estimates_of(
+    fit: Fit,
+    alone: Sequence[Fit],
+    others: Sequence[Fit] = (),
+    aliased: Callable[[float], float] = lambda _hz: 0.0,
+    white_share: float = 1.0,
+    least: tuple[float, float] = (0.0, 0.0),
+) -> list[IdentifiedMode]:
+    """Values and 95 % intervals of each mode of a fit; one that moves against the push has that as its refusal.
+
+    The intervals are those of the fit's covariance, in logarithms. Where taps differ by more than that explains, their
+    scatter takes its place. What the force does between its samples is not known to the covariance: the intervals
+    reach as far as those of the other courses that the data allow, and by what may have been folded into its spectrum.
+    """
+    freedom = max(white_share * fit.samples - fit.parameters, 1.0)
+    quantile = float(stats.t.ppf(0.975, freedom)) / np.sqrt(white_share)
+    rows = [_logarithms(fit, mode) for mode in range(len(fit.omega_rad_s))]
+    found = []
+    for mode, row in enumerate(rows):
+        spread = _half_widths(row, quantile)
+        spread[:2] = np.hypot(spread[:2], least)
+        if len(row.values) > 2:
+            spread[2:] = np.hypot(spread[2:], aliased(float(np.exp(row.values[0]))))
+        for other in others:
+            apart = _logarithms(other, mode)
+            spread = np.maximum(spread, np.abs(apart.values - row.values) + _half_widths(apart, quantile))
+        if len(alone) > 1:
+            spread = np.maximum(spread, _scatter([_logarithms(one, mode) for one in alone], white_share))
+        values = [
+            Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
+            for value, half in zip(np.exp(row.values), np.minimum(spread, _UNKNOWN), strict=True)
+        ]
+        named = dict(zip(_VALUES, values, strict=False))
+        found.append(IdentifiedMode(**named, refusal=_OPPOSED if row.opposed else ""))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Logarithms:
+    """Logarithms of frequency (Hz), damping ratio, mass, viscous damping, stiffness (SI), and their covariance."""
+
+    values: FloatArray
+    covariance: FloatArray
+    opposed: bool
+
+
+def _logarithms(fit: Fit, mode: int) -> _Logarithms:
+    omega, zeta = float(fit.omega_rad_s[mode]), float(fit.damping_ratio[mode])
+    values = [np.log(omega / (2.0 * np.pi)), np.log(zeta)]
+    if not isinstance(fit, _core.DecayFit):
+        residue = float(fit.inverse_mass[mode])
+        scale = np.array([1.0 / omega, 1.0 / zeta, 1.0 / residue])
+        # ln of f, zeta, m, c = 2 zeta omega m, k = omega^2 m from ln omega, ln zeta, ln 1/m.
+        change = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]], dtype=np.float64)
+        mass = -np.log(abs(residue))
+        values += [mass, np.log(2.0 * zeta * omega) + mass, 2.0 * np.log(omega) + mass]
+    else:
+        residue = 1.0
+        scale = np.array([1.0 / omega, 1.0 / zeta])
+        change = np.eye(2)
+    size = len(scale)
+    block = fit.covariance[size * mode : size * (mode + 1), size * mode : size * (mode + 1)]
+    covariance = change @ (block * np.outer(scale, scale)) @ change.T
+    return _Logarithms(np.array(values), covariance, residue < 0.0)
+
+
+def _half_widths(row: _Logarithms, quantile: float) -> FloatArray:
+    """Half widths of the intervals; where the fit has no usable covariance, as wide as can be."""
+    variance = np.diag(row.covariance)
+    usable = np.isfinite(variance) & (variance >= 0.0)
+    return np.where(usable, quantile * np.sqrt(np.where(usable, variance, 0.0)), _UNKNOWN)
+
+
+def _scatter(taps: Sequence[_Logarithms], white_share: float) -> FloatArray:
+    """Half widths from the scatter of single taps; 0 where noise explains it."""
+    values = np.array([tap.values for tap in taps])
+    expected = np.mean([np.diag(tap.covariance) for tap in taps], axis=0) / white_share
+    seen = np.var(values, axis=0, ddof=1)
+    ratio = seen / np.maximum(expected, np.finfo(float).tiny)
+    more = ratio > stats.chi2.ppf(1.0 - _SCATTER_PROBABILITY, len(taps) - 1) / (len(taps) - 1)
+    half = stats.t.ppf(0.975, len(taps) - 1) * np.sqrt(seen / len(taps))
+    return np.where(more, half, 0.0)
+
+
+def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
+    """The model with a mode more than the chosen one, if chance alone would seldom make it fit so much better."""
+    if len(fits) <= order:
+        return None
+    chosen, larger = fits[order - 1 : order + 1]
+    better = chosen.sum_of_squares / max(larger.sum_of_squares, np.finfo(float).tiny)
+    gain = white_share * chosen.samples * np.log(better)
+    by_chance = stats.chi2.ppf(1.0 - _RIVAL_PROBABILITY, larger.parameters - chosen.parameters)
+    return larger if gain > by_chance else None
+
+
+def judged_modes(modes: Sequence[IdentifiedMode], doubts: Doubts) -> list[IdentifiedMode]:
+    """The modes by ascending frequency, each with its refusal if any, without drift and what lies outside the band."""
+    low, high = doubts.band_hz
+    found = [
+        replace(mode, refusal=_refusal_of(mode, doubts))
+        for mode in modes
+        if mode.damping_ratio.value <= _NO_VIBRATION and low <= mode.frequency_hz.value <= high
+    ]
+    return sorted(found, key=lambda mode: mode.frequency_hz.value)
+
+
+def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
+    """Why the data do not support a mode; empty if they do."""
+    frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
+    if frequency.value * doubts.record_s < MIN_SWINGS:
+        return (
+            f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
+            f"{MIN_SWINGS:g} or more are needed"
+        )
+    lasting = float(np.exp(-2.0 * np.pi * frequency.value * damping.value * doubts.record_s))
+    if lasting > _LASTING:
+        return (
+            f"still at {100.0 * lasting:.0f} % after {doubts.record_s:.3g} s: a steady disturbance (mains, pump, "
+            "spindle), or a record too short for a mode of so little damping"
+        )
+    limits = (
+        ("frequency", frequency, min(_FREQUENCY_PERCENT, doubts.limit_percent)),
+        ("damping ratio", damping, doubts.limit_percent),
+        ("stiffness", stiffness, doubts.limit_percent),
+    )
+    for name, estimate, limit in limits:
+        if estimate is not None and not estimate.uncertainty_percent <= limit:
+            folded = 100.0 * doubts.aliased(frequency.value)
+            if name == "stiffness" and folded > 0.5 * limit:
+                return (
+                    f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} %): the pulse has "
+                    "few samples, and without an anti-aliasing filter they do not tell its force at this frequency; "
+                    "sample faster or take a softer tip"
+                )
+            known = f"to {estimate.uncertainty_percent:.2g} % only"
+            if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:
+                known = "not at all"
+            return f"{name} is known {known} (limit {limit:g} %): more taps, a longer record or less noise"
+    if mode.refusal or doubts.rival is None:
+        return mode.refusal
+    # A rival that splits the mode in two or lacks it disagrees as much as one can.
+    rows = [_logarithms(doubts.rival, i) for i in range(len(doubts.rival.omega_rad_s))]
+    nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(frequency.value)))
+    for (name, estimate, _), index in zip(limits, (0, 1, 4), strict=True):
+        change = 0.0
+        if estimate is not None:
+            change = 100.0 * abs(float(np.expm1(nearest.values[index] - np.log(estimate.value))))
+        if change > doubts.limit_percent:
+            return (
+                f"{name} would change by {change:.0f} % with one mode more in the model, which the data cannot decide "
+                f"(limit {doubts.limit_percent:g} %): more taps or less noise"
+            )
+    return ""

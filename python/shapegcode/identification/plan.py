@@ -4,31 +4,128 @@ from __future__ import annotations
 
 import math
 import textwrap
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.identification.checks import DOUBLE_HIT, LEAST_FORCE, LEAST_LEAD, LEAST_PULSE
-from shapegcode.identification.plan_result import AxisRecording, RapidStop, TapPlan
-from shapegcode.identification.quality import EXCITED_HALF_SINE, FOLDING, LEAST_PERIODS
+from shapegcode.identification.checks import (
+    DOUBLE_HIT,
+    EXCITED_HALF_SINE,
+    FOLDING,
+    MIN_FORCE,
+    MIN_LEAD,
+    MIN_PERIODS,
+    MIN_PULSE,
+)
 from shapegcode.machine import Machine
+from shapegcode.results.result import Result
+from shapegcode.results.table import Column, Table
 
 if TYPE_CHECKING:
     from shapegcode.machine import Axis
 
+
+@dataclass(frozen=True)
+class AxisRecording:
+    """How to record the modes of an axis.
+
+    Attributes:
+        axis: "X", "Y", "Z", or all of them.
+        modes_hz: those known, ascending; empty: the usual range is taken.
+        highest_hz: modes are looked for up to here.
+        samples_per_s: sampling rate.
+        duration_s: of one tap, from the trigger on.
+        pre_trigger_s: before it.
+        pulse_s: longest pulse of the force that still excites the highest frequency.
+        tip: of the hammer.
+    """
+
+    axis: str
+    modes_hz: tuple[float, ...]
+    highest_hz: float
+    samples_per_s: float
+    duration_s: float
+    pre_trigger_s: float
+    pulse_s: float
+    tip: str
+
+
+@dataclass(frozen=True)
+class RapidStop:
+    """How to let an axis decay without a hammer.
+
+    Attributes:
+        axis: "X", "Y" or "Z".
+        distance_mm: of each rapid.
+        dwell_s: rest after each, in which the decay is recorded.
+        program: that does it, in FANUC's dialect.
+    """
+
+    axis: str
+    distance_mm: float
+    dwell_s: float
+    program: str
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class TapPlan(Result):
+    """How to do a tap test.
+
+    Attributes:
+        machine: its name; null: no machine file was given.
+        recordings: for each axis.
+        stops: the decays after a rapid stop, for each axis.
+        instructions: the rest of it, for the operator: machine, sensor and hammer, recording, file, what is refused.
+        warnings: none.
+    """
+
+    machine: str | None
+    recordings: tuple[AxisRecording, ...]
+    stops: tuple[RapidStop, ...]
+    instructions: str
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """There is a plan for every machine."""
+        return True
+
+    @property
+    def answer(self) -> str:
+        """Of which machine."""
+        return f"tap test of {self.machine or 'a machining centre'}: how to do it"
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next."""
+        return "do the test, then for each axis: shapegcode identify x1.csv x2.csv x3.csv --axis x --update mine.toml"
+
+    def tables(self) -> list[Table]:
+        """How to record each axis."""
+        columns = (
+            Column("axis", text=True),
+            Column(
+                "modes known", "Hz", lambda row: ", ".join(f"{each:g}" for each in row.modes_hz) or "none", text=True
+            ),
+            Column("look up to", "Hz", "highest_hz", digits=0),
+            Column("samples/s", value="samples_per_s", digits=0),
+            Column("record", "s", lambda row: f"{row.duration_s:g}"),
+            Column("pre-trigger", "s", lambda row: f"{row.pre_trigger_s:.2g}"),
+            Column("pulse at most", "ms", lambda row: f"{1e3 * row.pulse_s:.2g}"),
+            Column("tip", text=True),
+        )
+        return [Table("recording", columns, self.recordings)]
+
+
 #: Modes of a machining centre that its own motion excites, Hz; for a plan without a machine file.
 _USUAL_HZ = (20.0, 200.0)
-#: Damping ratio where none is known: welded and cast structures with guides have 0.01 to 0.05.
-_USUAL_DAMPING = 0.02
-#: Modes are looked for up to this multiple of the highest one known.
-_LOOK_ABOVE = 2.0
+_USUAL_DAMPING = 0.02  # Damping ratio where none is known: welded and cast structures with guides have 0.01 to 0.05
+_LOOK_ABOVE = 2.0  # Modes are looked for up to this multiple of the highest one known
 #: ... and up to here in any case: a mode that the machine file does not state is found only where it is looked for.
 _LOOK_LEAST_HZ = 500.0
-#: Samples in the pulse of the hammer: a half sine of ten is known to a percent.
-_PULSE_SAMPLES = 10
-#: The record lasts until the slowest mode has fallen to this share.
-_FALLEN_TO = 0.01
-#: ... and at least so many of its periods.
-_PERIODS = 20
+_PULSE_SAMPLES = 10  # Samples in the pulse of the hammer: a half sine of ten is known to a percent
+_FALLEN_TO = 0.01  # The record lasts until the slowest mode has fallen to this share
+_PERIODS = 20  # ... and at least so many of its periods
 _PRE_TRIGGER_SHARE = 0.1
 _PRE_TRIGGER_SAMPLES = 100
 _TAPS = 5
@@ -69,12 +166,11 @@ def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisReco
 
 
 def _modes(axis: Axis) -> tuple[tuple[float, float], ...]:
-    found = []
-    for mode in axis.modes:
-        over = mode.frequency_over
-        frequencies = over.frequency_hz if over is not None else (mode.frequency_hz,)
-        found += [(frequency, mode.damping_ratio) for frequency in frequencies]
-    return tuple(found)
+    return tuple(
+        (frequency, mode.damping_ratio)
+        for mode in axis.modes
+        for frequency in (mode.frequency_over.frequency_hz if mode.frequency_over else (mode.frequency_hz,))
+    )
 
 
 def rapid_stop_program(axis: str, distance_mm: float, dwell_s: float) -> str:
@@ -100,24 +196,53 @@ def _stop_distance_mm(machine: Machine | None, index: int) -> float:
 
 def _bullets(*texts: str) -> list[str]:
     """Each text as a paragraph of its own, with a star."""
-    lines = []
-    for text in texts:
-        lines += textwrap.wrap(text, _WIDTH, initial_indent="* ", subsequent_indent="  ", break_on_hyphens=False)
-    return lines
+    style = textwrap.TextWrapper(_WIDTH, initial_indent="* ", subsequent_indent="  ", break_on_hyphens=False)
+    return [line for text in texts for line in style.wrap(text)]
 
 
-def _machine_part() -> list[str]:
-    return [
-        "1. THE MACHINE",
-        *_bullets(
-            "Warm, drives on, axes held in position by the controller (handle or MDI mode), spindle stopped, doors as "
-            "the safety rules say. Not with the emergency stop pressed: the drives are then off and the modes "
-            "are others.",
-            "Axis in the middle of its travel, the workpiece or one of its weight clamped on. Then again at both ends "
-            "and without a workpiece: the spread goes into frequency_over or frequency_uncertainty_percent.",
-            "Nothing else may shake it: pumps, fans and chip conveyor off where the machine allows.",
-        ),
-    ]
+_MACHINE_PART = [
+    "1. THE MACHINE",
+    *_bullets(
+        "Warm, drives on, axes held in position by the controller (handle or MDI mode), spindle stopped, doors as "
+        "the safety rules say. Not with the emergency stop pressed: the drives are then off and the modes "
+        "are others.",
+        "Axis in the middle of its travel, the workpiece or one of its weight clamped on. Then again at both ends "
+        "and without a workpiece: the spread goes into frequency_over or frequency_uncertainty_percent.",
+        "Nothing else may shake it: pumps, fans and chip conveyor off where the machine allows.",
+    ),
+]
+_RECORDING_PART = [
+    "3. RECORDING",
+    *_bullets(
+        "Both channels at once, at the same rate, with the same anti-aliasing filters. Rate, length and "
+        f"pre-trigger: see the table. The pulse should have {_PULSE_SAMPLES} samples, never fewer than "
+        f"{MIN_PULSE}.",
+        "Trigger on the force. The pre-trigger tells noise and offset: it must be quiet.",
+        "Input ranges so that the largest value is at 30 to 70 % of the range. Look at every tap.",
+        f"{_TAPS} good taps per axis, at least 3: they are averaged, and the coherence shows where they agree. One "
+        "long recording with several taps is divided by itself; let the machine come to rest between them, a "
+        "second or more.",
+        "No window and no filter in the recorder. The force is set to 0 outside its pulse when it is read; an "
+        "exponential window on the response would be taken for damping.",
+    ),
+]
+_REFUSAL_PART = [
+    "6. WHAT IS REFUSED",
+    *_bullets(
+        "Overload: force or response cut off at its largest value.",
+        f"Double hit: a second pulse above {100 * DOUBLE_HIT:g} % of the first.",
+        f"No force, or less than {MIN_FORCE:g} times its noise.",
+        f"A record of fewer than {MIN_PERIODS:g} periods whose response has not decayed.",
+        f"Sampling too slow: the strongest vibration above {100 * FOLDING:g} % of half the rate.",
+        "A record that begins inside the pulse; gaps and repeats in the time; cells that are no numbers; frequency "
+        "responses without their time records.",
+    ),
+    *textwrap.wrap(
+        f"There are warnings for a pulse of fewer than {MIN_PULSE} samples, fewer than {MIN_LEAD} samples "
+        "before the hit, a tip too soft for the mode, and a machine that was not at rest.",
+        _WIDTH,
+    ),
+]
 
 
 def _sensor_part(how: AxisRecording) -> list[str]:
@@ -135,33 +260,6 @@ def _sensor_part(how: AxisRecording) -> list[str]:
             "Short and square, then let the hammer bounce back. A tip that touches twice spoils the tap.",
         ),
     ]
-
-
-def _recording_part() -> list[str]:
-    return [
-        "3. RECORDING",
-        *_bullets(
-            "Both channels at once, at the same rate, with the same anti-aliasing filters. Rate, length and "
-            f"pre-trigger: see the table. The pulse should have {_PULSE_SAMPLES} samples, never fewer than "
-            f"{LEAST_PULSE}.",
-            "Trigger on the force. The pre-trigger tells noise and offset: it must be quiet.",
-            "Input ranges so that the largest value is at 30 to 70 % of the range. Look at every tap.",
-            f"{_TAPS} good taps per axis, at least 3: they are averaged, and the coherence shows where they agree. One "
-            "long recording with several taps is divided by itself; let the machine come to rest between them, a "
-            "second or more.",
-            "No window and no filter in the recorder. The force is set to 0 outside its pulse when it is read; an "
-            "exponential window on the response would be taken for damping.",
-        ),
-    ]
-
-
-def _stops(machine: Machine | None, dwell_s: float) -> tuple[RapidStop, ...]:
-    """The decays of all axes."""
-    ways = [_stop_distance_mm(machine, index) for index in range(len(_AXES))]
-    return tuple(
-        RapidStop(axis, way, dwell_s, rapid_stop_program(axis, way, dwell_s))
-        for axis, way in zip(_AXES, ways, strict=True)
-    )
 
 
 def _stop_part(stops: tuple[RapidStop, ...]) -> list[str]:
@@ -201,26 +299,6 @@ def _file_part(how: AxisRecording) -> list[str]:
     ]
 
 
-def _refusal_part() -> list[str]:
-    return [
-        "6. WHAT IS REFUSED",
-        *_bullets(
-            "Overload: force or response cut off at its largest value.",
-            f"Double hit: a second pulse above {100 * DOUBLE_HIT:g} % of the first.",
-            f"No force, or less than {LEAST_FORCE:g} times its noise.",
-            f"A record of fewer than {LEAST_PERIODS:g} periods whose response has not decayed.",
-            f"Sampling too slow: the strongest vibration above {100 * FOLDING:g} % of half the rate.",
-            "A record that begins inside the pulse; gaps and repeats in the time; cells that are no numbers; frequency "
-            "responses without their time records.",
-        ),
-        *textwrap.wrap(
-            f"There are warnings for a pulse of fewer than {LEAST_PULSE} samples, fewer than {LEAST_LEAD} samples "
-            "before the hit, a tip too soft for the mode, and a machine that was not at rest.",
-            _WIDTH,
-        ),
-    ]
-
-
 def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
     """How to do the test: where to tap, with what, how to record, how to write the file, and what is refused.
 
@@ -248,19 +326,20 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
             f"Lengths follow from the modes of the machine file (an axis without modes: {usual}); every axis is looked "
             f"at up to {_LOOK_LEAST_HZ:g} Hz or more, as there may be modes that the file does not state."
         )
-    stops = _stops(machine, max(_LONG_STOP_S, 2.0 * max(how.duration_s for how in recordings)))
+    dwell_s = max(_LONG_STOP_S, 2.0 * max(how.duration_s for how in recordings))
+    ways = [_stop_distance_mm(machine, index) for index in range(len(_AXES))]
+    stops = tuple(
+        RapidStop(axis, way, dwell_s, rapid_stop_program(axis, way, dwell_s))
+        for axis, way in zip(_AXES, ways, strict=True)
+    )
     parts = [
         textwrap.wrap(about, _WIDTH),
-        _machine_part(),
+        _MACHINE_PART,
         _sensor_part(max(recordings, key=lambda how: how.highest_hz)),
-        _recording_part(),
+        _RECORDING_PART,
         _stop_part(stops),
         _file_part(recordings[0]),
-        _refusal_part(),
+        _REFUSAL_PART,
     ]
-    return TapPlan(
-        None if machine is None else machine.name,
-        recordings,
-        stops,
-        "\n\n".join("\n".join(part) for part in parts),
-    )
+    text = "\n\n".join("\n".join(part) for part in parts)
+    return TapPlan(None if machine is None else machine.name, recordings, stops, text)

@@ -20,16 +20,16 @@ from shapegcode.results.result import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MOST_TRACES = 3
+_MAX_TRACES = 3
 _SEEN = 0.02
 _ROOM = 2.5
 _FILE_TIME = "time in the file in s"
 _FAINT = 0.35  # opacity of poles that are not stable
-_LEAST_SHOWN = 1e-5  # of the largest value, on a logarithmic axis
+_MIN_SHOWN = 1e-5  # of the largest value, on a logarithmic axis
 _CLEAR = 3.0  # times the noise: down to here the model's envelope is the mode's
 _BELOW_NOISE = 0.3
 _BEYOND_NOISE = 1.25  # of the decay's duration, so that the noise is seen
-_MOST_ENVELOPES = 4
+_MAX_ENVELOPES = 4
 _MEASURED, _FITTED = plot.GREY, plot.COLOURS[0]
 
 
@@ -65,7 +65,7 @@ def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
     Returns:
         The first panel.
     """
-    shown = list(zip(found.fitted_records, found.fitted, strict=True))[:_MOST_TRACES]
+    shown = list(zip(found.fitted_records, found.fitted, strict=True))[:_MAX_TRACES]
     rows = 1 if found.decay else 2
     many = f", {len(shown)} of {len(found.taps)} records" if len(found.taps) > len(shown) else ""
     panels = plot.grid(
@@ -190,9 +190,9 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
     Returns:
         The upper panel.
     """
-    frequencies = [mode.frequency_hz.value for mode in found.modes][:_MOST_ENVELOPES]
+    frequencies = [mode.frequency_hz.value for mode in found.modes][:_MAX_ENVELOPES]
     record, model = found.fitted_records[0], _as_fitted(found)[0]
-    begin = _after_hit(record)
+    begin = 0 if record.force_n is None else int(np.argmax(np.abs(record.force_n)))
     record, model = (replace(each, response=each.response[begin:], force_n=None) for each in (record, model))
     name = f": {Path(record.source).name}" if len(found.taps) > 1 else ""
     panels = plot.grid(
@@ -206,7 +206,7 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
     longest = 1
     for panel, frequency, measured, fitted, rest in zip(column, frequencies, *bands, strict=True):
         top = float(measured.envelope.max())
-        noise = max(float(np.median(rest.envelope)), _LEAST_SHOWN * top)
+        noise = max(float(np.median(rest.envelope)), _MIN_SHOWN * top)
         end = _first_below(fitted.envelope, _CLEAR * noise)
         longest = max(longest, end)
         panel.semilogy(time_s, measured.envelope, color=_MEASURED, linewidth=2.2, label="measured")
@@ -240,7 +240,7 @@ def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
     panel.margins(x=0.01)
     panel.set_xlabel("frequency in Hz")
     panel.set_ylabel(_quantity(found.taps[0]))
-    panel.set_ylim(max(_BELOW_NOISE * float(np.median(amplitude)), _LEAST_SHOWN * top), 3.0 * top)
+    panel.set_ylim(max(_BELOW_NOISE * float(np.median(amplitude)), _MIN_SHOWN * top), 3.0 * top)
     for peak in spectrum.peaks:
         if peak.frequency_hz <= spectrum.frequency_hz[seen][-1]:
             panel.annotate(
@@ -333,10 +333,6 @@ def _mark_modes(column: list[Axes], found: Identification) -> None:
             f"{plot.number(hertz, 4)} Hz", (hertz, 0.98), (3, 0), xycoords=("data", "axes fraction"),
             textcoords="offset points", va="top", fontsize=8,
         )  # fmt: skip
-
-
-def _after_hit(record: Record) -> int:
-    return 0 if record.force_n is None else int(np.argmax(np.abs(record.force_n)))
 
 
 def _first_below(envelope: FloatArray, level: float) -> int:

@@ -7,28 +7,54 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import firwin, kaiserord, oaconvolve
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.identification.model_search import Fit, Starts
-from shapegcode.identification.prepared import Prepared
-from shapegcode.identification.support import LEAST_SWINGS
-from shapegcode.identification.thinning import FLAT, Thinned, are_blows, highest_of_interest_hz, thin
+from shapegcode.identification.checks import MIN_PULSE, Prepared
+from shapegcode.identification.model_search import MIN_SWINGS, PEAKS, Fit, Starts
+from shapegcode.identification.spectra import decay_spectrum
+from shapegcode.io.record import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
-
-#: Of the sampling rate: the force between samples is known up to there.
-HIGHEST_SHARE = 0.45
-_STEPS = 60  # of a fit
-_QUICK_STEPS = 15  # of one that only shows where a mode may be
+HIGHEST_SHARE = 0.45  # Of the sampling rate: the force between samples is known up to there
+_STEPS, _QUICK_STEPS = 60, 15  # of a fit; of one that only shows where a mode may be
 
 
 class _OverTime:
     """What records over time have in common, taps or decays."""
 
+    forces: list[FloatArray] | None
     responses: list[FloatArray]
     period_s: float
     band_hz: tuple[float, float]
+    quantity: str
+
+    def _fit(self, starts: Starts, responses: list[FloatArray], *, coloured: bool = False, quick: bool = False) -> Fit:
+        raise NotImplementedError
+
+    def fit(self, starts: Starts, coloured: bool = False) -> Fit:
+        """The best model near some modes, its residual white or coloured."""
+        return self._fit(starts, self.responses, coloured=coloured)
+
+    def fit_quickly(self, starts: Starts) -> Fit:
+        """A model in a few steps."""
+        return self._fit(starts, self.responses, quick=True)
+
+    def fit_left(self, starts: Starts, last: Fit | None) -> Fit:
+        """A model in a few steps of what another one leaves."""
+        return self._fit(starts, self.left(last), quick=True)
+
+    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
+        """Discrete poles of models with 1 to `most` modes."""
+        return _core.stabilisation_poles(self.responses, most, self.forces)
+
+    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
+        """Ranks of the candidates that explain most, beside those that are kept."""
+        omega, zeta = np.array(candidates).T
+        ranking = _core.rank_modes(
+            self.responses, self.period_s, omega, zeta, kept + 1, self.forces, self.quantity, kept
+        )
+        return [int(index) for index in ranking.chosen]
 
     @property
     def samples(self) -> int:
@@ -61,7 +87,7 @@ class _OverTime:
             return self.responses
         return [response - np.real(model) for response, model in zip(self.responses, last.fitted, strict=True)]
 
-    def peaks_left(self, last: Fit | None, most: int) -> list[float]:
+    def peaks_left(self, last: Fit | None) -> list[float]:
         """Frequencies (rad/s) of the highest peaks within the band of what a model leaves, the highest first."""
         residuals = self.left(last)
         length = 2 * max(len(residual) for residual in residuals)
@@ -71,7 +97,7 @@ class _OverTime:
         frequency = np.fft.rfftfreq(length, self.period_s)
         power[(frequency < self.band_hz[0]) | (frequency > self.band_hz[1])] = 0.0
         inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
-        highest = inner[np.argsort(power[inner])[::-1][:most]]
+        highest = inner[np.argsort(power[inner])[::-1][:PEAKS]]
         return [float(2.0 * np.pi * frequency[index]) for index in highest]
 
 
@@ -87,7 +113,7 @@ class Taps(_OverTime):
     force_noise_n: float  # RMS of the force off the pulse
     hold: str  # course of the force between samples: "band_limited", "linear" or "impulse"
     thinned: Thinned | None = None  # what was thinned out before the fit; None: every sample is fitted
-    begun: bool = False  # the record begins within the pulse
+    starts_in_pulse: bool = False  # the record begins within the pulse
     widened: float = 1.0  # what intervals are multiplied with; see `Record`
 
     @property
@@ -122,51 +148,17 @@ class Taps(_OverTime):
             responses = [response - free * (sampled - course) for response, sampled, course in parts]
         return [replace(self, forces=straight, responses=responses, hold="linear")]
 
-    def fit(self, starts: Starts, coloured: bool = False) -> _core.ModalFit:
-        """The best model near some modes, its residual white or coloured."""
-        return self._fit(self.responses, starts, coloured, self.force_noise_n, _STEPS)
-
-    def fit_quickly(self, starts: Starts) -> _core.ModalFit:
-        """A model in a few steps."""
-        return self._quick(starts, self.responses)
-
-    def fit_left(self, starts: Starts, last: Fit | None) -> _core.ModalFit:
-        """A model in a few steps of what another one leaves."""
-        return self._quick(starts, self.left(last))
-
-    def _quick(self, starts: Starts, responses: Sequence[FloatArray]) -> _core.ModalFit:
-        return self._fit(responses, starts, False, 0.0, _QUICK_STEPS)
-
     def _fit(
-        self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, force_noise_n: float, steps: int
+        self, starts: Starts, responses: list[FloatArray], *, coloured: bool = False, quick: bool = False
     ) -> _core.ModalFit:
         omega, zeta = np.array(starts).T
         return _core.fit_modes(
-            self.forces,
-            list(responses),
-            self.period_s,
-            omega,
-            zeta,
-            quantity=self.quantity,
-            hold=self.held,
+            self.forces, responses, self.period_s, omega, zeta, quantity=self.quantity, hold=self.held,
             # What is read after a blow lacks the force over the mass: so much of the force is fitted along.
             with_mass_line=self.hold == "impulse" and self.held != "impulse" and self.quantity == "acceleration",
-            force_noise_n=force_noise_n,
-            coloured_residuals=coloured,
-            most_iterations=steps,
-        )
-
-    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
-        """Discrete poles of models with 1 to `most` modes."""
-        return _core.stabilisation_poles(self.responses, most, self.forces)
-
-    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
-        """Ranks of the candidates that explain most, beside those that are kept."""
-        omega, zeta = np.array(candidates).T
-        ranking = _core.rank_modes(
-            self.responses, self.period_s, omega, zeta, kept + 1, self.forces, self.quantity, kept
-        )
-        return [int(index) for index in ranking.chosen]
+            force_noise_n=0.0 if quick else self.force_noise_n, coloured_residuals=coloured,
+            most_iterations=_QUICK_STEPS if quick else _STEPS,
+        )  # fmt: skip
 
     def record(self, index: int) -> Taps:
         """One record alone."""
@@ -180,39 +172,19 @@ class Decays(_OverTime):
     responses: list[FloatArray]  # (n,) each
     period_s: float  # time between two samples
     band_hz: tuple[float, float]  # modes are looked for in it
-    white_share: float = 1.0  # of the samples, how many are independent
+    white_share: float  # of the samples, how many are independent
+    forces: None = None
+    quantity: str = "acceleration"  # whatever it is: amplitudes are fitted
     noise_correlation: float = 0.0  # none
 
-    def fit(self, starts: Starts, coloured: bool = False) -> _core.DecayFit:
-        """The best model near some modes, its residual white or coloured."""
-        return self._fit(self.responses, starts, coloured, _STEPS)
-
-    def fit_quickly(self, starts: Starts) -> _core.DecayFit:
-        """A model in a few steps."""
-        return self._quick(starts, self.responses)
-
-    def fit_left(self, starts: Starts, last: Fit | None) -> _core.DecayFit:
-        """A model in a few steps of what another one leaves."""
-        return self._quick(starts, self.left(last))
-
-    def _quick(self, starts: Starts, responses: Sequence[FloatArray]) -> _core.DecayFit:
-        return self._fit(responses, starts, False, _QUICK_STEPS)
-
-    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, steps: int) -> _core.DecayFit:
+    def _fit(
+        self, starts: Starts, responses: list[FloatArray], *, coloured: bool = False, quick: bool = False
+    ) -> _core.DecayFit:
         omega, zeta = np.array(starts).T
+        steps = _QUICK_STEPS if quick else _STEPS
         return _core.fit_decay(
-            list(responses), self.period_s, omega, zeta, coloured_residuals=coloured, most_iterations=steps
+            responses, self.period_s, omega, zeta, coloured_residuals=coloured, most_iterations=steps
         )
-
-    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
-        """Discrete poles of models with 1 to `most` modes."""
-        return _core.stabilisation_poles(self.responses, most)
-
-    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
-        """Ranks of the candidates that explain most, beside those that are kept."""
-        omega, zeta = np.array(candidates).T
-        ranking = _core.rank_modes(self.responses, self.period_s, omega, zeta, kept + 1, kept=kept)
-        return [int(index) for index in ranking.chosen]
 
     def record(self, index: int) -> Decays:
         """One record alone."""
@@ -220,10 +192,7 @@ class Decays(_OverTime):
 
 
 def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: bool = False) -> Taps | Decays:
-    """The records of a fit, and the band to look in.
-
-    A strong mode outside the band asked for is part of what is measured within it: it is looked for too.
-    """
+    """The records of a fit, and the band to look in; a strong mode outside is part of what is measured within it."""
     first = ready.records[0]
     responses = [record.response for record in ready.records]
     longest_s = max(len(response) for response in responses) * first.period_s
@@ -232,14 +201,14 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
             f"band of {band_hz[0]:g} to {band_hz[1]:g} Hz: must ascend and end below half the sampling rate, "
             f"{0.5 / first.period_s:g} Hz"
         )
-    band = (LEAST_SWINGS / longest_s, HIGHEST_SHARE / first.period_s)
+    band = (MIN_SWINGS / longest_s, HIGHEST_SHARE / first.period_s)
     if band_hz is not None:
         band = band_hz if within else (min(band[0], band_hz[0]), max(band[1], band_hz[1]))
     widest = max(record.widened for record in ready.records)
     if first.force_n is None:
         return Decays(responses, first.period_s, band, 1.0 / widest**2)
     forces = [record.force_n for record in ready.records if record.force_n is not None]
-    noise = [value for value in ready.force_noise_n if value is not None]
+    noise = [each.force_noise_n for each in ready.usable if each.force_noise_n is not None]
     taps = Taps(
         forces,
         responses,
@@ -248,7 +217,7 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
         first.quantity,
         float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0,
         "band_limited",
-        begun=any(force[0] != 0.0 for force in forces),
+        starts_in_pulse=any(force[0] != 0.0 for force in forces),
         widened=widest,
     )
     thinned = thin(ready, highest_of_interest_hz(ready, None if band_hz is None else band_hz[1]))
@@ -264,3 +233,107 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
         thinned=thinned,
         hold="impulse" if are_blows(ready) else taps.hold,
     )
+
+
+FLAT = 0.35  # Of the new sampling rate: the filter is flat up to here
+_STOP_DB = 80.0  # ... and has fallen to -80 dB at half of it, as the filters of recorders do
+_BAND = 0.34  # The band ends at this share of the new rate at most
+_FEW = 4096  # Fewer samples than this need no thinning
+_MARGIN = 1.25  # What stands out of the response above the band that the hit excites is looked at with this margin
+_MARGIN_OF_BLOWS = 2.0
+_GRID = 8  # points of the filter's transform per tap
+
+
+@dataclass(frozen=True, eq=False)
+class Thinned:
+    """Taps with fewer samples."""
+
+    responses: list[FloatArray]  # (n,) each
+    forces: list[FloatArray]  # (n,) each, of a recorder's force
+    straight: list[FloatArray]  # (n,) each, of a force that runs straight from sample to sample
+    period_s: float  # time between two samples
+    factor: int  # of how many samples one is left
+    # share of the band up to half the new rate that the filter lets pass, in power: what is left of white noise
+    white_share: float
+    noise_correlation: float  # between two samples on end of white noise behind the filter
+    # noise per sample of the pulse, as a share of what it was: the pulse's momentum is known as before
+    force_noise: float
+    first_s: list[float]  # time of the first new sample after that of the old first, per record; negative: before it
+
+
+def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
+    """Up to where a tap must be sampled; what stands out of the response above the band is fitted along."""
+    excited = max(each.excited_hz or 0.0 for each in ready.usable)
+    margin = _MARGIN
+    if are_blows(ready):  # they excite all that the rate holds
+        excited, margin = 0.0, _MARGIN_OF_BLOWS
+    peaks = [
+        peak.frequency_hz
+        for each in ready.usable
+        for response in (each.record.response[each.hit.first if each.hit else 0 :],)
+        for peak in decay_spectrum(replace(each.record, response=response, force_n=None)).peaks
+    ]
+    return max(excited if asked_hz is None else asked_hz, margin * max(peaks, default=0.0))
+
+
+def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
+    """Leave out samples that the band does not need.
+
+    Force and response pass the same filter of linear phase, whose delay is taken away: their ratio stays what it was.
+    The record is taken as at rest before its first sample; where the pulse comes soon after it, it begins earlier by as
+    much as the filter spreads the pulse.
+    """
+    period = ready.records[0].period_s
+    factor = int(_BAND / (highest_hz * period)) if highest_hz > 0.0 else 1
+    longest = max(len(record.response) for record in ready.records)
+    factor = min(factor, longest // (_FEW // 2))
+    if factor < 2 or longest <= _FEW or (are_blows(ready) and ready.records[0].quantity == "velocity"):
+        return None
+    plain, straight = _filters(factor)
+    reach = len(plain) // 2
+    responses, forces, courses, first_s, widths = [], [], [], [], []
+    for record in ready.records:
+        force = record.force_n
+        assert force is not None
+        acts = np.flatnonzero(force)
+        # Samples to put before the record, so that nothing of the pulse is spread beyond it.
+        before = max(0, 2 * reach + factor - int(acts[0]))
+        lead = np.zeros(before)
+        places = slice(reach, before + len(force) - reach, factor)
+        response = oaconvolve(np.concatenate((lead, record.response)), plain, "same")[places]
+        both = [oaconvolve(np.concatenate((lead, force)), taps, "same")[places] for taps in (plain, straight)]
+        inside = np.arange(before + len(force))[places]
+        near = (inside >= before + acts[0] - reach) & (inside <= before + acts[-1] + reach)
+        forces.append(np.where(near, both[0], 0.0))
+        courses.append(np.where(near, both[1], 0.0))
+        responses.append(np.ascontiguousarray(response))
+        first_s.append((reach - before) * period)
+        widths.append((acts[-1] - acts[0] + 1) / np.count_nonzero(near))
+    whole = float(np.sum(plain**2))
+    return Thinned(
+        responses,
+        forces,
+        courses,
+        period * factor,
+        factor,
+        whole * factor,
+        float(np.sum(plain[factor:] * plain[:-factor])) / whole,
+        float(np.sqrt(np.mean(widths))) / factor,
+        first_s,
+    )
+
+
+def are_blows(ready: Prepared) -> bool:
+    """Whether the pulses are single blows of one or two samples."""
+    forces = (record.force_n for record in ready.records)
+    return any(np.count_nonzero(force) < MIN_PULSE for force in forces if force is not None)
+
+
+def _filters(factor: int) -> tuple[FloatArray, FloatArray]:
+    """The filter, and what it is of a force that runs straight between its samples: (sin x / x)² of its spectrum."""
+    count, beta = kaiserord(_STOP_DB, (0.5 - FLAT) * 2.0 / factor)
+    count |= 1
+    plain = firwin(count, (0.5 + FLAT) / factor, window=("kaiser", beta))
+    size = _GRID * count
+    spectrum = np.fft.rfft(plain, size) * np.sinc(np.fft.rfftfreq(size)) ** 2
+    return np.asarray(plain, dtype=np.float64), np.asarray(np.fft.irfft(spectrum, size)[:count], dtype=np.float64)

@@ -2,23 +2,120 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-import numpy.typing as npt
-
-from shapegcode.identification.mode import IdentifiedMode, estimate_cell, mode_line
-from shapegcode.identification.prepared import Prepared
+from shapegcode.identification.checks import Prepared, RecordUse
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
-from shapegcode.io.record import Quantity, Record
+from shapegcode.io.record import FloatArray, Record
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
 
-FloatArray = npt.NDArray[np.float64]
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and its 95 % interval.
+
+    Attributes:
+        value: the estimate.
+        low: lower end of the interval.
+        high: upper end.
+    """
+
+    value: float
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        """Numbers of Python, whatever they come as."""
+        for name in ("value", "low", "high"):
+            object.__setattr__(self, name, float(getattr(self, name)))
+
+    @property
+    def uncertainty_percent(self) -> float:
+        """Larger half of the interval, in percent of the value."""
+        return 100.0 * max(self.high - self.value, self.value - self.low) / abs(self.value)
+
+    def map(self, function: Callable[[float], float]) -> Estimate:
+        """The estimate of a monotonic function of the value.
+
+        Args:
+            function: of the value; rising or falling.
+
+        Returns:
+            Its value and the ends of its interval.
+        """
+        ends = sorted((function(self.low), function(self.high)))
+        return Estimate(function(self.value), *ends)
+
+
+@dataclass(frozen=True)
+class IdentifiedMode:
+    """One mode.
+
+    Attributes:
+        frequency_hz: undamped natural frequency.
+        damping_ratio: 1 = critically damped.
+        mass_kg: equivalent (modal) mass at the point of the tap; None for a free decay.
+        damping_n_s_per_m: equivalent viscous damping; None for a free decay.
+        stiffness_n_per_m: equivalent stiffness; None for a free decay.
+        refusal: why the data do not support this mode; empty: they do.
+    """
+
+    frequency_hz: Estimate
+    damping_ratio: Estimate
+    mass_kg: Estimate | None = None
+    damping_n_s_per_m: Estimate | None = None
+    stiffness_n_per_m: Estimate | None = None
+    refusal: str = ""
+
+
+_SKEWED = 1.2
+
+
+def mode_line(mode: IdentifiedMode) -> str:
+    """A mode in one line: each value with half of its 95 % interval, or why the data do not support it."""
+    if mode.refusal:
+        return f"{mode.frequency_hz.value:.4g} Hz not supported: {mode.refusal}"
+    named = (
+        ("frequency", mode.frequency_hz, 1.0, "Hz"),
+        ("damping", mode.damping_ratio, 100.0, "%"),
+        ("m", mode.mass_kg, 1.0, "kg"),
+        ("c", mode.damping_n_s_per_m, 1.0, "N s/m"),
+        ("k", mode.stiffness_n_per_m, 1e-6, "N/µm"),
+    )
+    parts = (
+        f"{name} {estimate_cell(estimate, factor)} {unit}"
+        for name, estimate, factor, unit in named
+        if estimate is not None
+    )
+    return ", ".join(parts)
+
+
+def _decimals(half: float) -> int:
+    return min(max(0, 1 - math.floor(math.log10(half))), 6)
+
+
+def estimate_cell(estimate: Estimate | None, factor: float) -> str:
+    """An estimate times a factor, ``46.02 ± 0.05``, with as many digits as the interval is worth.
+
+    Both ends where it is skewed; empty where there is none.
+    """
+    if estimate is None:
+        return ""
+    value, low, high = (factor * each for each in (estimate.value, estimate.low, estimate.high))
+    above, below = high - value, value - low
+    if not (math.isfinite(above) and math.isfinite(below) and above > 0.0 and below > 0.0):
+        return f"{value:.4g} ({low:.4g} ... {high:.4g})"
+    if max(above, below) > _SKEWED * min(above, below):
+        decimals = _decimals(min(above, below))
+        return f"{value:z.{decimals}f} ({low:z.{decimals}f} ... {high:z.{decimals}f})"
+    decimals = _decimals(max(above, below))
+    return f"{value:z.{decimals}f} ± {max(above, below):.{decimals}f}"
 
 
 @dataclass(frozen=True)
@@ -45,38 +142,6 @@ class MassCheck:
     closed_form_kg: float
     bisection_kg: float
     halvings: int
-
-
-@dataclass(frozen=True)
-class RecordUse:
-    """What became of one tap or decay.
-
-    Attributes:
-        source: file, and which hit or channel of it.
-        used: whether the modes come from it too.
-        reason: why it is not used; empty: it is.
-        samples: that were recorded; null where it is not used, as for the others.
-        period_s: time between two samples.
-        start_s: time of the first sample in the file.
-        quantity: what the sensor measured.
-        excited_hz: up to where the hit excites (-20 dB); null for a decay.
-        resolution_hz: distance of two lines of a frequency response without time record, whose lines are its samples.
-    """
-
-    source: str
-    used: bool
-    reason: str = ""
-    samples: int | None = None
-    period_s: float | None = None
-    start_s: float | None = None
-    quantity: Quantity | None = None
-    excited_hz: float | None = None
-    resolution_hz: float | None = None
-
-    @property
-    def duration_s(self) -> float | None:
-        """How long it lasts; None where it is not used."""
-        return None if self.samples is None or self.period_s is None else self.samples * self.period_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,13 +280,12 @@ class Identification(Result):
                 )
                 for each in self.responses
             )
-        used = [
-            RecordUse(
-                record.source, True, "", len(record.response), record.period_s, record.start_s, record.quantity, excited
-            )
-            for record, excited in zip(self.taps, self.prepared.excited_hz, strict=True)
-        ]
-        return (*used, *(RecordUse(each.source, False, each.reason) for each in self.prepared.refused))
+        used = []
+        for each in self.prepared.usable:
+            tap = each.record
+            about = len(tap.response), tap.period_s, tap.start_s, tap.quantity, each.excited_hz
+            used.append(RecordUse(tap.source, True, "", *about))
+        return (*used, *self.prepared.refused)
 
     @property
     def ok(self) -> bool:
@@ -297,15 +361,15 @@ def _estimate(name: str, factor: float = 1.0) -> Any:
     return lambda mode: estimate_cell(getattr(mode, name), factor)
 
 
-def reason_for(supported: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
-    """Why there is no mode; empty: there is."""
-    if supported:
-        return ""
-    if not refused:
-        return "no mode stands out of the noise"
-    return "what stands out is not supported by the data: " + "; ".join(
-        f"{mode.frequency_hz.value:.4g} Hz: {mode.refusal}" for mode in refused
-    )
+def by_support(found: Sequence[IdentifiedMode]) -> dict[str, Any]:
+    """The modes that the data support, those that they do not, and why there is no mode (empty: there is)."""
+    modes, refused = (tuple(mode for mode in found if bool(mode.refusal) == bad) for bad in (False, True))
+    reason = "" if modes else "no mode stands out of the noise"
+    if refused and not modes:
+        reason = "what stands out is not supported by the data: " + "; ".join(
+            f"{mode.frequency_hz.value:.4g} Hz: {mode.refusal}" for mode in refused
+        )
+    return {"modes": modes, "refused": refused, "reason": reason}
 
 
 _MODE_COLUMNS = (

@@ -6,23 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import fft, signal
 
 from shapegcode.errors import RecordError
+from shapegcode.io.frequency_response import ComplexArray
 from shapegcode.io.record import FloatArray, Record
 
-ComplexArray = npt.NDArray[np.complex128]
-
-#: A peak counts above this share of the largest (-40 dB) ...
-_PEAK_SHARE = 0.01
-#: ... and if it stands out of its surroundings by this factor.
-_PEAK_RISES = 2.0
-#: So many standard noise levels, of which the spectrum's median is a measure.
-_PEAK_NOISE = 6.0
-_MOST_PEAKS = 8
-#: The spectrum of a decay is drawn from so many times as many points as there are samples.
-_PADDING = 4
+_PEAK_SHARE = 0.01  # A peak counts above this share of the largest (-40 dB)
+_PEAK_RISES = 2.0  # ... and if it stands out of its surroundings by this factor
+_PEAK_NOISE = 6.0  # So many standard noise levels, of which the spectrum's median is a measure
+_MAX_PEAKS = 8
+_PADDING = 4  # The spectrum of a decay is drawn from so many times as many points as there are samples
 #: A mode's band reaches this share of its frequency to either side, and at most half way to the next mode.
 _BAND_SHARE = 0.25
 _BAND_ORDER = 2
@@ -135,7 +129,7 @@ def _peaks(frequency: FloatArray, amplitude: FloatArray, resolution_hz: float) -
         height = float(np.exp(top - 0.25 * (left - right) * shift))
         peaks.append(Peak(value, height, f"{value:.{decimals}f} Hz"))
     peaks.sort(key=lambda peak: -peak.amplitude)
-    return tuple(peaks[:_MOST_PEAKS])
+    return tuple(peaks[:_MAX_PEAKS])
 
 
 @dataclass(frozen=True, eq=False)

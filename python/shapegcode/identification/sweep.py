@@ -11,30 +11,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.mode import Estimate, IdentifiedMode
-from shapegcode.identification.result import Identification, Sweep, reason_for
-from shapegcode.io.record import Record
+from shapegcode.identification.model_search import Sought
+from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, Sweep, by_support
+from shapegcode.io.record import FloatArray, Record
 
-FloatArray = npt.NDArray[np.float64]
-
-#: What Klipper sweeps unless told otherwise is 5 to 133 Hz; its ends are no steady sweep.
-SWEPT_HZ = (10.0, 130.0)
+SWEPT_HZ = (10.0, 130.0)  # What Klipper sweeps unless told otherwise is 5 to 133 Hz; its ends are no steady sweep
 _BIN_HZ = 0.5  # over which the spectrum is averaged: interference of the harmonics ripples faster
 _BIN_NOISE = 0.05  # of the logarithm of a bin's power
-_LEAST_S = 10.0
+_MIN_S = 10.0
 _APART_HZ = 8.0  # two peaks that are tried
-_MOST_MODES = 4
-#: The covariance is widened: the command's course, friction and play are no noise.
-_WIDENED = 2.0
-_LEAST_FREQUENCY, _LEAST_DAMPING = 0.005, 0.1  # shares: no interval is narrower
+_MAX_MODES = 4
+_WIDENED = 2.0  # The covariance is widened: the command's course, friction and play are no noise
+_MIN_FREQUENCY, _MIN_DAMPING = 0.005, 0.1  # shares: no interval is narrower
 _FREQUENCY_LIMIT, _DAMPING_LIMIT = 2.0, 30.0  # percent
 _NO_VIBRATION = 0.5
-_LEAST_SHARE = 0.02  # of the motion: less is no mode that counts
+_MIN_SHARE = 0.02  # of the motion: less is no mode that counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,23 +41,13 @@ class _Model:
     squares: float
 
 
-def find_swept_modes(
-    record: Record,
-    files: tuple[str, ...],
-    *,
-    band_hz: tuple[float, float] | None,
-    most_modes: int,
-    modes: int | None,
-) -> Identification:
-    """Find the modes that a sweep shows; see `identify.identify`.
-
-    Source: this project; the sweep is that of Klipper's resonance tester.
-    """
-    band = band_hz or SWEPT_HZ
+def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> Identification:
+    """Find the modes that a sweep of Klipper's resonance tester shows; see `identify.identify`."""
+    band, modes = sought.band_hz or SWEPT_HZ, sought.modes
     frequency, power = _spectrum(record, band)
     fits = [_fit(frequency, power, [], free=False)]
     evidence = [_evidence(fits[0], len(power))]
-    while len(fits) - 1 < (modes or min(most_modes, _MOST_MODES)):
+    while len(fits) - 1 < (modes or min(sought.most_modes, _MAX_MODES)):
         fits.append(_next(frequency, power, fits[-1]))
         evidence.append(_evidence(fits[-1], len(power)))
         if modes is None and len(fits) - 1 - int(np.argmin(evidence)) >= 1:
@@ -71,21 +56,17 @@ def find_swept_modes(
     best = fits[order]
     # What a free slope of the command's spectrum changes is not known.
     other = _fit(frequency, power, [tuple(row) for row in np.exp(best.parameters[2:].reshape(-1, 3))], free=True)
-    found = [_judged(best, other, index, len(power)) for index in range(order)]
+    found = [_judge_mode(best, other, index, len(power)) for index in range(order)]
     found = [mode for mode in found if band[0] <= mode.frequency_hz.value <= band[1]]
     found.sort(key=lambda mode: mode.frequency_hz.value)
-    supported = tuple(mode for mode in found if not mode.refusal)
-    refused = tuple(mode for mode in found if mode.refusal)
     fitted = np.exp(0.5 * _log_power(best.parameters, frequency))
     amplitude = np.sqrt(power)
     return Identification(
         files=files,
-        modes=supported,
-        refused=refused,
+        **by_support(found),
         order=order,
         evidence=dict(enumerate(float(each) for each in evidence)),
         fit_percent=100.0 * (1.0 - float(np.linalg.norm(fitted - amplitude) / np.linalg.norm(amplitude))),
-        reason=reason_for(supported, refused),
         warnings=(
             *record.warnings,
             "a sweep without force gives no mass and no stiffness, and its command is taken to grow evenly with the "
@@ -112,9 +93,9 @@ def _spectrum(record: Record, band: tuple[float, float]) -> tuple[FloatArray, Fl
             f"{record.source}: {1.0 / record.period_s:g} samples per second are too slow for {band[1]:g} Hz: needed "
             f"are {2.5 * band[1]:.4g} or more, or another band (--frequencies)"
         )
-    if duration < _LEAST_S:
+    if duration < _MIN_S:
         raise RecordError(
-            f"{record.source}: {duration:.3g} s: too short for a sweep ({_LEAST_S:g} s or more); a decay after a "
+            f"{record.source}: {duration:.3g} s: too short for a sweep ({_MIN_S:g} s or more); a decay after a "
             "stop is read with --decay"
         )
     if not np.ptp(record.response) > 0.0:
@@ -147,13 +128,8 @@ def _fit(frequency: FloatArray, power: FloatArray, starts: list[tuple[float, ...
     def left(theta: FloatArray) -> FloatArray:
         return _log_power(theta, frequency) - goal
 
-    found = least_squares(
-        left,
-        np.clip(first, low + 1e-12, high - 1e-12),
-        bounds=(low, high),
-        loss="soft_l1",
-        f_scale=0.5,
-    )
+    begin = np.clip(first, low + 1e-12, high - 1e-12)
+    found = least_squares(left, begin, bounds=(low, high), loss="soft_l1", f_scale=0.5)
     residual = _log_power(found.x, frequency) - goal
     squares = float(2.0 * found.cost)
     jacobian = np.asarray(found.jac, dtype=np.float64)
@@ -180,12 +156,12 @@ def _next(frequency: FloatArray, power: FloatArray, last: _Model) -> _Model:
     return min(tried, key=lambda fit: fit.squares)
 
 
-def _judged(best: _Model, other: _Model, index: int, bins: int) -> IdentifiedMode:
+def _judge_mode(best: _Model, other: _Model, index: int, bins: int) -> IdentifiedMode:
     """One mode with its intervals, and why it is refused if it is."""
     place = 2 + 3 * index
     quantile = _WIDENED * float(student.ppf(0.975, max(bins - len(best.parameters), 1)))
     halves = []
-    for at, least in ((place + 1, _LEAST_FREQUENCY), (place + 2, _LEAST_DAMPING)):
+    for at, least in ((place + 1, _MIN_FREQUENCY), (place + 2, _MIN_DAMPING)):
         apart = abs(float(other.parameters[at] - best.parameters[at]))
         halves.append(max(least, quantile * float(np.sqrt(max(best.covariance[at, at], 0.0))), apart))
     share, omega, zeta = np.exp(best.parameters[place : place + 3])
@@ -194,8 +170,8 @@ def _judged(best: _Model, other: _Model, index: int, bins: int) -> IdentifiedMod
         for value, half in zip((omega / (2.0 * np.pi), zeta), halves, strict=True)
     )
     refusal = ""
-    if share < _LEAST_SHARE:
-        refusal = f"{100.0 * share:.2g} % of the axis' motion only (limit {100.0 * _LEAST_SHARE:g} %)"
+    if share < _MIN_SHARE:
+        refusal = f"{100.0 * share:.2g} % of the axis' motion only (limit {100.0 * _MIN_SHARE:g} %)"
     elif zeta > _NO_VIBRATION:
         refusal = f"damping ratio {zeta:.2g}: no vibration that stands out (limit {_NO_VIBRATION:g})"
     for name, estimate, limit in (

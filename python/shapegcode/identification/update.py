@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import copy
+import math
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+from scipy.optimize import linear_sum_assignment
+from tomlkit.items import AoT, Key, SingleKey, Table
 
 from shapegcode.errors import ArgumentError, MachineError
-from shapegcode.identification.mode import IdentifiedMode
-from shapegcode.identification.mode_tables import ModeTables
-from shapegcode.identification.other_axes import decide_axes, open_modes, require_decisions
-from shapegcode.identification.result import Identification, MachineFile
-from shapegcode.machine import Machine
+from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, MachineFile
+from shapegcode.machine import Machine, check_axes
+from shapegcode.settings.edit import (
+    Entry,
+    commented_key,
+    commented_table,
+    entry_of,
+    is_blank,
+    own_end,
+    parse_exactly,
+    take_tail,
+)
+from shapegcode.settings.keys import toml
 from shapegcode.settings.load import read_text
+from shapegcode.settings.remarks import remarks_of, with_origin_table, with_remarks
 
 
 @dataclass(frozen=True)
@@ -44,7 +63,7 @@ class MachineUpdate:
 
 
 def update_machine(path: str | Path, found: Identification, *, keep_modes: str = "", rigid: str = "") -> MachineUpdate:
-    """A machine file with the modes of an identification in it; see `update_machine_file`.
+    """A machine file with the modes of an identification in it.
 
     Args:
         path: of the machine file, which is not touched.
@@ -56,43 +75,22 @@ def update_machine(path: str | Path, found: Identification, *, keep_modes: str =
         The text to write, what it says, and notes of what changed.
 
     Raises:
-        ArgumentError: no axis; see `update_machine_file` too.
+        ArgumentError: no axis, no mode that the data support, or a built-in machine.
         MachineError: the file is bad, or would be.
         OSError: it cannot be read.
     """
     if found.axis is None:
         raise ArgumentError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
-    return update_machine_file(
-        path,
-        found.axis,
-        found.modes,
-        source=found.source,
-        refused=found.refused,
-        keep_modes=keep_modes,
-        rigid=rigid,
-    )
-
-
-def update_machine_file(
-    path: str | Path,
-    axis: str,
-    modes: Sequence[IdentifiedMode],
-    *,
-    source: str,
-    refused: Sequence[IdentifiedMode] = (),
-    keep_modes: str = "",
-    rigid: str = "",
-) -> MachineUpdate:
-    """Read a machine file and put identified modes into it; see `update_modes`. The file itself is not touched."""
     check_updatable(path)
     text = read_text(Path(path), MachineError)
     return update_modes(
-        text, axis, modes, source=source, refused=refused, keep_modes=keep_modes, rigid=rigid, file=str(path)
-    )
+        text, found.axis, found.modes, source=found.source, refused=found.refused, keep_modes=keep_modes, rigid=rigid,
+        file=str(path),
+    )  # fmt: skip
 
 
 def check_updatable(path: str | Path) -> Machine:
-    """Tell before the work what would make `update_machine_file` fail whatever the modes."""
+    """Tell before the work what would make `update_machine` fail whatever the modes."""
     if isinstance(path, str) and path in Machine.builtin_names():
         raise ArgumentError(
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "
@@ -146,3 +144,376 @@ def _unknown(machine: Machine) -> Iterator[str]:
     if names:
         letters = "".join(names)
         yield f"no mode of {', '.join(names)} is known: tap, or say --rigid {letters}; until then taken as rigid"
+
+
+_KEPT = ", kept"
+_ORIGIN = re.compile(r"^(from [^:]*|assumed|not known|not measured)")
+
+
+def open_modes(machine: Machine, measured: str | None) -> dict[str, str]:
+    """Modes of the other axes that nobody measured on this machine, and over which nobody decided."""
+    found: dict[str, list[str]] = {}
+    for value in machine.values():
+        parts = value.key.split(".")
+        is_mode = parts[:1] == ["axes"] and parts[2:3] == ["modes"] and parts[-1] == "frequency_hz"
+        if is_mode and parts[1] != measured and value.unmeasured and _KEPT not in value.remark:
+            found.setdefault(parts[1], []).append(f"{value.value} Hz ({value.remark})")
+    return {axis: ", ".join(modes) for axis, modes in found.items()}
+
+
+def require_decisions(open_axes: Mapping[str, str], keep: str, rigid: str, file: str) -> None:
+    """Refuse modes over which nobody decided."""
+    check_axes(keep, rigid)
+    undecided = {axis: modes for axis, modes in open_axes.items() if axis not in keep + rigid}
+    if undecided:
+        said = "; ".join(f"{axis.upper()}: {modes}" for axis, modes in undecided.items())
+        letters = "".join(undecided).upper()
+        raise ArgumentError(
+            f"{file}: modes that were not measured on this machine would stay, and make shapers longer: {said}. "
+            f"--keep-modes {letters} keeps them (until they are tapped), --rigid {letters} takes them out"
+        )
+
+
+def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[str]]:
+    """Take the modes of rigid axes out of a file, and say of kept ones that they are."""
+    notes: list[str] = []
+    for axis in rigid:
+        tables = ModeTables(text, axis, "", file)
+        text = tables.make_rigid()
+        notes += [f"{axis.upper()}: {note}" for note in tables.notes]
+
+    def remark(key: str, said: str) -> str:
+        parts = key.split(".")
+        frequency = parts[:1] == ["axes"] and parts[1] in keep and parts[-1] == "frequency_hz"
+        if not frequency or _KEPT in said:
+            return said
+        marked = _ORIGIN.sub(rf"\1{_KEPT}", said)
+        if marked != said:
+            notes.append(f"{parts[1].upper()}: kept, though not measured here ({said})")
+        return marked
+
+    return with_remarks(text, remark), notes
+
+
+_MEASURED = "half of the 95 % interval"
+_DIGITS = 7
+_SUM_SLACK = 1e-3  # of the participations: rounding
+_KEYS = (
+    "frequency_hz",
+    "damping_ratio",
+    "frequency_uncertainty_percent",
+    "damping_uncertainty_percent",
+    "mass_kg",
+    "mass_uncertainty_percent",
+    "source",
+)
+
+
+class ModeTables:
+    """The modes of one axis in the text of a machine file."""
+
+    def __init__(self, text: str, axis: str, source: str, file: str) -> None:
+        """Find them."""
+        text = with_origin_table(text)
+        self.newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
+        self._last_end = "" if text.endswith("\n") else self.newline
+        self.document = parse_exactly(text + self._last_end, file)
+        self.data: dict[str, Any] = tomllib.loads(text)
+        self.axis, self.source, self.file = axis, source, file
+        self.notes: list[str] = []  # what was replaced, kept, removed and added, one sentence each
+        self._gap: list[Entry] = []  # the blank line behind the first table, if that went
+        self.name = f"axes.{self.axis}.modes"
+        self.old: list[dict[str, Any]] = list(self.data["axes"][self.axis].get("modes", []))
+        self.expected: list[dict[str, Any]] = []
+        self._remarks = remarks_of(text)
+        self._said: dict[int, dict[str, str]] = {}
+        """Of a table, by its identity: where the values that were put into it come from."""
+        self.home = self._axis_table()
+        self.tables: list[Table] = next(
+            (item.body for key, item in self.home.value.body if isinstance(item, AoT) and _is_modes(key, item)),
+            [],
+        )
+        self._before = list(self.tables)
+        if len(self.tables) != len(self.old):
+            raise ArgumentError(
+                f"{self.file}: the modes of the {self.axis.upper()} axis are written inline; write each as a table "
+                f"[[{self.name}]], then they can be updated"
+            )
+
+    def _axis_table(self) -> Table:
+        """The table [axes.x] of the axis."""
+        for key, axes in self.document.body:
+            if key is not None and key.key == "axes" and isinstance(axes, Table) and not key.is_dotted():
+                for inner, table in axes.value.body:
+                    if inner is not None and inner.key == self.axis and isinstance(table, Table):
+                        return table
+        raise self._no_place()
+
+    def _no_place(self) -> ArgumentError:
+        return ArgumentError(
+            f"{self.file}: no place for a table [[{self.name}]]: write the axis as a table [axes.{self.axis}]"
+        )
+
+    def put(self, modes: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
+        """The text with modes in it; see `update.update_modes`."""
+        old_hz = [each["frequency_hz"] for each in self.old]
+        taken = matches(modes, old_hz)
+        kept = {old: modes[mode] for mode, old in taken.items()}
+        seen = {old: refused[mode] for mode, old in matches(refused, old_hz).items()}
+        fresh = [mode for number, mode in enumerate(modes) if number not in taken]
+        stay, left = self._old_tables(kept, seen)
+        shares, meaning = shares_of(modes)
+        share_of = dict(zip(map(id, modes), shares, strict=True))
+        added = [self._table(mode, share_of[id(mode)], meaning) for mode in fresh]
+        self._insert(stay, added, left)
+        self._tell_sum(modes)
+        said = self.data["axes"][self.axis].get("rigid")
+        if said:
+            self.notes.append("it was said to be rigid: that is taken back")
+        if said or (said is False and self._remarks.get(f"axes.{self.axis}.rigid", "").startswith("assumed")):
+            self._say_rigid(False, "a mode was measured")
+        text = self.document.as_string()
+        self._check(text)
+        return self._with_origins(text, [*stay, *added])
+
+    def make_rigid(self) -> str:
+        """The text without modes of the axis, which is said to be rigid."""
+        _, left = self._old_tables({}, {}, "it is taken as rigid")
+        entries = self.home.value.body
+        place = next((n for n, (key, item) in enumerate(entries) if _is_modes(key, item)), len(entries))
+        entries[place : place + 1] = [(None, item) for _, item in left]
+        self._say_rigid(True, "decided: no mode of it counts")
+        text = self.document.as_string()
+        self._check(text, rigid=True)
+        return self._with_origins(text, [])
+
+    def _with_origins(self, text: str, tables: Sequence[Table]) -> str:
+        """The new text with the origins of the modes where they are now."""
+        found = {key: remark for key, remark in self._remarks.items() if not key.startswith(self.name)}
+        before = {id(table): number for number, table in enumerate(self._before, start=1)}
+        for number, table in enumerate(tables, start=1):
+            was = before.get(id(table))
+            held = self.old[was - 1].keys() if was else set()
+            stem = f"{self.name}.{was}."
+            old = {key.removeprefix(stem): said for key, said in self._remarks.items() if key.startswith(stem)}
+            gone = held - table.keys()
+            said = {key: remark for key, remark in old.items() if key not in gone} | self._said.get(id(table), {})
+            found |= {f"{self.name}.{number}.{key}": remark for key, remark in said.items() if remark}
+        return with_origin_table(text, found)
+
+    def _say_rigid(self, rigid: bool, remark: str) -> None:
+        self._remarks[f"axes.{self.axis}.rigid"] = remark
+        self._put(self.home.value.body, {"rigid": (rigid, remark)})
+
+    def _old_tables(
+        self, kept: Mapping[int, IdentifiedMode], seen: Mapping[int, IdentifiedMode], why: str = "which was not found"
+    ) -> tuple[list[Table], list[Entry]]:
+        """Change the tables of the file."""
+        stay: list[Table] = []
+        left: list[Entry] = []
+        for number, (table, old) in enumerate(zip(self.tables, self.old, strict=True)):
+            if number in kept:
+                self._change(table, old, kept[number])
+            elif number in seen:
+                old_hz, new_hz = toml(old["frequency_hz"]), seen[number].frequency_hz.value
+                self.expected.append(old)
+                self.notes.append(f"kept {old_hz} Hz as it is: the test shows it at {new_hz:.6g} Hz, not well enough")
+            else:
+                self.notes.append(f"removed {toml(old['frequency_hz'])} Hz, {why}: {toml(old)}")
+                tail = take_tail(table)
+                blank = tail[:1] if tail and is_blank(tail[0]) else []
+                left += tail[len(blank) :]
+                self._gap = blank if number == 0 else self._gap
+                continue
+            table.trivia.indent = _text(left) + table.trivia.indent
+            left = []
+            stay.append(table)
+        return stay, left
+
+    def _check(self, text: str, *, rigid: bool = False) -> None:
+        """The new text must say what is meant, and nothing else may have changed."""
+        wanted = copy.deepcopy(self.data)
+        axis = wanted["axes"][self.axis]
+        axis["modes"] = self.expected
+        if rigid or "rigid" in axis:
+            axis["rigid"] = rigid
+        try:
+            found = tomllib.loads(text)
+            found["axes"][self.axis].setdefault("modes", [])
+            found["axes"][self.axis]["modes"].sort(key=_frequency)
+            wanted["axes"][self.axis]["modes"].sort(key=_frequency)
+        except (tomllib.TOMLDecodeError, KeyError, AttributeError):
+            found = {}
+        if found != wanted:
+            raise self._no_place()
+
+    def _change(self, table: Table, old: dict[str, Any], mode: IdentifiedMode) -> None:
+        """Put a mode into a table."""
+        entries = table.value.body
+        values = self._values(mode)
+        kept = ["participation " + toml(old.get("participation", 1.0))]
+        stated = old.get("frequency_uncertainty_percent")
+        if stated is not None and _MEASURED not in table["frequency_uncertainty_percent"].trivia.comment:
+            measured = values["frequency_uncertainty_percent"][0]
+            if stated > measured:
+                del values["frequency_uncertainty_percent"]
+                kept.append(f"frequency_uncertainty_percent = {toml(stated)}, wider than the measured {toml(measured)}")
+        kept += [f"{key} = {toml(old[key])}" for key in ("frequency_over",) if key in old]
+        for key in ("mass_kg", "mass_uncertainty_percent"):
+            if key in old and key not in values:
+                entries[:] = [entry for entry in entries if entry[0] is None or entry[0].key != key]
+                self.notes.append(f"removed {key} = {toml(old[key])}: a decay without force gives no mass")
+        self._put(entries, values)
+        self._said[id(table)] = {key: remark for key, (_, remark) in values.items()}
+        self.expected.append(
+            {key: value for key, value in old.items() if key not in _KEYS}
+            | {key: old[key] for key in ("frequency_uncertainty_percent",) if key in old}
+            | {key: value for key, (value, _) in values.items()}
+        )
+        self.notes.append(
+            f"{toml(values['frequency_hz'][0])} Hz replaces {toml(old['frequency_hz'])} Hz, which keeps "
+            + "; ".join(kept)
+        )
+
+    def _put(self, entries: list[Entry], values: Mapping[str, tuple[Any, str]]) -> None:
+        """Values in place of those that a table has, or of its commented keys, else behind them."""
+        below = next((n for n, (_, item) in enumerate(entries) if isinstance(item, Table)), len(entries))
+        places = {commented_key(entry): place for place, entry in enumerate(entries[:below])}
+        places |= {key.key: place for place, (key, _) in enumerate(entries[:below]) if key is not None}
+        added = []
+        for key, (value, remark) in values.items():
+            entry = entry_of(_line(key, value, remark) + self.newline)
+            if key in places:
+                entry[1].trivia.indent = entries[places[key]][1].trivia.indent
+                entries[places[key]] = entry
+            else:
+                added.append(entry)
+        place = own_end(entries[:below])
+        entries[place:place] = added
+
+    def _values(self, mode: IdentifiedMode) -> dict[str, tuple[Any, str]]:
+        """Value and remark of every key that the data give."""
+        values: dict[str, tuple[Any, str]] = {}
+        named: Mapping[str, Estimate | None] = {
+            "frequency_hz": mode.frequency_hz, "damping_ratio": mode.damping_ratio, "mass_kg": mode.mass_kg,
+        }  # fmt: skip
+        for key, estimate in named.items():
+            if estimate is not None:
+                low, high = (f"{end:.{_DIGITS}g}" for end in (estimate.low, estimate.high))
+                values[key] = _rounded(estimate.value), f"95 %: {low} ... {high}"
+                uncertain = key.partition("_")[0] + "_uncertainty_percent"
+                values[uncertain] = _rounded_up(estimate.uncertainty_percent), _MEASURED
+        values["source"] = self.source, ""
+        return {key: values[key] for key in _KEYS if key in values}
+
+    def _table(self, mode: IdentifiedMode, share: float, meaning: str) -> Table:
+        """A new table."""
+        values = self._values(mode) | {"participation": (share, f"{meaning}, not measured")}
+        self.expected.append({key: value for key, (value, _) in values.items()})
+        self.notes.append(
+            f"{toml(values['frequency_hz'][0])} Hz is new: participation {share:g} ({meaning}), as a tap does not tell "
+            "how much of the axis' motion goes into it"
+        )
+        lines = ["[[modes]]", *(_line(key, value, remark) for key, (value, remark) in values.items())]
+        (_, tables), *_ = tomlkit.parse("".join(line + self.newline for line in lines)).body
+        assert isinstance(tables, AoT)
+        self._said[id(tables.body[0])] = {key: remark for key, (_, remark) in values.items()}
+        return tables.body[0]
+
+    def _tell_sum(self, modes: Sequence[IdentifiedMode]) -> None:
+        """Warn of modes that together would move further than the axis does."""
+        total = sum(float(mode.get("participation", 1.0)) for mode in self.expected)
+        if total > 1.0 + _SUM_SLACK:
+            shares = ", ".join(f"{share:g}" for share in shares_of(modes)[0])
+            self.notes.append(
+                f"warning: the participations of the {self.axis.upper()} axis sum to {total:.4g}: those of all modes "
+                f"of one point sum to 1 when the axis moves; by the shares of the modes found they would be {shares}"
+            )
+
+    def _insert(self, stay: list[Table], added: list[Table], left: list[Entry]) -> None:
+        """Put new tables behind the last one that stays, or where the first one was, or where the axis ends."""
+        for table in added:
+            table.trivia.indent = self.newline
+        if not self.tables:
+            self._insert_first(added)
+            return
+        if stay:
+            behind = take_tail(stay[-1]) + left
+        else:
+            added[0].trivia.indent = self.tables[0].trivia.indent.rstrip(" \t")
+            behind = self._gap + left
+        self.tables[:] = [*stay, *added]
+        self.tables[-1].value.body.extend(behind)
+
+    def _insert_first(self, added: list[Table]) -> None:
+        """Where a commented table of modes makes room for them, or behind the axis."""
+        entries = self.home.value.body
+        modes = (SingleKey("modes"), AoT(added, "modes", parsed=True))
+        for place, entry in enumerate(entries):
+            if commented_table(entry) == self.name:
+                end = place + 1
+                while end < len(entries) and commented_key(entries[end]):
+                    end += 1
+                entries[place:end] = [modes]
+                return
+        added[-1].value.body.extend(take_tail(self.home))
+        entries.append(modes)
+
+
+def _is_modes(key: Key | None, item: object) -> bool:
+    return key is not None and key.key == "modes" and isinstance(item, AoT)
+
+
+def _text(entries: Sequence[Entry]) -> str:
+    """Comments and blank lines as they stand in the file."""
+    return "".join(item.as_string() for _, item in entries)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def _rounded_up(value: float) -> float:
+    """To four digits, never less than it was; rounding the value itself is covered too."""
+    if not math.isfinite(value):
+        return value
+    value += 100.0 * 0.5 * 10.0 ** (1 - _DIGITS)
+    step = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return float(f"{math.ceil(value / step) * step:.4g}")
+
+
+def _line(key: str, value: object, remark: str) -> str:
+    return f"{key} = {toml(value)}" + (f"  # {remark}" if remark else "")
+
+
+def _frequency(mode: dict[str, Any]) -> float:
+    return float(mode["frequency_hz"])
+
+
+SAME_MODE = 0.1  # Two frequencies, relative to the old one, within which a mode is taken as the one that the file has
+
+_NO_PAIR = 1e3
+_SHARE_DIGITS = 4
+
+
+def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
+    """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes."""
+    masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
+    if len(masses) < len(modes):
+        return [_share(1.0 / len(modes))] * len(modes), "equal shares"
+    total = sum(1.0 / mass for mass in masses)
+    return [_share(1.0 / mass / total) for mass in masses], "share of the residues 1/m"
+
+
+def _share(value: float) -> float:
+    return float(f"{value:.{_SHARE_DIGITS}g}")
+
+
+def matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
+    """Number of the old mode by that of the new: as many pairs within 10 % as there can be, the nearest ones."""
+    if not old_hz or not modes:
+        return {}
+    new_hz = np.array([mode.frequency_hz.value for mode in modes])
+    distance = np.abs(new_hz[:, None] / np.asarray(old_hz) - 1.0)
+    pairs = zip(*linear_sum_assignment(np.where(distance <= SAME_MODE, distance, _NO_PAIR)), strict=True)
+    return {int(new): int(old) for new, old in pairs if distance[new, old] <= SAME_MODE}

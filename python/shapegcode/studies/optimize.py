@@ -23,17 +23,13 @@ from shapegcode.machine import Machine
 from shapegcode.machine.output import ANY_PRICE
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
-from shapegcode.studies.distributions import listed
-from shapegcode.studies.optimum_result import Candidate, ChosenValue, Optimum
 from shapegcode.studies.replay import SHARE, DrawsJob, Replay, play_all
-from shapegcode.studies.study import check_ends
-from shapegcode.studies.summary import check_probability, within
-from shapegcode.studies.varied import MOST_DRAWS, Columns, Vary, check_keys, drawn, drawn_machine, varied_values
+from shapegcode.studies.result import Candidate, ChosenValue, Optimum
+from shapegcode.studies.study import check_ends, check_probability, within
+from shapegcode.studies.varied import MAX_DRAWS, Vary, check_keys, drawn, drawn_machine, listed, varied_values
 
-USUAL_DRAWS = 256
-"""Machines on which a choice is played, if nothing else is said."""
-USUAL_CONVERSIONS = 300
-"""Conversions at most, if nothing else is said."""
+USUAL_DRAWS = 256  # Machines on which a choice is played, if nothing else is said
+USUAL_CONVERSIONS = 300  # Conversions at most, if nothing else is said
 
 _FRESH = 4  # times as many draws confirm a choice: the best of many has had luck
 _UNLIKELY_S = 1e6  # a candidate that is not likely enough costs more than any program takes
@@ -90,12 +86,13 @@ def optimize(
         if each.known:
             raise ArgumentError(f"vary: {each.key}: the converter would know it: it belongs into choose")
     samples = [drawn(varied, n, "sobol", seed, indices=False)]
-    if n > (largest := MOST_DRAWS // _FRESH):
+    if n > (largest := MAX_DRAWS // _FRESH):
         raise ArgumentError(f"n = {n}: must be at most {largest}: {_FRESH} times as many confirm a choice")
     samples.append(drawn(varied, _FRESH * n, "sobol", seed + 1, indices=False))
     for columns in samples:
         check_ends(machine, varied, columns)
-    rows = [_rows([each.key for each in varied], columns) for columns in samples]
+    keys = [each.key for each in varied]
+    rows = [tuple(dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)) for columns in samples]
     _check_values(machine, choices)
     if isinstance(program, Program):
         program.require_machine(machine)
@@ -112,10 +109,6 @@ def optimize(
         name, machine.name, probability, n, best, run.as_it_is(), tuple(listed),
         math.prod(len(values) for values in choices.values()),
     )  # fmt: skip
-
-
-def _rows(keys: list[str], columns: Columns) -> tuple[Mapping[str, object], ...]:
-    return tuple(dict(zip(keys, values, strict=True)) for values in zip(*columns, strict=True))
 
 
 def _check_values(machine: Machine, choices: Choices) -> None:
@@ -136,7 +129,7 @@ class _Choosing:
 
     def __init__(
         self, program: Program | str, machine: Machine, choices: Choices,
-        rows: list[tuple[Mapping[str, object], ...]], probability: float, shape_all: bool,
+        rows: Sequence[tuple[Mapping[str, object], ...]], probability: float, shape_all: bool,
     ) -> None:  # fmt: skip
         # The shortest time is looked for: no price stands in its way.
         self._program, self._machine, self._choices, self._rows = program, machine.with_values(ANY_PRICE), choices, rows
@@ -242,22 +235,18 @@ def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
     return checked
 
 
-def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float]) -> Iterator[Ranks]:
-    """Combinations worth a conversion: all of them, or as many as differential evolution gets to."""
-    sizes = [len(values) for values in choices.values()]
-    if math.prod(sizes) <= most:
-        yield from itertools.product(*(range(size) for size in sizes))
-        return
-    yield from _evolved(sizes, most, seed, cost)
-
-
 class _EnoughError(Exception):
     """As many were tried as may be."""
 
 
-def _evolved(sizes: Sequence[int], most: int, seed: int, cost: Callable[[Ranks], float]) -> Iterator[Ranks]:
+def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float]) -> Iterator[Ranks]:
+    """Combinations worth a conversion: all of them, or as many as differential evolution gets to."""
     from scipy.optimize import Bounds, differential_evolution
 
+    sizes = [len(values) for values in choices.values()]
+    if math.prod(sizes) <= most:
+        yield from itertools.product(*(range(size) for size in sizes))
+        return
     known: dict[Ranks, float] = {}
 
     def asked(point: npt.NDArray[np.float64]) -> float:

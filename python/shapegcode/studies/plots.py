@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
-from shapegcode.studies.optimum_result import Optimum
 from shapegcode.studies.replay import MEASURES, SHARE
-from shapegcode.studies.result import Bins, MachineStudy
+from shapegcode.studies.result import Bins, MachineStudy, Optimum
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -67,25 +67,16 @@ class _PlayedPart:
 
 
 class Replay:
-    """A text that was converted for a machine, ready to be played on others.
-
-    Args:
-        machine: for which it was converted.
-        original: the program.
-        emitted: the text, read back.
-        parts: of each shaped region its rank in the original, and its first and last line in the text.
-        limits: of each.
-        time_s: cycle time of the text on that machine.
-    """
+    """A text that was converted for a machine, ready to be played on others."""
 
     def __init__(
         self,
-        machine: Machine,
+        machine: Machine,  # for which it was converted
         original: Program,
-        emitted: Program,
-        parts: Sequence[tuple[int, int, int]],
-        limits: Sequence[RegionLimits],
-        time_s: float,
+        emitted: Program,  # the text, read back
+        parts: Sequence[tuple[int, int, int]],  # rank in the original, first and last line in the text: of each region
+        limits: Sequence[RegionLimits],  # of each
+        time_s: float,  # cycle time of the text on that machine
     ) -> None:
         self.machine, self._original, self._emitted, self._places = machine, original, emitted, tuple(parts)
         self.time_s = time_s
@@ -118,13 +109,10 @@ class Replay:
             )
         judging = MachineModel(judged_by or machine)
         judge, ranks = Judge(judging), {id(region): index for index, region in enumerate(original.regions)}
-        limits = [
-            judge.limits(
-                RegionFigures(judging.play_original(place.region.path, offset=judging.offset(place.region)), (), (), 0),
-                place,
-            )
-            for place in found.placed
-        ]
+        limits = []
+        for place in found.placed:
+            played = judging.play_original(place.region.path, offset=judging.offset(place.region))
+            limits.append(judge.limits(RegionFigures(played, (), (), 0), place))
         places = [(ranks[id(place.region)], place.first_line, place.last_line) for place in found.placed]
         return cls(machine, original, found.emitted, places, limits, found.cycle_time_s.emitted)
 
@@ -198,8 +186,7 @@ class Replay:
         return {name: value for name, value in measured.items() if name in wanted}
 
 
-OVERRIDE = "times.feed_override_percent"
-"""Where it is varied, the blocks are played at it."""
+OVERRIDE = "times.feed_override_percent"  # Where it is varied, the blocks are played at it
 
 _AT_ONCE = 64  # draws of a task at most: long enough to be worth one
 _PLAYED_S = 900.0  # of motion in a task: short enough to tell how far it is, and to be stopped

@@ -17,6 +17,7 @@ shaping.family = ["zv", "zvd", "ei"]
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_origin
@@ -38,14 +39,13 @@ from shapegcode.settings.keys import (
     table_type,
 )
 from shapegcode.settings.load import KeyProblem, parsed, read_text, validated
-from shapegcode.studies.distributions import Distribution, listed, lognormal, normal, uniform
 from shapegcode.studies.optimize import USUAL_CONVERSIONS, USUAL_DRAWS
 from shapegcode.studies.replay import DEFAULT_MEASURES, MEASURES
-from shapegcode.studies.varied import MOST_DRAWS
+from shapegcode.studies.varied import MAX_DRAWS, Distribution, listed, lognormal, normal, uniform
 
 _KINDS = (("mean", "sd"), ("mean", "percent"), ("median", "percent"), ("low", "high"), ("one_of",))
 _GIVE = "give mean and sd (or percent), median and percent, low and high, or one_of"
-_MOST_CONVERSIONS = 100_000
+_MAX_CONVERSIONS = 100_000
 _DOTTED = re.compile(r"^(\s*)([\w-]+(?:\.[\w-]+)+)(\s*=)", re.MULTILINE)
 
 
@@ -140,15 +140,6 @@ def _is_value(parts: Sequence[str]) -> bool:
     return table is None
 
 
-def _flattened(data: dict[str, Any], table: str, path: str) -> dict[str, object]:
-    found: dict[str, object] = {}
-    for name, entry in _flat(data[table]):
-        if name in found:
-            raise StudyFileError(path, (Problem(f"{table}.{name}", "", "given twice, in quotes and without"),))
-        found[name] = entry
-    return found
-
-
 Values = Annotated[dict[str, Annotated[DrawnValue, BeforeValidator(_as_table)]], Field(min_length=1)]
 Lists = Annotated[dict[str, Annotated[tuple[Any, ...], Field(min_length=1)]], Field(min_length=1)]
 Measure = Annotated[Text, Field(json_schema_extra={"enum": list(MEASURES)})]
@@ -161,7 +152,7 @@ class StudyFile(TomlTable):
     machine: Text | None = key(
         "machine file beside this one, or a built-in machine; left out: that of -m", default=None
     )
-    n: Annotated[int, Strict(), Field(ge=1, le=MOST_DRAWS)] | None = key(
+    n: Annotated[int, Strict(), Field(ge=1, le=MAX_DRAWS)] | None = key(
         f"how many draws; left out: 1000, and {USUAL_DRAWS} for each choice of optimize", default=None
     )
     sampling: Literal["sobol", "lhs", "grid"] = key("how they are spread, of study", default="sobol")
@@ -170,7 +161,7 @@ class StudyFile(TomlTable):
     indices: Bool = key("Sobol indices too, of study; needs shapegcode[study]", default=False)
     at_least: Annotated[Positive, Field(le=1)] = key("probability of staying within tolerance", default=0.95)
     shape_all: Bool = key("shape every region, see convert --shape-all", default=False)
-    most: Annotated[int, Strict(), Field(ge=1, le=_MOST_CONVERSIONS)] = key(
+    most: Annotated[int, Strict(), Field(ge=1, le=_MAX_CONVERSIONS)] = key(
         "conversions at most, of optimize", default=USUAL_CONVERSIONS
     )
     vary: Values = key("the distribution from which each key of the machine file is sampled")
@@ -230,7 +221,11 @@ def load_study(path: str | Path) -> StudyFile:
     data = parsed(text, str(path), StudyFileError)
     for table in ("vary", "choose"):
         if isinstance(data.get(table), dict):
-            data[table] = _flattened(data, table, str(path))
+            pairs = list(_flat(data[table]))
+            data[table] = dict(pairs)
+            for name in (name for name, count in Counter(name for name, _ in pairs).items() if count > 1):
+                twice = Problem(f"{table}.{name}", "", "given twice, in quotes and without")
+                raise StudyFileError(str(path), (twice,))
     # In quotes, as they are said in messages, so that these find their lines.
     quoted = _DOTTED.sub(r'\1"\2"\3', text)
     found = validated(StudyFile, data, str(path), quoted, StudyFileError)

@@ -11,15 +11,17 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
-from shapegcode.testcut.coefficient_fit import CoefficientFit, fit_coefficients
+from shapegcode.io.record import FloatArray
 from shapegcode.testcut.cut import CuttingLaw, IntervalDetails, MeasuringPass, TestCut, read_test_cut
 from shapegcode.testcut.forces import (
+    CoefficientFit,
     Engagement,
     ForceLaw,
     MeanForces,
     Thickness,
     engagement,
     expected,
+    fit_coefficients,
     fully_engaged,
     straight_engagement,
 )
@@ -91,13 +93,10 @@ def fit_test_cut(
     return _fit_corner(known, measured) if known.kind == "corner" else _fit_interval(known, measured)
 
 
-Array = npt.NDArray[np.float64]
-
 _BINS_PER_PASS = 60
 _MIN_TURNS = 4
 _ROUNDS = 2
-#: Standard error of the place of the tool, found from entry and exit, in feeds per revolution.
-_PLACE = 0.25
+_PLACE = 0.25  # Standard error of the place of the tool, found from entry and exit, in feeds per revolution
 _PER_MINUTE = 60.0
 
 
@@ -107,10 +106,10 @@ class _TaperRows:
 
     met: Engagement
     displaced: Engagement
-    feed: float | Array
+    feed: float | FloatArray
     speed: float
-    force_n: Array
-    torque_nm: Array | None
+    force_n: FloatArray
+    torque_nm: FloatArray | None
     revolutions: float
 
 
@@ -253,7 +252,7 @@ def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) 
 
 
 def _joined(rows: Sequence[_TaperRows]) -> MeanForces:
-    def repeated(values: Sequence[float | Array]) -> Array:
+    def repeated(values: Sequence[float | FloatArray]) -> FloatArray:
         return np.concatenate([np.broadcast_to(v, len(each.force_n)) for v, each in zip(values, rows, strict=True)])
 
     # A torque that only some of the files have does not help the others.
@@ -313,7 +312,7 @@ def _pass(cut: TestCut, number: int, record: ForceRecord) -> CornerPass:
     )
 
 
-def _inside(cut: TestCut, number: int, x_mm: Array) -> npt.NDArray[np.bool_]:
+def _inside(cut: TestCut, number: int, x_mm: FloatArray) -> npt.NDArray[np.bool_]:
     measuring = cut.passes[number - 1]
     margin = _MARGIN_REVS * measuring.feed_mm_per_min / cut.spindle_rev_per_min
     return fully_engaged(cut, measuring, x_mm, margin)
@@ -366,7 +365,7 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
     within = (record.time_s > entry - 0.2) & (record.x_mm < last + 2.0)
     time, size = record.time_s[within], force[within]
 
-    def course(lag: float) -> Array:
+    def course(lag: float) -> FloatArray:
         if record.by_time:
             speed = _speeds(measuring, time - entry, lag)
         else:
@@ -399,7 +398,7 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
     )
 
 
-def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> tuple[Array, Array]:
+def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> tuple[FloatArray, FloatArray]:
     """Feeds below, between and above those of a pass, and the mean force at each."""
     commanded = [feed for _, feed in measuring.feeds]
     low, high = np.linspace(0.2, 0.98, _FEEDS) * min(commanded), np.linspace(0.5, 1.1, _FEEDS) * max(commanded)
@@ -409,7 +408,7 @@ def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> t
     return feeds, np.linalg.norm(law.forces(met, feeds).mean_n, axis=1)
 
 
-def _speeds(measuring: MeasuringPass, time_s: Array, lag: float) -> Array:
+def _speeds(measuring: MeasuringPass, time_s: FloatArray, lag: float) -> FloatArray:
     """Feed over time, from 0 at the first change, that follows each block's F with a first-order lag, mm/min."""
     begins, starts = [0.0], [measuring.feeds[0][1]]
     commands: list[float] = []
@@ -423,9 +422,9 @@ def _speeds(measuring: MeasuringPass, time_s: Array, lag: float) -> Array:
         starts.append((command + (speed - command) * left) * _PER_MINUTE)
     block = np.clip(np.searchsorted(begins, time_s, side="right") - 1, 0, len(commands) - 1)
     into = time_s - np.array(begins)[block]
-    wanted, begun = np.array(commands)[block], np.array(starts)[block]
+    wanted, speed_then = np.array(commands)[block], np.array(starts)[block]
     share = np.exp(-np.maximum(into, 0.0) / lag) if lag > 0.0 else np.zeros(len(into))
-    return np.where(time_s < 0.0, measuring.feeds[0][1], wanted + (begun - wanted) * share)
+    return np.where(time_s < 0.0, measuring.feeds[0][1], wanted + (speed_then - wanted) * share)
 
 
 def _block_time(way: float, speed: float, command: float, lag: float) -> float:
@@ -443,7 +442,7 @@ def _block_time(way: float, speed: float, command: float, lag: float) -> float:
     return time
 
 
-def _speeds_at(measuring: MeasuringPass, x_mm: Array, lag: float) -> Array:
+def _speeds_at(measuring: MeasuringPass, x_mm: FloatArray, lag: float) -> FloatArray:
     """The same where the record tells the position: at the X of each sample."""
     first, last = measuring.feeds[0][0], measuring.feeds[-1][0]
     fine = np.linspace(0.0, 1.5 * (last - first) / min(feed for _, feed in measuring.feeds) * _PER_MINUTE, 20000)
@@ -452,7 +451,7 @@ def _speeds_at(measuring: MeasuringPass, x_mm: Array, lag: float) -> Array:
     return np.where(x_mm < first, measuring.feeds[0][1], np.interp(x_mm, way, speed))
 
 
-def _noise(x: Array, force: Array, way: float) -> float:
+def _noise(x: FloatArray, force: FloatArray, way: float) -> float:
     """Standard deviation of means over a way, as a share of the mean."""
     place = ((x - x[0]) / way).astype(int)
     sums, counts = np.bincount(place, force), np.bincount(place)

@@ -11,13 +11,12 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.columns import Meaning, read_label, unit_of
+from shapegcode.io.record import FloatArray
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.table import TextTable
 from shapegcode.io.units import Measured, factor_between
 from shapegcode.testcut.cut import MeasuringPass, TestCut
 from shapegcode.testcut.forces import Expected, fully_engaged
-
-Array = npt.NDArray[np.float64]
 
 _EXAMPLE = "time_s,fx_n,fy_n"
 #: Unit of `ForceRecord`, and of a column that states none.
@@ -40,12 +39,14 @@ class ForceRecord:
     """Measured forces, turned so that they act on the tool."""
 
     file: str  # where they were read
-    force_n: Array  # (n, 2) along the feed and to its left, in N
-    torque_nm: Array | None = None  # (n,) magnitude as measured; None: not recorded
-    time_s: Array | None = None  # (n,), evenly spaced; None: not recorded
-    position_mm: Array | None = None  # (n,) X of the tool's axis in the program's coordinates; None: not recorded
-    radial_depth_mm: Array | None = None  # (n,) of means at known depths; None: the test cut's description tells it
-    feed_mm_per_min: Array | None = None  # (n,) where the file tells it
+    force_n: FloatArray  # (n, 2) along the feed and to its left, in N
+    torque_nm: FloatArray | None = None  # (n,) magnitude as measured; None: not recorded
+    time_s: FloatArray | None = None  # (n,), evenly spaced; None: not recorded
+    position_mm: FloatArray | None = None  # (n,) X of the tool's axis in the program's coordinates; None: not recorded
+    radial_depth_mm: FloatArray | None = (
+        None  # (n,) of means at known depths; None: the test cut's description tells it
+    )
+    feed_mm_per_min: FloatArray | None = None  # (n,) where the file tells it
 
     def __len__(self) -> int:
         return len(self.force_n)
@@ -110,14 +111,12 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
 # --- the position of each sample --------------------------------------------------------------------------------------
 
 _PER_MINUTE = 60.0
-#: Samples per revolution from which on a file is a record and not a table of means.
-MIN_SAMPLES = 6.0
+MIN_SAMPLES = 6.0  # Samples per revolution from which on a file is a record and not a table of means
 _MIN_AIR_REVS = 5
 _FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
 _TELL_SPEED, _TELL_FEED = 0.002, 0.005
 _GUARD_REVS = 2
-#: Of the noise in the air, and of the largest force: what is more is a cut.
-_ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04
+_ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04  # Of the noise in the air, and of the largest force: what is more is a cut
 _SPEED_RANGE = 0.05
 _CLEAR_LINE = 8.0  # times the median of the spectrum around it
 _MIN_FOR_SPEED = 20.0
@@ -134,14 +133,14 @@ class PlacedRecord:
     file: str
     cut: TestCut
     measuring: MeasuringPass
-    time_s: Array  # (n,)
-    x_mm: Array  # (n,) X of the tool's axis
-    force_n: Array  # (n, 2) on the tool, along the feed and to its left
-    torque_nm: Array | None  # (n, 1); None: not recorded
+    time_s: FloatArray  # (n,)
+    x_mm: FloatArray  # (n,) X of the tool's axis
+    force_n: FloatArray  # (n, 2) on the tool, along the feed and to its left
+    torque_nm: FloatArray | None  # (n, 1); None: not recorded
     samples: float  # per revolution
     spindle_rev_per_min: float  # as the record shows it, or as commanded
-    offset_n: Array  # (2,) force that was shown in the air before the cut
-    drift_n: Array  # (2,) change of it until after the cut
+    offset_n: FloatArray  # (2,) force that was shown in the air before the cut
+    drift_n: FloatArray  # (2,) change of it until after the cut
     by_time: bool  # the place comes from the time and the feed; else it was recorded
     notes: tuple[str, ...]  # what else the user should know, with the name of the file
 
@@ -181,7 +180,7 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, hoped: E
     )
 
 
-def _clock(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[Array, Array]:
+def _clock(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
     """Time of each sample, and the way gone since the first one at the commanded feeds (or as measured)."""
     if record.position_mm is not None:
         x = record.position_mm
@@ -197,7 +196,7 @@ def _clock(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[Ar
     return time, (time - time[0]) * measuring.feed_mm_per_min / _PER_MINUTE
 
 
-def _spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
+def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
     """Spindle speed from the lines of a record at the revolution, the teeth, and their multiples."""
     count = len(force_n)
     turns = count * period_s * commanded / _PER_MINUTE
@@ -222,14 +221,14 @@ def _spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: in
     return (commanded, False) if best is None else (float(best[1]), True)
 
 
-def turned(force: Array, samples: float) -> Array:
+def turned(force: FloatArray, samples: float) -> FloatArray:
     """Moving mean of each column over a stretch of a number of samples that need not be whole, centred."""
     middle = np.arange(len(force)) + 0.5
     low, high = np.clip(middle - 0.5 * samples, 0, len(force)), np.clip(middle + 0.5 * samples, 0, len(force))
     return np.asarray(_sums(force, low, high) / (high - low)[:, None])
 
 
-def _sums(table: Array, low: Array, high: Array) -> Array:
+def _sums(table: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Of each column between two places among the samples, which need not be whole."""
     sums = np.vstack([np.zeros((1, table.shape[1])), np.cumsum(table, axis=0)])
     at = np.arange(len(sums), dtype=np.float64)
@@ -263,7 +262,7 @@ def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
     return begin, end
 
 
-def _without_offset(force: Array, begin: int, end: int, guard: int) -> tuple[Array, Array, Array]:
+def _without_offset(force: FloatArray, begin: int, end: int, guard: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Force without what the air before and after shows, in between on a straight line; offset and drift."""
     places, levels = [], []
     for low, high in ((0, max(begin - guard, 1)), (min(end + guard, len(force) - 1), len(force))):
@@ -278,12 +277,12 @@ def _placed(
     record: ForceRecord,
     measuring: MeasuringPass,
     hoped: Expected,
-    size: Array,
-    time: Array,
-    moved: Array,
+    size: FloatArray,
+    time: FloatArray,
+    moved: FloatArray,
     contact: tuple[int, int],
     notes: list[str],
-) -> Array:
+) -> FloatArray:
     """X of the axis at each sample: entry and exit of the record laid over those that are expected."""
     seen = np.flatnonzero(hoped.mean_n > _ABOVE_SHARE * hoped.mean_n.max())
     wanted = hoped.x_mm[seen[0]], hoped.x_mm[seen[-1]]
@@ -311,7 +310,7 @@ def _placed(
     return np.asarray(x)
 
 
-def _way_of_blocks(measuring: MeasuringPass, time_s: Array, entry_mm: float) -> Array:
+def _way_of_blocks(measuring: MeasuringPass, time_s: FloatArray, entry_mm: float) -> FloatArray:
     """X over time at the commanded feeds, at `entry_mm` at time 0."""
     ends = np.array([measuring.start_mm, *(end for end, _ in measuring.feeds)])
     pace = _PER_MINUTE / np.array([feed for _, feed in measuring.feeds])
@@ -319,7 +318,7 @@ def _way_of_blocks(measuring: MeasuringPass, time_s: Array, entry_mm: float) -> 
     return np.asarray(np.interp(time_s + np.interp(entry_mm, ends, at), at, ends))
 
 
-def _shift(hoped: Expected, x: Array, size: Array, side: float) -> float:
+def _shift(hoped: Expected, x: FloatArray, size: FloatArray, side: float) -> float:
     """By how much X must be moved so that the course at one end of the cut is the expected one, whatever its scale."""
     near = np.flatnonzero(np.abs(x - side) < 3.0 * _MAX_SHIFT_MM)
     near = near[:: max(1, len(near) // 400)]
@@ -336,7 +335,7 @@ def _shift(hoped: Expected, x: Array, size: Array, side: float) -> float:
     return float(tried[best] + _vertex(errors[best - 1 : best + 2]) * (tried[1] - tried[0]))
 
 
-def _vertex(three: Array) -> float:
+def _vertex(three: FloatArray) -> float:
     """Where the parabola through three values is lowest, in steps from the middle one."""
     left, middle, right = three.tolist()
     bend = left - 2.0 * middle + right
@@ -355,11 +354,11 @@ class Revolutions:
     """Means over whole revolutions of one pass."""
 
     record: PlacedRecord
-    x_mm: Array  # (n,) X of the tool's axis in the middle of each revolution
-    mean_n: Array  # (n, 2) mean force on the tool along the feed and to its left
-    torque_nm: Array | None  # (n,) mean torque; None: not recorded
-    resultant_n: Array  # (n,) mean magnitude
-    peak_n: Array  # (n,) largest magnitude
+    x_mm: FloatArray  # (n,) X of the tool's axis in the middle of each revolution
+    mean_n: FloatArray  # (n, 2) mean force on the tool along the feed and to its left
+    torque_nm: FloatArray | None  # (n,) mean torque; None: not recorded
+    resultant_n: FloatArray  # (n,) mean magnitude
+    peak_n: FloatArray  # (n,) largest magnitude
     # (n,) whether the force swings more than its mean lets expect from the rest of the pass
     chatter: npt.NDArray[np.bool_]
     # the feed between entry and exit, as the record shows it; of a pass with changing feeds the first one
@@ -391,7 +390,7 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     return Revolutions(record, middle, means[:, :2], torque, means[:, 2], peaks, chatter, feed)
 
 
-def _swings(x: Array, uneven: Array, resultant: Array) -> npt.NDArray[np.bool_]:
+def _swings(x: FloatArray, uneven: FloatArray, resultant: FloatArray) -> npt.NDArray[np.bool_]:
     """Where the force within a revolution swings more, for its mean, than in the rest of the pass."""
     if len(uneven) < _MIN_REVOLUTIONS:
         return np.zeros(len(uneven), dtype=bool)

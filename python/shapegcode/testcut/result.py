@@ -6,17 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
-import numpy as np
-import numpy.typing as npt
-
+from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
-from shapegcode.testcut.coefficient_fit import Coefficient, CoefficientFit
-from shapegcode.testcut.cut import CuttingLaw, TestCut
-from shapegcode.testcut.edges import Edge
-from shapegcode.testcut.forces import Expected, MeanForces
+from shapegcode.testcut.cut import CuttingLaw, Edge, TestCut
+from shapegcode.testcut.forces import Coefficient, CoefficientFit, Expected, MeanForces
 from shapegcode.testcut.record import Revolutions
 
 
@@ -78,12 +74,8 @@ def _range(values: Sequence[float], digits: int | None = None, same: float = 0.0
     return low if max(values) - min(values) <= same else f"{low} ... {high}"
 
 
-Array = npt.NDArray[np.float64]
-
-#: Wider intervals (half of them) are no result to build on.
-EXPONENT_LIMIT, FACTOR_LIMIT = 0.05, 0.10
-#: By how much the measured effect of the feed may differ from the expected one.
-RATIO_LIMIT = 0.10
+EXPONENT_LIMIT, FACTOR_LIMIT = 0.05, 0.10  # Wider intervals (half of them) are no result to build on
+RATIO_LIMIT = 0.10  # By how much the measured effect of the feed may differ from the expected one
 
 
 @dataclass(frozen=True)
@@ -372,10 +364,10 @@ class FollowedPass:
     noise: float
     lag_s: float
     ok: bool
-    time_s: Array = field(metadata=hidden())
-    force_n: Array = field(metadata=hidden())
-    immediate_n: Array = field(metadata=hidden())
-    lagging_n: Array = field(metadata=hidden())
+    time_s: FloatArray = field(metadata=hidden())
+    force_n: FloatArray = field(metadata=hidden())
+    immediate_n: FloatArray = field(metadata=hidden())
+    lagging_n: FloatArray = field(metadata=hidden())
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -23,7 +23,7 @@ from shapegcode.program import Program, given_program
 from shapegcode.program.operating import OVERRIDE_LOCKED
 from shapegcode.timing.result import PARTS, BlockTime, CycleTime, RegionTime, ToolTime
 
-_KINDS = {value: name for name, value in ((kind.name, kind.value) for kind in _core.BlockKind.__members__.values())}
+_KINDS = {kind.value: name for name, kind in _core.BlockKind.__members__.items()}
 _CUTTING, _RAPID = _core.BlockKind.cutting.value, _core.BlockKind.rapid.value
 
 
@@ -81,7 +81,10 @@ def cycle_time(
         program=program.source,
         machine=machine.name,
         full_interpolation_s=_core.interpolate_program(program.core, model).total_s if full else None,
-        tools=tuple(_tool_time(tool) for tool in timed.tools),
+        tools=tuple(
+            ToolTime(**_parts(each), duration_s=float(each.total_s), tool=_tool(each.tool), first_line=each.first_line)
+            for each in timed.tools
+        ),
         regions=tuple(_regions(timed.regions, program, feed_override)),
         blocks=tuple(_blocks(timed.blocks, program)) if per_block else (),
         shaped_regions=program.shaped_regions,
@@ -103,12 +106,6 @@ def _locked(program: Program, feed_override: float) -> Iterator[str]:
             f"control runs at 100 %; here they are timed at {feed_override * 100:g} %, as all others: their times with "
             "--override 100% are the true ones"
         )
-
-
-def _tool_time(timed: _core.ToolTime) -> ToolTime:
-    return ToolTime(
-        **_parts(timed), duration_s=float(timed.total_s), tool=_tool(timed.tool), first_line=timed.first_line
-    )
 
 
 def _parts(timed: _core.CycleTime | _core.ToolTime) -> dict[str, float]:

@@ -14,8 +14,7 @@ from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table, share_percent
 
-AGREEMENT_PERCENT = 0.5
-"""Closed form and full interpolation agree if they differ by no more than this."""
+AGREEMENT_PERCENT = 0.5  # Closed form and full interpolation agree if they differ by no more than this
 
 
 @dataclass(frozen=True, repr=False)
@@ -42,8 +41,7 @@ class TimeParts:
     function_s: float
 
 
-PARTS = tuple(field.name for field in fields(TimeParts))
-"""Names of the parts, in the order in which they are shown."""
+PARTS = tuple(field.name for field in fields(TimeParts))  # Names of the parts, in the order in which they are shown
 
 
 @dataclass(frozen=True)
@@ -125,8 +123,7 @@ LABELS = {
 """Name of each part in tables and pictures."""
 
 _SLOWEST = 5
-# A part of the time that deserves the next look.
-_NOTABLE = 0.1
+_NOTABLE = 0.1  # A part of the time that deserves the next look
 _REMEDIES = {
     "acceleration_s": "join short blocks, or look at the time constants and corner limits of the machine file",
     "rapid_s": "shorten the rapids, or take tools in an order that needs fewer of them",

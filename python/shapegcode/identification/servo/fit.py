@@ -12,7 +12,6 @@ from shapegcode.errors import ArgumentError
 from shapegcode.identification.servo.models import (
     SETTLE_S,
     DriveFit,
-    FloatArray,
     LoopFit,
     Masks,
     counted,
@@ -25,6 +24,7 @@ from shapegcode.identification.servo.models import (
 )
 from shapegcode.identification.servo.record import ServoRecord, ServoTrace, read_servo_record
 from shapegcode.identification.servo.result import ServoAxis, ServoCurves, ServoEstimate, ServoFit, ServoModel
+from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 
 _STILL_TRAVEL = 1e-3  # mm or degrees
@@ -121,21 +121,21 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
         return replace(base, note=two)
     early, use = _halves(speeds, period_s)
     uses = (use, *(tuple(c & (e == which) for e, c in zip(early, use, strict=True)) for which in (True, False)))
-    judged = _judged(trace, early, uses, period_s, with_drive, tell)
-    rests = [rms(counted(each.rest, use)) for each in judged]
+    compared = _compare_models(trace, early, uses, period_s, with_drive, tell)
+    rests = [rms(counted(each.rest, use)) for each in compared]
     own = rms(counted(trace.deviation, use)) if trace.deviation is not None else None
     models = tuple(
         ServoModel(
             each.name, rest, rms(counted(each.rest_fitted, use)), 100.0 * (1.0 - (rest / own) ** 2) if own else None
         )
-        for each, rest in zip(judged, rests, strict=True)
+        for each, rest in zip(compared, rests, strict=True)
     )
-    whole, *halves = judged[1].fits
+    whole, *halves = compared[1].fits
     parameters = lag_estimates(whole, halves, trace, use, period_s)
     parameters += torque_friction(trace, whole.lag_s, uses, period_s)
-    for each in judged[2:]:
+    for each in compared[2:]:
         parameters += _drive_estimates([fit for fit in each.fits if isinstance(fit, DriveFit)], trace.unit)
-    best = judged[int(np.argmin(rests))]
+    best = compared[int(np.argmin(rests))]
     curves = ServoCurves(trace.time_s, speeds, trace.lag, trace.deviation, best.rest)
     return replace(base, models=models, parameters=parameters, curves=curves)
 
@@ -186,7 +186,7 @@ def _halves(speeds: Sequence[FloatArray], period_s: float) -> tuple[Masks, Masks
 
 
 @dataclass(frozen=True, eq=False)
-class _Judged:
+class _ComparedModel:
     """A model with what it leaves in every sample."""
 
     name: str
@@ -195,24 +195,24 @@ class _Judged:
     rest_fitted: tuple[FloatArray, ...]
 
 
-def _judged(
+def _compare_models(
     trace: ServoTrace,
     early: Masks,
     uses: Sequence[Masks],
     period_s: float,
     with_drive: bool,
     tell: Callable[[float], None],
-) -> list[_Judged]:
+) -> list[_ComparedModel]:
     """The models, fitted to all, the first half and the second."""
 
-    def judge(name: str, fits: Sequence[LoopFit]) -> _Judged:
+    def judge(name: str, fits: Sequence[LoopFit]) -> _ComparedModel:
         whole, first, second = fits
         rest = tuple(
             lag - np.where(in_first, second.error[rank], first.error[rank])
             for rank, (lag, in_first) in enumerate(zip(trace.lag, early, strict=True))
         )
         fitted = tuple(lag - model for lag, model in zip(trace.lag, whole.error, strict=True))
-        return _Judged(name, tuple(fits), rest, fitted)
+        return _ComparedModel(name, tuple(fits), rest, fitted)
 
     found = [judge("servo lag", [fit_lag(trace, use, period_s, dead_time=False) for use in uses])]
     tell(0.1)

@@ -19,8 +19,8 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.identification.servo.record import ServoTrace
 from shapegcode.identification.servo.result import ServoEstimate
+from shapegcode.io.record import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 Masks = Sequence[npt.NDArray[np.bool_]]  # of each stretch: which samples count
 SETTLE_S = 0.1
 GAINS = (2.0, 1000.0)  # 1/s

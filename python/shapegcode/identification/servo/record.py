@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, RecordError
 from shapegcode.io.data_file import open_file
 from shapegcode.io.edge_capture import EdgeCapture
 from shapegcode.io.edge_json import is_edge_json, read_edge_json
+from shapegcode.io.record import FloatArray
 from shapegcode.io.servo_log import parse_units, read_log
 
-FloatArray = npt.NDArray[np.float64]
 _GAP = 1.5  # of the usual step
 _FEWEST = 100
 _WINDOW = 2500

@@ -6,16 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-import numpy as np
-import numpy.typing as npt
-
 from shapegcode.errors import ArgumentError
+from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError
+from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.timing.calibration.functions import FunctionFit, fit_functions, m_codes, spindle_rows, whole_model
@@ -46,7 +46,6 @@ from shapegcode.timing.calibration.result import (
 )
 from shapegcode.timing.calibration.runs_file import RunsFile, load_runs
 
-FloatArray = npt.NDArray[np.float64]
 _Hold = tuple[float, float, str]  # begin and length in s, and why
 
 _MAX_FOLDS = 4
@@ -447,14 +446,9 @@ def learned_machine(
     values.update(_function_values(functions, runs))
     numbers, remarks = _motion_numbers(machine, motion, runs, source)
     if math.isfinite(motion.rapid_mm_per_s):
-        rate = motion.rapid_mm_per_s * 60.0
-        bounds = _digits(rate), _digits(0.99 * rate), _digits(1.01 * rate)
-        had = machine.axes.x.rapid_mm_per_min
-        numbers.append(
-            LearnedNumber(
-                "axes.x|y|z.rapid_mm_per_min", "rate of rapids, of the fastest axis", *bounds, "mm/min", True, had
-            )
-        )
+        rate, had = motion.rapid_mm_per_s * 60.0, machine.axes.x.rapid_mm_per_min
+        key, meaning = "axes.x|y|z.rapid_mm_per_min", "rate of rapids, of the fastest axis"
+        numbers.append(_number(key, meaning, (rate, 0.99 * rate, 1.01 * rate), "mm/min", True, had))
     numbers += _function_numbers(functions)
     not_told = [
         f"{number.meaning} ({number.key}): the runs bear {number.low:.3g} to {number.high:.3g} {number.unit}"
@@ -480,11 +474,7 @@ def _motion_numbers(
         told = low > value / _KNOWN and high < value * _KNOWN
         key = parameter.key.format(axis="|".join(parameter.axes))
         had = _had(machine, parameter.key.format(axis=parameter.axes[:1]))
-        numbers.append(
-            LearnedNumber(
-                key, parameter.meaning, _digits(value), _digits(low), _digits(high), parameter.unit, told, had
-            )
-        )
+        numbers.append(_number(key, parameter.meaning, (value, low, high), parameter.unit, told, had))
         for axis in parameter.axes or " ":
             place = parameter.key.format(axis=axis)
             place = place.rpartition(".")[0] if place.startswith("controller.corner_speed") else place
@@ -492,12 +482,33 @@ def _motion_numbers(
     return numbers, remarks
 
 
+def _number(
+    key: str, meaning: str, values: tuple[float, float, float], unit: str, told: bool, had: float | None = None
+) -> LearnedNumber:
+    """A number and its interval, to what a person reads."""
+    value, low, high = (float(f"{each:.4g}") for each in values)
+    return LearnedNumber(key, meaning, value, low, high, unit, told, had)
+
+
+# Key, meaning and unit of what takes time beside the motion, by its name in the fit; else it is an M code.
+_FUNCTIONS = {
+    "start": ("times.program_start_s", "from the start key to the first block", "s"),
+    "tool change": ("times.tool_change_s", "tool change", "s"),
+    "way xy": ("times.unknown_move_s.x|y", "rapid of X and Y on a way that is not known", "s"),
+    "way z": ("times.unknown_move_s.z", "rapid of Z on a way that is not known", "s"),
+    "spindle start": ("times.spindle_start", "start of the spindle, per 1000/min", "s"),
+    "spindle start from": ("times.spindle_start", "start of the spindle takes time from", "1000/min"),
+    "spindle stop": ("times.spindle_stop", "stop of the spindle, per 1000/min", "s"),
+    "spindle stop from": ("times.spindle_stop", "stop of the spindle takes time from", "1000/min"),
+}
+
+
 def _function_numbers(functions: FunctionFit) -> list[LearnedNumber]:
     numbers = []
-    for name, key, meaning, unit in _function_rows(functions):
-        value, low, high = functions.values[name], functions.low[name], functions.high[name]
-        told = high - low < max(2.0, 2.0 * value)
-        numbers.append(LearnedNumber(key, meaning, _digits(value), _digits(low), _digits(high), unit, told))
+    for name, value in functions.values.items():
+        key, meaning, unit = _FUNCTIONS.get(name) or ("times.m_codes", f"M{int(name[1:]):02d}", "s")
+        low, high = functions.low[name], functions.high[name]
+        numbers.append(_number(key, meaning, (value, low, high), unit, high - low < max(2.0, 2.0 * value)))
     return numbers
 
 
@@ -507,11 +518,6 @@ def _usual(overrides: Iterable[tuple[float, float]]) -> float:
     return value if ratio >= _USUAL else 1.0
 
 
-def _digits(value: float) -> float:
-    """A number to what a person reads."""
-    return float(f"{value:.4g}")
-
-
 def _had(machine: Machine, key: str) -> float | None:
     place: object = machine
     for name in key.split("."):
@@ -519,24 +525,6 @@ def _had(machine: Machine, key: str) -> float | None:
     if isinstance(place, int | float):
         return float(place)
     return float(place.x) if place is not None and hasattr(place, "x") else None
-
-
-def _function_rows(functions: FunctionFit) -> list[tuple[str, str, str, str]]:
-    """Name in the fit, key, meaning and unit of what takes time beside the motion."""
-    known = {
-        "start": ("times.program_start_s", "from the start key to the first block", "s"),
-        "tool change": ("times.tool_change_s", "tool change", "s"),
-        "way xy": ("times.unknown_move_s.x|y", "rapid of X and Y on a way that is not known", "s"),
-        "way z": ("times.unknown_move_s.z", "rapid of Z on a way that is not known", "s"),
-        "spindle start": ("times.spindle_start", "start of the spindle, per 1000/min", "s"),
-        "spindle start from": ("times.spindle_start", "start of the spindle takes time from", "1000/min"),
-        "spindle stop": ("times.spindle_stop", "stop of the spindle, per 1000/min", "s"),
-        "spindle stop from": ("times.spindle_stop", "stop of the spindle takes time from", "1000/min"),
-    }
-    return [
-        (name, *known[name]) if name in known else (name, "times.m_codes", f"M{int(name[1:]):02d}", "s")
-        for name in functions.values
-    ]
 
 
 def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dict[str, object]:

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.timing.calibration.motion import MotionFit, starts_of
 from shapegcode.timing.calibration.observed import ObservedRun
-
-FloatArray = npt.NDArray[np.float64]
 
 _READING_S = 0.1  # scatter of the time between two readings
 _OUTLIER = 3.0  # of it: what is further off counts less

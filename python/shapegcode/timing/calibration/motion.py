@@ -9,15 +9,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import controller_model
-from shapegcode.timing.calibration.observed import ObservedRun, TimedProgram, seen_arc_acceleration
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+from shapegcode.timing.calibration.observed import IntArray, ObservedRun, seen_arc_acceleration
 
 
 @dataclass(frozen=True)
@@ -207,7 +204,7 @@ class SeenSection:
     run: ObservedRun
     feed_override: float
     time_s: FloatArray  # (n,) when its lines were seen
-    line: npt.NDArray[np.int64]  # (n,) which
+    line: IntArray  # (n,) which
 
     @cached_property
     def stretches(self) -> tuple[tuple[IntArray, IntArray], ...]:
@@ -231,24 +228,21 @@ def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
     return found
 
 
-def line_starts(timed: TimedProgram, model: _core.ControllerModel) -> FloatArray:
-    """(line_count + 2,) When each line begins on a model; the last entry is the end of the program."""
-    starts = timed.starts(model)
-    # A line without any move begins with the next one.
-    missing = np.isnan(starts)
-    following = np.minimum.accumulate(np.where(missing, len(starts), np.arange(len(starts)))[::-1])[::-1]
-    return np.asarray(starts[following], dtype=np.float64)
-
-
 def starts_of(model: _core.ControllerModel) -> Callable[[ObservedRun, float], FloatArray]:
-    """Line starts on a model by run and feed override, simulated once for each program and its overrides."""
+    """When each line begins on a model, by run and feed override: (line_count + 2,), the last is the program's end.
+
+    Simulated once for each program and its overrides.
+    """
     found: dict[tuple[int, float, float], FloatArray] = {}
 
     def starts(run: ObservedRun, feed_override: float) -> FloatArray:
         key = (id(run.timed), feed_override, run.rapid_override)
         if key not in found:
             model.feed_override, model.rapid_override = feed_override, run.rapid_override
-            found[key] = line_starts(run.timed, model)
+            own = run.timed.starts(model)
+            # A line without any move begins with the next one.
+            known = np.where(np.isnan(own), len(own), np.arange(len(own)))
+            found[key] = own[np.minimum.accumulate(known[::-1])[::-1]]
         return found[key]
 
     return starts
@@ -398,7 +392,7 @@ def parameter_intervals(
     return found
 
 
-def _stretches(section: SeenSection) -> npt.NDArray[np.int64]:
+def _stretches(section: SeenSection) -> IntArray:
     """Readings that are some seconds apart."""
     places = [0]
     for index, time_s in enumerate(section.time_s):

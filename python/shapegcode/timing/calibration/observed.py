@@ -9,12 +9,14 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
+from shapegcode.io.record import FloatArray
 from shapegcode.io.run_tracks import RunLog, Signal
 from shapegcode.io.units import find_unit
 from shapegcode.machine import Machine
@@ -22,7 +24,6 @@ from shapegcode.model.machine_model import controller_model
 from shapegcode.program import Program
 from shapegcode.timing.calibration.runs_file import RunEntry
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 _SEQUENCE = re.compile(r"[ /]*[Nn](\d{1,7})")
@@ -108,24 +109,15 @@ def timed_program(program: Program) -> TimedProgram:
     for kind, _, line in core.steps:
         if kind == _core.StepKind.function:
             function[line] = True
-    return TimedProgram(program, count, feed, radius, free, rapid, function, tuple(_sections(function, count)))
+    ends = [0, *(np.flatnonzero(function[1 : count + 1]) + 1).tolist(), count + 1]
+    sections = tuple((before + 1, end - 1) for before, end in pairwise(ends) if end - before > 2)
+    return TimedProgram(program, count, feed, radius, free, rapid, function, sections)
 
 
 def _radius_mm(segment: _core.Segment) -> float:
     if segment.kind != _core.SegmentKind.arc:
         return math.inf
     return float(np.linalg.norm(np.asarray(segment.start_mm) - np.asarray(segment.centre_mm)))
-
-
-def _sections(function: npt.NDArray[np.bool_], count: int) -> list[tuple[int, int]]:
-    found: list[tuple[int, int]] = []
-    first = 1
-    for line in range(1, count + 2):
-        if line > count or function[line]:
-            if line - first > 1:
-                found.append((first, line - 1))
-            first = line + 1
-    return found
 
 
 # --- what the feeds of a log tell: their unit, the overrides ----------------------------------------------------------
@@ -229,8 +221,11 @@ def stretches_of(entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float,
     if log.feed is not None and math.isfinite(unit):
         line = lines_at(log.feed, log, timed)
         ratio = log.feed.value * unit / timed.feed_mm_per_s[line]
-        # A control shows feeds in steps: where one is much of the feed, it tells nothing.
-        fine = timed.feed_mm_per_s[line] * _FEED_BIN > _step_of(log.feed.value) * unit
+        # A control shows feeds in steps, the largest usual one that all are multiples of: where it is much of the
+        # feed, that tells nothing.
+        shown = ((step, log.feed.value / step) for step in _STEPS)
+        step = next((each for each, parts in shown if np.all(np.abs(parts - np.round(parts)) < 1e-3)), 0.0)
+        fine = timed.feed_mm_per_s[line] * _FEED_BIN > step * unit
         keep = np.isfinite(ratio) & (ratio > 0.0) & timed.free[line] & fine
         ratio, line = ratio[keep], line[keep]
     whole = steady_value(ratio) if len(ratio) else None
@@ -250,14 +245,6 @@ def stretches_of(entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float,
     if ratio.size == 0 and stated is None:
         notes.append("no feed in the log: overrides cannot be told and are taken as 100 %")
     return found
-
-
-def _step_of(values: FloatArray) -> float:
-    """The step in which values are shown: the largest usual one that all of them are multiples of; 0: none is."""
-    for step in _STEPS:
-        if np.all(np.abs(values / step - np.round(values / step)) < 1e-3):
-            return step
-    return 0.0
 
 
 def as_dialled(ratio: float) -> float:
@@ -514,6 +501,5 @@ def _along_z(timed: TimedProgram) -> npt.NDArray[np.bool_]:
     """Lines whose only axis word is Z."""
     alone = np.zeros(timed.line_count + 2, dtype=bool)
     for number, words in enumerate(timed.text_lines[: timed.line_count], start=1):
-        plain = words.split("(")[0].upper()
-        alone[number] = "Z" in plain and "X" not in plain and "Y" not in plain
+        alone[number] = set(words.split("(")[0].upper()) & set("XYZ") == {"Z"}
     return alone
