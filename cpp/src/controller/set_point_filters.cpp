@@ -4,11 +4,9 @@
 #include <cmath>
 #include <numeric>
 
-#include <fmt/format.h>
-
 #include "base/checks.hpp"
+#include "base/refuse.hpp"
 #include "filter/dense.hpp"
-#include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
@@ -28,8 +26,7 @@ std::vector<Fir> shapers_of(const ControllerSettings& settings, int n_axes) {
   if (const auto* following = std::get_if<FollowingFir>(&settings.shaper)) return following->fir().set();
   std::vector<Fir> each = std::get<std::vector<Fir>>(settings.shaper);
   if (each.size() != static_cast<std::size_t>(n_axes)) {
-    throw Error(ErrorKind::argument,
-                fmt::format("{} shapers for {} axes: one for all, or one for each", each.size(), n_axes));
+    detail::refuse("{} shapers for {} axes: one for all, or one for each", each.size(), n_axes);
   }
   for (Fir& fir : each) fir = scaled_to_one(fir);
   return each;

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/format.h>
-
 #include "base/checks.hpp"
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
 #include "shapegcode/motion.hpp"
 
 namespace shapegcode {
@@ -114,13 +112,13 @@ double block_overlap_time_s(std::span<const double> lengths_mm, std::span<const 
                             const ControllerModel& model) {
   check(model);
   if (lengths_mm.size() != feeds_mm_per_s.size()) {
-    throw Error(ErrorKind::argument, fmt::format("{} lengths but {} feeds", lengths_mm.size(), feeds_mm_per_s.size()));
+    detail::refuse("{} lengths but {} feeds", lengths_mm.size(), feeds_mm_per_s.size());
   }
   double periods = 0.0;
   for (std::size_t i = 0; i < lengths_mm.size(); ++i) {
     if (!(lengths_mm[i] >= 0.0) || !(feeds_mm_per_s[i] > 0.0)) {
-      throw Error(ErrorKind::argument, fmt::format("block {} has length {} mm and feed {} mm/s, must be >= 0 and > 0",
-                                                   i, lengths_mm[i], feeds_mm_per_s[i]));
+      detail::refuse("block {} has length {} mm and feed {} mm/s, must be >= 0 and > 0", i, lengths_mm[i],
+                     feeds_mm_per_s[i]);
     }
     periods += block_periods(lengths_mm[i], feeds_mm_per_s[i], model.period_s, model.block_end);
   }
