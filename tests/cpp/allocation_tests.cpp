@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/filter.hpp"
 #include "shapegcode/measure/contour.hpp"
 #include "shapegcode/motion.hpp"
@@ -111,7 +111,7 @@ int main() {
     return 5000L;
   });
 
-  ControllerModel controller;
+  FanucModel controller;
   controller.rapid_bell_time_s = 0.03;
   RapidPlayer rapid({0.0, 0.0, 0.0}, {300.0, -20.0, 5.0}, controller);
   expect_none("RapidPlayer::step", [&] {

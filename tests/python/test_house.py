@@ -49,8 +49,8 @@ NOT_FROM = {
 # Public headers whose folder of sources has another name; one that is named like a folder, or lies in it, is its own.
 HEADER_FOLDERS = {
     "columns.hpp": "path",
-    "control.hpp": "motion",
     "error.hpp": "base",
+    "fanuc_model.hpp": "motion",
     "minimal_shapers.hpp": "shaper",
     "mode.hpp": "base",
     "play_stream.hpp": "play",

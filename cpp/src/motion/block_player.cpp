@@ -1,4 +1,4 @@
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 
 #include <algorithm>
 #include <cmath>

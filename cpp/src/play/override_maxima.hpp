@@ -7,7 +7,7 @@
 #include "play/deviation_bounds.hpp"
 #include "play/free_modes.hpp"
 #include "play/path_walk.hpp"
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/measure/contour.hpp"
 #include "shapegcode/play.hpp"
 

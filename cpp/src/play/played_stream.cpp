@@ -137,7 +137,7 @@ PlayedStream::PlayedStream(std::shared_ptr<const Path> blocks, BlockEnd block_en
       options, rest_s);
 }
 
-PlayedStream::PlayedStream(std::shared_ptr<const Program> program, const ControllerModel& model,
+PlayedStream::PlayedStream(std::shared_ptr<const Program> program, const FanucModel& model,
                            const PlaybackOptions& options, std::vector<Vector3> region_offsets_mm, double rest_s) {
   if (!region_offsets_mm.empty() && region_offsets_mm.size() != program->regions.size()) {
     throw Error(ErrorKind::argument, fmt::format("{} offsets for {} regions: must be one for each",
@@ -149,12 +149,12 @@ PlayedStream::PlayedStream(std::shared_ptr<const Program> program, const Control
   }
   // What the set-points refer to lives with them.
   struct Played {
-    Played(std::shared_ptr<const Program> text, const ControllerModel& controller)
+    Played(std::shared_ptr<const Program> text, const FanucModel& controller)
         : program(std::move(text)),
           model(controller),
           set_points(*program, model, detail::ProgramSetPoints::Waits::played) {}
     std::shared_ptr<const Program> program;
-    ControllerModel model;
+    FanucModel model;
     detail::ProgramSetPoints set_points;
   };
   auto played = std::make_shared<Played>(std::move(program), model);

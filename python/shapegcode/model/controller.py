@@ -8,12 +8,12 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 
 
-def controller_model(
+def fanuc_model(
     machine: Machine, *, feed_override: float = 1.0, rapid_override: float = 1.0, shaped: bool | None = None
-) -> _core.ControllerModel:
+) -> _core.FanucModel:
     """The controller of a machine as the core times and plays it."""
     controller = machine.controller
-    model = _core.ControllerModel()
+    model = _core.FanucModel()
     model.period_s = controller.interpolation_period_s
     model.block_end = getattr(_core.BlockEnd, controller.block_end)
     model.motion = getattr(_core.MotionKind, controller.motion)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model, motion_limits
+from shapegcode.model.controller import fanuc_model, motion_limits
 from shapegcode.model.drives import drive_parameters
 from shapegcode.model.modes import (
     NO_OFFSET,
@@ -76,7 +76,7 @@ class PlayingController:
         override: feed override, 1 = 100 %.
     """
 
-    def __init__(self, model: _core.ControllerModel, override: float = 1.0) -> None:
+    def __init__(self, model: _core.FanucModel, override: float = 1.0) -> None:
         self.model = model
         self._override = override
         model.limits.feed_override *= override
@@ -160,12 +160,12 @@ class MachineModel:
     @cached_property
     def ordinary(self) -> PlayingController:
         """The controller as it plays an ordinary program."""
-        return PlayingController(controller_model(self.machine))
+        return PlayingController(fanuc_model(self.machine))
 
     @cached_property
     def shaped(self) -> PlayingController:
         """The controller as it plays shaped blocks: one by one, without look-ahead."""
-        model = _core.for_shaped_blocks(controller_model(self.machine))
+        model = _core.for_shaped_blocks(fanuc_model(self.machine))
         model.block_end = self.own_rule
         return PlayingController(model)
 
@@ -266,7 +266,7 @@ class MachineModel:
         options.record_samples = record_samples
         controller = self.ordinary
         if override != 1.0:
-            controller = PlayingController(controller_model(self.machine), override)
+            controller = PlayingController(fanuc_model(self.machine), override)
         return controller.play(path, options, against=against)
 
     def play_rapid(

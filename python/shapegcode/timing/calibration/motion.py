@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model
+from shapegcode.model.controller import fanuc_model
 from shapegcode.timing.calibration.observed import ObservedRun, TimedProgram, seen_arc_acceleration
 
 FloatArray = npt.NDArray[np.float64]
@@ -120,10 +120,10 @@ class MotionFit:
     values: dict[str, float]  # of its parameters by name, in mm, s and rad
     rapid_mm_per_s: float  # rapid rate of every axis; NaN: the machine's
 
-    def model(self, machine: Machine) -> _core.ControllerModel:
+    def model(self, machine: Machine) -> _core.FanucModel:
         """The controller that the family and its numbers describe."""
         family, values, rapid_mm_per_s = self.family, self.values, self.rapid_mm_per_s
-        model = controller_model(machine)
+        model = fanuc_model(machine)
         limits = _core.MotionLimits()
         limits.law = getattr(_core.AccelerationLaw, family.law)
         xy, z = values.get("acceleration_xy", _OFF), values.get("acceleration_z", _OFF)
@@ -231,7 +231,7 @@ def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
     return found
 
 
-def line_starts(timed: TimedProgram, model: _core.ControllerModel) -> FloatArray:
+def line_starts(timed: TimedProgram, model: _core.FanucModel) -> FloatArray:
     """(line_count + 2,) When each line begins on a model; the last entry is the end of the program."""
     starts = timed.starts(model)
     # A line without any move begins with the next one.
@@ -240,7 +240,7 @@ def line_starts(timed: TimedProgram, model: _core.ControllerModel) -> FloatArray
     return np.asarray(starts[following], dtype=np.float64)
 
 
-def starts_of(model: _core.ControllerModel) -> Callable[[ObservedRun, float], FloatArray]:
+def starts_of(model: _core.FanucModel) -> Callable[[ObservedRun, float], FloatArray]:
     """Line starts on a model by run and feed override, simulated once for each program and its overrides."""
     found: dict[tuple[int, float, float], FloatArray] = {}
 
@@ -254,13 +254,13 @@ def starts_of(model: _core.ControllerModel) -> Callable[[ObservedRun, float], Fl
     return starts
 
 
-def section_residuals(sections: Sequence[SeenSection], model: _core.ControllerModel) -> list[FloatArray]:
+def section_residuals(sections: Sequence[SeenSection], model: _core.FanucModel) -> list[FloatArray]:
     """What was seen minus what the model says, in s, for each reading of each section."""
     starts = starts_of(model)
     return [section.time_s - starts(section.run, section.feed_override)[section.line] for section in sections]
 
 
-def misfit(sections: Sequence[SeenSection], model: _core.ControllerModel) -> float:
+def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
     """How badly a model keeps the time of sections: every program counts alike, outliers (holds) count to a limit."""
     square: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))
     count: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))
