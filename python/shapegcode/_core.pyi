@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_planned', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_planned', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -2571,276 +2571,6 @@ class FeedDriveParameters:
         """
         s; 0: none.
         """
-class FanucModel:
-    """
-    What decides how long a program takes, and what acceleration does to the path.
-    """
-    def __init__(self) -> None:
-        ...
-    @property
-    def bell_time_s(self) -> float:
-        """
-        After interpolation, linear: second moving average, s; 0: none.
-        """
-    @bell_time_s.setter
-    def bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def block_end(self) -> BlockEnd:
-        """
-        When a block's successor starts.
-        """
-    @block_end.setter
-    def block_end(self, arg0: BlockEnd) -> None:
-        ...
-    @property
-    def exponential_rest(self) -> float:
-        """
-        Share of the exponential's weights that is cut off at its end.
-        """
-    @exponential_rest.setter
-    def exponential_rest(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def feed_forward_ratio(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
-        """
-        Per axis, 0 ... 1, shape (3,) (2092).
-        """
-    @feed_forward_ratio.setter
-    def feed_forward_ratio(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
-        ...
-    @property
-    def feed_override(self) -> float:
-        """
-        Scales every programmed feed.
-        """
-    @feed_override.setter
-    def feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def filter_shape(self) -> FilterShape:
-        """
-        After interpolation: linear or exponential.
-        """
-    @filter_shape.setter
-    def filter_shape(self, arg0: FilterShape) -> None:
-        ...
-    @property
-    def in_position(self) -> InPosition:
-        """
-        Measured or from the servo lag.
-        """
-    @in_position.setter
-    def in_position(self, arg0: InPosition) -> None:
-        ...
-    @property
-    def in_position_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
-        """
-        Measured wait, per axis, s, shape (3,).
-        """
-    @in_position_s.setter
-    def in_position_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
-        ...
-    @property
-    def in_position_width_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
-        """
-        Per axis, mm, shape (3,) (1826).
-        """
-    @in_position_width_mm.setter
-    def in_position_width_mm(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
-        ...
-    @property
-    def last_tool_in_spindle(self) -> bool:
-        """
-        At the start, from the run before: an M06 that calls it changes nothing.
-        """
-    @last_tool_in_spindle.setter
-    def last_tool_in_spindle(self, arg0: bool) -> None:
-        ...
-    @property
-    def limits(self) -> MotionLimits:
-        """
-        Look-ahead; the axes' feed limits hold always.
-        """
-    @limits.setter
-    def limits(self, arg0: MotionLimits) -> None:
-        ...
-    @property
-    def look_ahead_filter_time_constant_s(self) -> float:
-        """
-        Moving average behind look-ahead, s (1769); 0: none.
-        """
-    @look_ahead_filter_time_constant_s.setter
-    def look_ahead_filter_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def m_code_s(self) -> dict[int, float]:
-        """
-        M codes with a time of their own: code -> s.
-        """
-    @m_code_s.setter
-    def m_code_s(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
-        ...
-    @property
-    def m_function_s(self) -> float:
-        """
-        Every M code without a time of its own, s.
-        """
-    @m_function_s.setter
-    def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def motion(self) -> MotionKind:
-        """
-        Where a cutting move is accelerated.
-        """
-    @motion.setter
-    def motion(self, arg0: MotionKind) -> None:
-        ...
-    @property
-    def period_s(self) -> float:
-        """
-        Interpolation period, s.
-        """
-    @period_s.setter
-    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def position_gain_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
-        """
-        Per axis, 1/s, shape (3,) (1825).
-        """
-    @position_gain_per_s.setter
-    def position_gain_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
-        ...
-    @property
-    def program_start_s(self) -> float:
-        """
-        From the start key to the first block, s.
-        """
-    @program_start_s.setter
-    def program_start_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rapid_bell_time_s(self) -> float:
-        """
-        s (1621); 0: none.
-        """
-    @rapid_bell_time_s.setter
-    def rapid_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rapid_override(self) -> float:
-        """
-        Scales the rapid rates; the acceleration of a rapid stays.
-        """
-    @rapid_override.setter
-    def rapid_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rapid_path(self) -> RapidPath:
-        """
-        Straight or every axis for itself.
-        """
-    @rapid_path.setter
-    def rapid_path(self, arg0: RapidPath) -> None:
-        ...
-    @property
-    def rapid_rate_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
-        """
-        Per axis, shape (3,) (1420).
-        """
-    @rapid_rate_mm_per_s.setter
-    def rapid_rate_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
-        ...
-    @property
-    def rapid_time_constant_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
-        """
-        From rest to the rate, per axis, s, shape (3,) (1620).
-        """
-    @rapid_time_constant_s.setter
-    def rapid_time_constant_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
-        ...
-    @property
-    def shaped_bell_time_s(self) -> float:
-        """
-        Behind shaped blocks, linear: second moving average, s; 0: none.
-        """
-    @shaped_bell_time_s.setter
-    def shaped_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def shaped_block_end(self) -> BlockEnd:
-        """
-        When a shaped block's successor starts; ceil is the slower rule.
-        """
-    @shaped_block_end.setter
-    def shaped_block_end(self, arg0: BlockEnd) -> None:
-        ...
-    @property
-    def shaped_filter_shape(self) -> FilterShape:
-        """
-        Behind shaped blocks.
-        """
-    @shaped_filter_shape.setter
-    def shaped_filter_shape(self, arg0: FilterShape) -> None:
-        ...
-    @property
-    def shaped_regions(self) -> ShapedRegions:
-        """
-        What is played as shaped blocks.
-        """
-    @shaped_regions.setter
-    def shaped_regions(self, arg0: ShapedRegions) -> None:
-        ...
-    @property
-    def shaped_time_constant_s(self) -> float:
-        """
-        Behind shaped blocks, s; 0: no filter.
-        """
-    @shaped_time_constant_s.setter
-    def shaped_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def spindle_start_s(self) -> list[tuple[float, float]]:
-        """
-        (speed in 1/min, s) in which the spindle comes from rest to it.
-        """
-    @spindle_start_s.setter
-    def spindle_start_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
-        ...
-    @property
-    def spindle_stop_s(self) -> list[tuple[float, float]]:
-        """
-        (speed in 1/min, s) in which the spindle comes from it to rest.
-        """
-    @spindle_stop_s.setter
-    def spindle_stop_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
-        ...
-    @property
-    def time_constant_s(self) -> float:
-        """
-        After interpolation, s (1622).
-        """
-    @time_constant_s.setter
-    def time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def tool_change_s(self) -> float:
-        """
-        M06, s.
-        """
-    @tool_change_s.setter
-    def tool_change_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def unknown_move_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
-        """
-        Per axis: a rapid of whose way the program does not tell start or end, s, shape (3,).
-        """
-    @unknown_move_s.setter
-    def unknown_move_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
-        ...
 class FeedDrive:
     """
     Feed drive of one axis, integrated by CVODE.
@@ -3406,7 +3136,7 @@ class ShapedCommand:
     @property
     def first_period(self) -> int:
         """
-        Periods of the region before this piece.
+        Periods of the region before this part.
         """
     @property
     def grid_mm(self) -> numpy.ndarray:
@@ -3421,7 +3151,7 @@ class ShapedCommand:
     @property
     def run_ends(self) -> list[int]:
         """
-        Periods of this piece at which the command is at rest.
+        Periods of this part at which the command is at rest.
         """
     @property
     def segment_periods(self) -> list[int]:
@@ -3430,7 +3160,7 @@ class ShapedCommand:
         """
 class RegionShaper:
     """
-    A region's shaped command in pieces, so that memory does not grow with the region.
+    A region's shaped command in parts, so that memory does not grow with the region.
     
     Args:
         path: The programmed path.
@@ -3450,18 +3180,18 @@ class RegionShaper:
         Give the region out from its begin again, with the feed that the search finds.
         
         Returns:
-            False, and nothing is done, if no piece was given out early.
+            False, and nothing is done, if no part was given out early.
         """
     def begin_early(self) -> None:
         """
-        To be called before the first piece: do not wait for the search for the feed.
+        To be called before the first part: do not wait for the search for the feed.
         
-        Where the region is one run, its pieces are given out while they are measured, as if the first plan kept the tolerance.
+        Where the region is one run, its parts are given out while they are measured, as if the first plan kept the tolerance.
         Where that turns out to be wrong, next() gives None and is_withdrawn holds: all that was given out is void.
         """
     def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
         """
-        Next piece of at most so many periods, or None behind the last.
+        Next part of at most so many periods, or None behind the last.
         """
     @property
     def is_slowed(self) -> bool:
@@ -4477,9 +4207,9 @@ class SectionFigures:
         """
         Left less right wall, with the tool's diameter.
         """
-class RunFigures:
+class TrackFigures:
     """
-    Figures of a whole run.
+    Figures of all samples measured.
     """
     @property
     def command(self) -> DeviationStats:
@@ -4590,7 +4320,7 @@ class SectionMetrology:
         """
         The next samples of both, (n, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
         """
-    def finish(self) -> RunFigures:
+    def finish(self) -> TrackFigures:
         """
         Everything measured so far. Raises NumericError if a circle fit does not converge.
         """
@@ -4852,6 +4582,276 @@ class ShapedRegions:
         ...
     @property
     def value(self) -> int:
+        ...
+class FanucModel:
+    """
+    What decides how long a program takes, and what acceleration does to the path.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def bell_time_s(self) -> float:
+        """
+        After interpolation, linear: second moving average, s; 0: none.
+        """
+    @bell_time_s.setter
+    def bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def block_end(self) -> BlockEnd:
+        """
+        When a block's successor starts.
+        """
+    @block_end.setter
+    def block_end(self, arg0: BlockEnd) -> None:
+        ...
+    @property
+    def exponential_rest(self) -> float:
+        """
+        Share of the exponential's weights that is cut off at its end.
+        """
+    @exponential_rest.setter
+    def exponential_rest(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def feed_forward_ratio(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, 0 ... 1, shape (3,) (2092).
+        """
+    @feed_forward_ratio.setter
+    def feed_forward_ratio(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def feed_override(self) -> float:
+        """
+        Scales every programmed feed.
+        """
+    @feed_override.setter
+    def feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def filter_shape(self) -> FilterShape:
+        """
+        After interpolation: linear or exponential.
+        """
+    @filter_shape.setter
+    def filter_shape(self, arg0: FilterShape) -> None:
+        ...
+    @property
+    def in_position(self) -> InPosition:
+        """
+        Measured or from the servo lag.
+        """
+    @in_position.setter
+    def in_position(self, arg0: InPosition) -> None:
+        ...
+    @property
+    def in_position_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Measured wait, per axis, s, shape (3,).
+        """
+    @in_position_s.setter
+    def in_position_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def in_position_width_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, mm, shape (3,) (1826).
+        """
+    @in_position_width_mm.setter
+    def in_position_width_mm(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def last_tool_in_spindle(self) -> bool:
+        """
+        At the start, from the run before: an M06 that calls it changes nothing.
+        """
+    @last_tool_in_spindle.setter
+    def last_tool_in_spindle(self, arg0: bool) -> None:
+        ...
+    @property
+    def limits(self) -> MotionLimits:
+        """
+        Look-ahead; the axes' feed limits hold always.
+        """
+    @limits.setter
+    def limits(self, arg0: MotionLimits) -> None:
+        ...
+    @property
+    def look_ahead_filter_time_constant_s(self) -> float:
+        """
+        Moving average behind look-ahead, s (1769); 0: none.
+        """
+    @look_ahead_filter_time_constant_s.setter
+    def look_ahead_filter_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def m_code_s(self) -> dict[int, float]:
+        """
+        M codes with a time of their own: code -> s.
+        """
+    @m_code_s.setter
+    def m_code_s(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def m_function_s(self) -> float:
+        """
+        Every M code without a time of its own, s.
+        """
+    @m_function_s.setter
+    def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def motion(self) -> MotionKind:
+        """
+        Where a cutting move is accelerated.
+        """
+    @motion.setter
+    def motion(self, arg0: MotionKind) -> None:
+        ...
+    @property
+    def period_s(self) -> float:
+        """
+        Interpolation period, s.
+        """
+    @period_s.setter
+    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_gain_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, 1/s, shape (3,) (1825).
+        """
+    @position_gain_per_s.setter
+    def position_gain_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def program_start_s(self) -> float:
+        """
+        From the start key to the first block, s.
+        """
+    @program_start_s.setter
+    def program_start_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rapid_bell_time_s(self) -> float:
+        """
+        s (1621); 0: none.
+        """
+    @rapid_bell_time_s.setter
+    def rapid_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rapid_override(self) -> float:
+        """
+        Scales the rapid rates; the acceleration of a rapid stays.
+        """
+    @rapid_override.setter
+    def rapid_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rapid_path(self) -> RapidPath:
+        """
+        Straight or every axis for itself.
+        """
+    @rapid_path.setter
+    def rapid_path(self, arg0: RapidPath) -> None:
+        ...
+    @property
+    def rapid_rate_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, shape (3,) (1420).
+        """
+    @rapid_rate_mm_per_s.setter
+    def rapid_rate_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def rapid_time_constant_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        From rest to the rate, per axis, s, shape (3,) (1620).
+        """
+    @rapid_time_constant_s.setter
+    def rapid_time_constant_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def shaped_bell_time_s(self) -> float:
+        """
+        Behind shaped blocks, linear: second moving average, s; 0: none.
+        """
+    @shaped_bell_time_s.setter
+    def shaped_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def shaped_block_end(self) -> BlockEnd:
+        """
+        When a shaped block's successor starts; ceil is the slower rule.
+        """
+    @shaped_block_end.setter
+    def shaped_block_end(self, arg0: BlockEnd) -> None:
+        ...
+    @property
+    def shaped_filter_shape(self) -> FilterShape:
+        """
+        Behind shaped blocks.
+        """
+    @shaped_filter_shape.setter
+    def shaped_filter_shape(self, arg0: FilterShape) -> None:
+        ...
+    @property
+    def shaped_regions(self) -> ShapedRegions:
+        """
+        What is played as shaped blocks.
+        """
+    @shaped_regions.setter
+    def shaped_regions(self, arg0: ShapedRegions) -> None:
+        ...
+    @property
+    def shaped_time_constant_s(self) -> float:
+        """
+        Behind shaped blocks, s; 0: no filter.
+        """
+    @shaped_time_constant_s.setter
+    def shaped_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def spindle_start_s(self) -> list[tuple[float, float]]:
+        """
+        (speed in 1/min, s) in which the spindle comes from rest to it.
+        """
+    @spindle_start_s.setter
+    def spindle_start_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def spindle_stop_s(self) -> list[tuple[float, float]]:
+        """
+        (speed in 1/min, s) in which the spindle comes from it to rest.
+        """
+    @spindle_stop_s.setter
+    def spindle_stop_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def time_constant_s(self) -> float:
+        """
+        After interpolation, s (1622).
+        """
+    @time_constant_s.setter
+    def time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tool_change_s(self) -> float:
+        """
+        M06, s.
+        """
+    @tool_change_s.setter
+    def tool_change_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def unknown_move_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis: a rapid of whose way the program does not tell start or end, s, shape (3,).
+        """
+    @unknown_move_s.setter
+    def unknown_move_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         ...
 class ServoLag:
     """

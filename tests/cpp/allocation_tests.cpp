@@ -100,7 +100,7 @@ int main() {
   });
 
   linuxcnc::SwitchingFilter switching(3);
-  switching.offer(std::make_unique<linuxcnc::Stage>(Fir({0, 3, 7}, {0.5, 0.2, 0.3}), 3, 1));
+  switching.offer(std::make_unique<linuxcnc::OfferedFilter>(Fir({0, 3, 7}, {0.5, 0.2, 0.3}), 3, 1));
   expect_none("SwitchingFilter::step", [&] {
     for (int i = 0; i < 5000; ++i) {
       position = Vector3(1.0 + i, 2.0, 3.0 - 0.5 * i);

@@ -65,7 +65,7 @@ void PathBuilder::put(const Vector3& next_mm) {
   }
   data.nodes.push_back({last_.start_mm, distance_mm_});
   data.feeds.push_back(last_.feed_mm_per_s);
-  data.places.push_back({line, kept});
+  data.sources.push_back({line, kept});
   distance_mm_ += last_.length_mm;
 }
 

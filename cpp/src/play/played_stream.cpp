@@ -24,9 +24,10 @@ using Source = std::function<bool(SetPoint&)>;
 
 // Set-points of one run from rest to rest, then so many at rest as its filters need.
 template <class Player>
-class Run {
+class FilteredRun {
  public:
-  Run(Player player, const PlaybackOptions& options) : player_(std::move(player)), filters_(options.axis_filters) {}
+  FilteredRun(Player player, const PlaybackOptions& options)
+      : player_(std::move(player)), filters_(options.axis_filters) {}
 
   template <class LineOf>
   bool step(SetPoint& next, LineOf&& line_of) {
@@ -117,7 +118,8 @@ struct PlayedStream::Impl {
 
 PlayedStream::PlayedStream(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
                            const PlaybackOptions& options, double rest_s) {
-  auto run = std::make_shared<Run<Interpolator>>(Interpolator(path, std::move(profile), options.period_s), options);
+  auto run =
+      std::make_shared<FilteredRun<Interpolator>>(Interpolator(path, std::move(profile), options.period_s), options);
   impl_ = std::make_unique<Impl>(
       [run, path](SetPoint& next) {
         return run->step(
@@ -128,7 +130,7 @@ PlayedStream::PlayedStream(std::shared_ptr<const Path> path, std::shared_ptr<con
 
 PlayedStream::PlayedStream(std::shared_ptr<const Path> blocks, BlockEnd block_end, double override_ratio,
                            const PlaybackOptions& options, double rest_s) {
-  auto run = std::make_shared<Run<BlockPlayer>>(
+  auto run = std::make_shared<FilteredRun<BlockPlayer>>(
       BlockPlayer(blocks->segments(), options.period_s, block_end, override_ratio), options);
   impl_ = std::make_unique<Impl>(
       [run, blocks](SetPoint& next) {

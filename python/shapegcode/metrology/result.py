@@ -30,7 +30,7 @@ class MeasuredRegion:
 
     lines: tuple[int, int]
     path: _core.Path
-    figures: _core.RunFigures
+    figures: _core.TrackFigures
     sections: tuple[MeasuredSection, ...]
     station_spacing_mm: float
 
