@@ -33,7 +33,7 @@ def __getattr__(name: str) -> Any:
     if (name != "__version__" and name.startswith("_")) or name not in _home():
         raise AttributeError(f"module 'shapegcode' has no attribute {name!r}{_near(name)}")
     value = getattr(importlib.import_module(_home()[name]), name)
-    if _home()[name] == "shapegcode._core":
+    if callable(value) and _home()[name] == "shapegcode._core":
         from shapegcode.model.signatures import with_signature
 
         value = with_signature(value)

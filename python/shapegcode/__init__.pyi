@@ -50,7 +50,7 @@ from shapegcode._core import (
     zv_on_grid as zv_on_grid,
 )
 from shapegcode.batching.batch import batch as batch
-from shapegcode.batching.cluster import Cluster as Cluster
+from shapegcode.batching.process import Cluster as Cluster
 from shapegcode.batching.result import (
     Batch as Batch,
     BatchRow as BatchRow,
@@ -69,9 +69,9 @@ from shapegcode.checking.result import (
     Check as Check,
     Finding as Finding,
 )
-from shapegcode.comparison.allowed import Allowed as Allowed
 from shapegcode.comparison.compare import compare as compare
 from shapegcode.comparison.result import (
+    Allowed as Allowed,
     Comparison as Comparison,
     KindCount as KindCount,
     ProgramDifference as ProgramDifference,
@@ -145,23 +145,20 @@ from shapegcode.io.edge_capture import (
 )
 from shapegcode.io.edge_json import read_edge_json as read_edge_json
 from shapegcode.io.frequency_response import FrequencyResponse as FrequencyResponse
-from shapegcode.io.read import ReadOptions as ReadOptions
-from shapegcode.io.record import Record as Record
+from shapegcode.io.record import ReadOptions as ReadOptions, Record as Record
 from shapegcode.io.run_log import (
     iter_run_logs as iter_run_logs,
     read_run_logs as read_run_logs,
 )
-from shapegcode.io.run_record import (
+from shapegcode.io.run_tracks import (
     RunLog as RunLog,
     Signal as Signal,
 )
 from shapegcode.machine import Machine as Machine
 from shapegcode.machine.description_result import (
     MachineDescription as MachineDescription,
-    describe_machine as describe_machine,
-)
-from shapegcode.machine.difference_result import (
     MachineDifference as MachineDifference,
+    describe_machine as describe_machine,
     machine_difference as machine_difference,
 )
 from shapegcode.machine.fanuc_import import import_parameters as import_parameters
@@ -174,7 +171,7 @@ from shapegcode.metrology.measure import (
 )
 from shapegcode.metrology.plots import plot_part as plot_part, plot_walls as plot_walls
 from shapegcode.metrology.result import Measurement as Measurement
-from shapegcode.model.drives import drive_parameters as drive_parameters
+from shapegcode.model.modes import drive_parameters as drive_parameters
 from shapegcode.model.response import plant_response as plant_response
 from shapegcode.model.stream import stream as stream
 from shapegcode.program import Program as Program
@@ -196,9 +193,8 @@ from shapegcode.setup.answers import Answers as Answers, AnswersError as Answers
 from shapegcode.setup.build import set_up as set_up
 from shapegcode.setup.result import MachineSetup as MachineSetup
 from shapegcode.shaping.bands import ModeBand as ModeBand
-from shapegcode.shaping.block_period import choose_block_period as choose_block_period
 from shapegcode.shaping.comparison import choose_shaper as choose_shaper
-from shapegcode.shaping.grid import choose_grid as choose_grid
+from shapegcode.shaping.grid import choose_block_period as choose_block_period, choose_grid as choose_grid
 from shapegcode.shaping.grid_designs import shortest_non_negative as shortest_non_negative
 from shapegcode.shaping.plots import (
     plot_branches as plot_branches,

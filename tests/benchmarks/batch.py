@@ -27,8 +27,7 @@ from pathlib import Path
 from processes import ROOT, launched
 from table import Sample
 
-from shapegcode.batching.inputs import find_programs
-from shapegcode.batching.plan import plan
+from shapegcode.batching.plan import find_programs, plan
 from shapegcode.batching.process import Base, Hosts, pack
 
 COMMAND = Path(sys.executable).with_name("shapegcode")

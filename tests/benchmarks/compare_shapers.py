@@ -22,7 +22,7 @@ from table import markdown
 
 import shapegcode as sg
 from shapegcode import _core
-from shapegcode.cli.console import progress
+from shapegcode.cli.runner import progress
 from shapegcode.conversion import convert as converter
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping import design, machine_bands

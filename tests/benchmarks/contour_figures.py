@@ -25,8 +25,7 @@ from judge.plant import contour_error_um
 from shapegcode import _core
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.demos.path import path_program
-from shapegcode.model.controller import motion_limits
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, motion_limits
 from shapegcode.shaping.grid import choose_grid
 
 Vector = npt.NDArray[np.float64]

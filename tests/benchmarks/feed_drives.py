@@ -23,7 +23,7 @@ from table import Row, Sample, comparison_table, markdown
 import feed_drive_reference as reference
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.drives import drive_parameters
+from shapegcode.model.modes import drive_parameters
 
 Vector = npt.NDArray[np.float64]
 

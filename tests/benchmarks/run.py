@@ -27,8 +27,7 @@ from table import Row, Sample, comparison_table, markdown
 import shapegcode as sg
 from shapegcode import _core
 from shapegcode.conversion.write import RegionWriter
-from shapegcode.model.controller import fanuc_model
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.shaping.grid import choose_grid
 
 _MEGA = 1e6

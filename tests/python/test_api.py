@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 import shapegcode as sg
 from acceptance import PROGRAMS
 from shapegcode import _core
-from shapegcode.model.controller import motion_limits
+from shapegcode.model.machine_model import motion_limits
 
 GOOD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F6000\nG3X40.Y20.R20.\nG1Y40.\nG0Z50.\nM30\n%\n"
 

@@ -18,7 +18,7 @@ import pytest
 import shapegcode as sg
 from command import COMMAND, run
 from shapegcode.batching import runs as batching
-from shapegcode.batching.inputs import called_files, find_programs
+from shapegcode.batching.plan import called_files, find_programs
 from shapegcode.results.json import plain
 
 HEAD = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\n"
@@ -339,7 +339,7 @@ def test_what_cannot_be_started(
     folder: Path, words: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Exit code 2, and nothing is written."""
-    monkeypatch.setattr("shapegcode.batching.cluster._WAIT_S", 1)
+    monkeypatch.setattr("shapegcode.batching.process._WAIT_S", 1)
     (folder / "lib").mkdir()
     (folder / "full").mkdir()
     (folder / "full/batch.jsonl").write_text("{}\n")

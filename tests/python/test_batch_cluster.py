@@ -111,7 +111,7 @@ def test_a_worker_of_another_version_is_named(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     """Nothing is done then."""
-    monkeypatch.setattr("shapegcode.batching.cluster._own_version", lambda: "shapegcode 0.0.0")
+    monkeypatch.setattr("shapegcode.batching.process._own_version", lambda: "shapegcode 0.0.0")
     done = run(tmp_path, *WORDS, "--scheduler", cluster[0])
     assert done.returncode == 2
     assert "this is shapegcode 0.0.0: install the same everywhere" in done.stderr

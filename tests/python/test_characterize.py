@@ -30,7 +30,7 @@ from shapegcode.characterization.air_tests import (
 from shapegcode.characterization.programs import program_text, read_sheet
 from shapegcode.characterization.result import ControllerFact
 from shapegcode.io.servo_log import parse_units, read_log
-from shapegcode.model.controller import fanuc_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.results.json import schema
 
 MACHINE = sg.Machine.load("vx500")

@@ -17,7 +17,7 @@ from scipy import signal
 import shapegcode as sg
 from acceptance import PROGRAMS, SAMPLE_KEYS, machine_with
 from shapegcode import _core
-from shapegcode.model.controller import fanuc_model
+from shapegcode.model.machine_model import fanuc_model
 
 SAMPLES = sorted(path for path in PROGRAMS.iterdir() if path.suffix.upper() == ".NC")
 Vector = npt.NDArray[np.float64]

@@ -14,6 +14,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*book.pages(ROOT / "docs"), *(ROOT / name for name in ("README.md", *book.HOUSE))]
+HOWTO = [page for page in sorted((ROOT / "docs" / "howto").glob("*.md")) if page.stem != "index"]
 TOCTREE = re.compile(r"^`{3,}\{toctree\}\n(.*?)^`{3,}$", re.MULTILINE | re.DOTALL)
 
 
@@ -59,6 +60,15 @@ def test_every_page_is_in_the_contents(tmp_path: Path) -> None:
     assert sorted(pages - set(listed)) == [], "in no contents"
     assert sorted(set(listed) - pages) == [], "in the contents, and not there"
     assert len(listed) == len(set(listed)), "twice in the contents"
+
+
+@pytest.mark.parametrize("page", HOWTO, ids=lambda page: page.stem)
+def test_every_how_to_ends_with_what_can_go_wrong(page: Path) -> None:
+    head, _, last = page.read_text(encoding="utf-8").rpartition("\n## ")
+    title, *rows = last.strip().splitlines()
+    assert title == "What can go wrong"
+    assert 3 <= sum(row.startswith("|") for row in rows) - 2 <= 6, "three to six rows below the head of the table"
+    assert title not in head
 
 
 def test_every_picture_that_a_result_draws_is_in_the_gallery() -> None:

@@ -16,7 +16,7 @@ from acceptance import machine_with
 from shapegcode import ArgumentError, NumericError, _core
 from shapegcode.errors import MachineError
 from shapegcode.machine import Machine
-from shapegcode.model.drives import drive_parameters
+from shapegcode.model.modes import drive_parameters
 
 Vector = npt.NDArray[np.float64]
 

@@ -17,8 +17,7 @@ from shapegcode.identification.identify import identify
 from shapegcode.identification.result import Identification
 from shapegcode.identification.update import update_machine
 from shapegcode.io.frequency_response import FrequencyResponse, ratio_unit
-from shapegcode.io.read import ReadOptions
-from shapegcode.io.record import Quantity
+from shapegcode.io.record import Quantity, ReadOptions
 from shapegcode.machine import Machine
 from tap_truth import TrueMode, random_modes
 

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
-from shapegcode.shaping.linear_program import LinearProgram, non_negative_least_squares
+from shapegcode.shaping.cutting_planes import LinearProgram, non_negative_least_squares
 
 FloatArray = NDArray[np.float64]
 

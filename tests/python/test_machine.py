@@ -13,7 +13,7 @@ import jsonschema
 import pytest
 
 from shapegcode.cli import COMMANDS, main
-from shapegcode.cli.console import write_json
+from shapegcode.cli.runner import write_json
 from shapegcode.errors import MachineError
 from shapegcode.io.atomic import write_text
 from shapegcode.machine import AxisMode, Machine

@@ -108,7 +108,7 @@ def test_check_names_it_too(tmp_path: Path) -> None:
     ],
 )
 def test_a_milling_program_is_not_taken_for_one(body: str) -> None:
-    from shapegcode.program.turning import signs_of_turning
+    from shapegcode.program.reading import signs_of_turning
 
     assert signs_of_turning(f"{HEAD}{body}M30\n%\n".encode()) is None
 

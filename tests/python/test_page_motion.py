@@ -16,7 +16,7 @@ from shapegcode import _core
 from shapegcode.model.scene import scene_of
 from shapegcode.model.stream import stream
 from shapegcode.program import Program
-from shapegcode.program.pairing import paired_regions
+from shapegcode.program.compensation import paired_regions
 from small_page import DOWN, LINES, NAME, UP, marked, write_small
 
 

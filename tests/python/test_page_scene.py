@@ -14,8 +14,7 @@ import shapegcode as sg
 from shapegcode.model.scene import scene_of
 from shapegcode.model.stream import stream
 from shapegcode.program import Program
-from shapegcode.results.page.scene import Scene, Variant, packed
-from shapegcode.results.page.thinning import PIXELS_HIGH, AccelerationSpectrum, Thinner
+from shapegcode.results.page.scene import PIXELS_HIGH, AccelerationSpectrum, Scene, Thinner, Variant, packed
 
 CORNER = "G90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\nX30. Y40.\nX60. Y0.\nG0 Z5.\nM30\n"
 

@@ -15,7 +15,7 @@ from acceptance import BLOCK_ENDS, convert, figures, machine_with, whole_periods
 from judge import durations, residual_um
 from shapegcode import _core
 from shapegcode.demos.path import PathDemo, ideal_command, path_demo, path_program, statements
-from shapegcode.model.controller import motion_limits
+from shapegcode.model.machine_model import motion_limits
 from shapegcode.results.json import schema
 
 Vector = npt.NDArray[np.float64]

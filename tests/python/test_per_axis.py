@@ -31,7 +31,7 @@ def left(fir: Fir, mode: Mode, period_s: float) -> float:
 
 
 def exists(axis_modes: Sequence[Sequence[Mode]], period_s: float, periods: int) -> bool:
-    """Whether non-negative taps at 0 ... `periods` with one mean cancel each axis' modes: one program for all axes."""
+    """Whether non-negative impulses at 0 ... `periods` with one mean cancel each axis' modes: one program for all."""
     shaken = [modes for modes in axis_modes if modes]
     n = periods + 1
     rows, right = [], []

@@ -18,7 +18,7 @@ from shapegcode.cli import main
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.convert import Conversion, convert
 from shapegcode.machine import Machine
-from shapegcode.model.controller import fanuc_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program
 
 Vector = npt.NDArray[np.float64]
@@ -406,7 +406,7 @@ def test_the_warnings_say_what_is_different() -> None:
     dogleg = with_tables(Machine.load("vx500"), controller={"rapid_path": "non_linear"})
     conversion = converted(text, dogleg)
     assert conversion.to_dict()["rapids"]["shaped"] == 1
-    assert "check that the straight way is free" in " ".join(conversion.to_dict()["warnings"])
+    assert "check that the straight path is free" in " ".join(conversion.to_dict()["warnings"])
     check_straight(conversion)
     per_axis = converted(text, with_tables(Machine.load("vx500"), shaping={"per_axis": True}))
     assert per_axis.to_dict()["rapids"]["shaped"] == 1

@@ -236,13 +236,14 @@ def test_refusal_shows_the_nearest() -> None:
 def test_refusal_where_all_taps_add_up() -> None:
     with pytest.raises(DesignError) as failed:
         minimax_robust(PAPER_BANDS, 0.008)
-    assert "131:0.02±10% Hz swings once per period of 8 ms at 125.03 Hz, where all taps add up" in str(failed.value)
+    said = "131:0.02±10% Hz completes one cycle per period of 8 ms at 125.03 Hz, where all impulses add up"
+    assert said in str(failed.value)
     assert re.search(r"on a period of \d ms a design of \d+ ms would do", str(failed.value))
-    with pytest.raises(DesignError, match=r"400:0 Hz swings 2 times per period of 5 ms at 400 Hz"):
+    with pytest.raises(DesignError, match=r"400:0 Hz completes 2 cycles per period of 5 ms at 400 Hz"):
         least_worst([PAPER_BANDS[0], ModeBand(Mode(400.0, 0.0))], 0.005, 0.1)
     with pytest.raises(DesignError, match=r"sum\|a\| up to 1.5 .* do not cancel 46 Hz \(zeta 0.02\), 131 Hz"):
         least_worst(PAPER_BANDS, 0.005, 0.005, non_negative=False, max_abs_sum=1.5, zeros_at_nominal=True)
-    with pytest.raises(DesignError, match=r"non-negative taps up to 5 ms on a 5 ms grid do not cancel"):
+    with pytest.raises(DesignError, match=r"non-negative impulses up to 5 ms on a 5 ms grid do not cancel"):
         minimax_robust([PAPER_BANDS[0], ModeBand(Mode(131.0, 0.02))], 0.005, max_duration_s=0.005)
     with pytest.raises(DesignError, match="no other period from half to twice as long has a design"):
         minimax_robust([ModeBand(Mode(1000.0, 0.0), 0.2)], 0.005)

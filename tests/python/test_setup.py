@@ -24,7 +24,7 @@ from command import run
 from shapegcode.cli.setup import ask_all
 from shapegcode.machine.output import ANY_PRICE
 from shapegcode.results.json import schema
-from shapegcode.settings.schema import toml_schema
+from shapegcode.settings.describe import toml_schema
 
 ANSWERS = """\
 name = "VMC-3"

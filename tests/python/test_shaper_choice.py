@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -352,3 +354,26 @@ def test_candidate_periods() -> None:
     slow = candidate_periods([ModeBand(Mode(0.5, 0.0))], None, 6.0)
     assert all(a < b for a, b in itertools.pairwise(slow))
     assert slow[0] >= 2.0 / 32.0
+
+
+ROWS = re.findall(
+    r"^\|[^|]*\| `([a-z-]+)` \|.*\| ([0-9.]+) \| ([0-9.]+) "
+    r"\| `shapegcode shaper (.*) --block-period 1ms --family \1` \|$",
+    (Path(__file__).resolve().parents[2] / "docs" / "concepts" / "choose_shaper.md").read_text(encoding="utf-8"),
+    re.MULTILINE,
+)
+
+
+@pytest.mark.parametrize(("family", "periods", "left", "modes"), ROWS, ids=lambda value: value.replace("--mode ", ""))
+def test_the_page_that_says_how_to_choose_says_what_is_designed(
+    family: str, periods: str, left: str, modes: str
+) -> None:
+    bands = modes.removeprefix("--mode ").split(" --mode ")
+    design = choose_shaper(bands, periods_s=[0.001], families=[family], allow_negative=True).design
+    slowest = min(float(band.partition(":")[0]) for band in bands)
+    assert f"{design.duration_s * slowest:.2f}" == periods
+    assert f"{100.0 * design.worst_residual:.1f}" == left
+
+
+def test_the_page_that_says_how_to_choose_has_its_rows() -> None:
+    assert len(ROWS) == 9

@@ -34,7 +34,7 @@ from shapegcode.shaping import (
     parse_mode_band,
     shortest_non_negative,
 )
-from shapegcode.shaping.designs import parse_taps
+from shapegcode.shaping.bands import parse_taps
 from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid
 from shapegcode.shaping.registry import distinct
 from shapegcode.shaping.solvers import simultaneous_zv
@@ -154,7 +154,7 @@ def test_zeros_on_a_grid_have_their_multiplicity(name: str, multiplicity: int, p
 
 
 def feasible(rows: list[NDArray[np.complex128]], last: int) -> bool:
-    """A linear program of its own: non-negative taps of sum 1 with these sums zero."""
+    """A linear program of its own: non-negative impulses of sum 1 with these sums zero."""
     matrix = np.vstack([np.ones(last + 1), *[part for row in rows for part in (row.real, row.imag)]])
     right = np.zeros(len(matrix))
     right[0] = 1.0

@@ -13,7 +13,7 @@ from command import run
 from shapegcode.errors import RecordError
 from shapegcode.identification.identify import identify
 from shapegcode.identification.update import update_machine
-from shapegcode.io.read import ReadOptions
+from shapegcode.io.record import ReadOptions
 from shapegcode.machine import Machine
 
 FloatArray = npt.NDArray[np.float64]

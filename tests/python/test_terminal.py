@@ -12,8 +12,7 @@ import pytest
 
 from command import run
 from shapegcode.cli import COMMANDS, parser_of
-from shapegcode.cli.arguments import GROUPS
-from shapegcode.cli.examples import EXAMPLES
+from shapegcode.cli.arguments import EXAMPLES, GROUPS
 from shapegcode.results.table import Column, Table
 
 PART = "%\nO0001\nG90 G17 G21 G94\nG00 X0 Y0 Z5.\nG01 Z-1. F300\nX20. F900\nX20. Y20.\nG00 Z5.\nM30\n%\n"
@@ -153,7 +152,7 @@ def test_older_names_of_options_still_work() -> None:
 def test_escape_codes_are_for_terminals_that_want_colours(no_colour: str, monkeypatch: pytest.MonkeyPatch) -> None:
     import io
 
-    from shapegcode.cli.console import output_console
+    from shapegcode.cli.runner import output_console
 
     class Terminal(io.StringIO):
         def isatty(self) -> bool:

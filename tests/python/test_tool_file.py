@@ -13,10 +13,9 @@ import pytest
 from tool_files_page import STEEL_TOOL
 
 from shapegcode import _core
-from shapegcode.cutting.materials import materials
-from shapegcode.cutting.tool import Tool
+from shapegcode.cutting.tool import Tool, materials
 from shapegcode.errors import FileError, ToolError
-from shapegcode.settings.problems import line_of
+from shapegcode.settings.load import line_of
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = resources.files("shapegcode") / "data" / "milling"

@@ -123,7 +123,7 @@ runpy.run_module("shapegcode", run_name="__main__")
     assert not (folder / "o.nc").exists()
 
 
-@pytest.mark.parametrize("instant", ["argparse", "numpy", "shapegcode._core", "pydantic", "shapegcode.conversion.run"])
+@pytest.mark.parametrize("instant", ["argparse", "numpy", "shapegcode._core", "pydantic", "shapegcode.conversion.plan"])
 def test_ctrl_c_while_modules_load_is_no_traceback(instant: str, folder: Path) -> None:
     code = f"""
 import runpy, signal, sys

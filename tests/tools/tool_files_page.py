@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from importlib import resources
 
-from shapegcode.cutting.materials import materials
 from shapegcode.cutting.stock import Stock
-from shapegcode.cutting.tool import Tool
+from shapegcode.cutting.tool import Tool, materials
+from shapegcode.settings.describe import key_tables
 from shapegcode.settings.keys import toml
-from shapegcode.settings.reference import key_tables
 
 STEEL_TOOL = """\
 [tool]

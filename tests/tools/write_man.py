@@ -11,7 +11,7 @@ from argparse_manpage.manpage import Manpage
 
 from shapegcode.cli import COMMANDS, parser_of
 from shapegcode.cli.arguments import CommandParser
-from shapegcode.results.made import this_version
+from shapegcode.results.json import this_version
 
 _WHO = {"project_name": "shapegcode", "version": this_version().split()[-1], "manual_title": "shapegcode"}
 

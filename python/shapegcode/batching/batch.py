@@ -11,14 +11,11 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 
-from shapegcode.batching.cluster import Cluster, cluster_executor
-from shapegcode.batching.inputs import find_programs
 from shapegcode.batching.manifest import Manifest, begun_in
-from shapegcode.batching.plan import COMMANDS, plan
-from shapegcode.batching.process import Base, Hosts, pack, run_packed
+from shapegcode.batching.plan import COMMANDS, find_programs, plan
+from shapegcode.batching.process import Base, Cluster, Hosts, cluster_executor, pack, run_packed
 from shapegcode.batching.result import Batch
-from shapegcode.batching.row import KeptRows, summary_lines
-from shapegcode.batching.runs import OnBatch, Runs
+from shapegcode.batching.runs import KeptRows, OnBatch, Runs, summary_lines
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import is_temporary, write_lines
 from shapegcode.verdict.ahead import cores

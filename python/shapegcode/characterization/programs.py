@@ -27,8 +27,7 @@ from shapegcode.characterization.result import CharacterisationTests, WrittenTes
 from shapegcode.errors import ArgumentError, FileError, Problem
 from shapegcode.io.atomic import write_text
 from shapegcode.settings.keys import Count, Float, InlineTable, Positive, Text, TomlTable, key
-from shapegcode.settings.load import parsed, read_text, validated
-from shapegcode.settings.problems import KeyProblem, line_of
+from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -189,10 +188,10 @@ class _PartTable(InlineTable):
     pattern: Pattern = key("kind of move")
     axis: Literal["X", "Y", "Z"] = key("of the moves", default="X")
     count: _Whole = key("number of moves", default=1)
-    length_mm: _Length = key("of a move", unit="mm", default=0.0)
-    feed_mm_per_min: _Feed = key("cutting feed, or the rapid rate", unit="mm/min", default=0.0)
+    length_mm: _Length = key("of a move", default=0.0)
+    feed_mm_per_min: _Feed = key("cutting feed, or the rapid rate", default=0.0)
     stride: _Whole = key("moves in one direction", default=1)
-    dwell_s: _Dwell = key("after each move, or the pause", unit="s", default=0.0)
+    dwell_s: _Dwell = key("after each move, or the pause", default=0.0)
 
     @model_validator(mode="after")
     def _moves(self) -> _PartTable:
@@ -206,8 +205,8 @@ class _TestTable(TomlTable):
     """One test."""
 
     program: Annotated[Text, Field(pattern=_PROGRAM)] = key("name of its file, such as O7001.nc")
-    override_percent: Annotated[Count, Field(ge=1, le=254)] = key("feed override", unit="%", default=100)
-    times_s: tuple[_Time, ...] = key("stopwatch times", unit="s", default=())
+    override_percent: Annotated[Count, Field(ge=1, le=254)] = key("feed override", default=100)
+    times_s: tuple[_Time, ...] = key("stopwatch times", default=())
     log: Text | None = key("file of the servo log", default=None)
     parts: Annotated[tuple[_PartTable, ...], Field(min_length=1)] = key("what the program does")
 
@@ -215,8 +214,8 @@ class _TestTable(TomlTable):
 class _SheetTable(TomlTable):
     """The file."""
 
-    resolution_s: Annotated[Float, Field(ge=1e-6, le=10)] = key("step of the stopwatch", unit="s", default=0.1)
-    reaction_s: Annotated[Float, Field(ge=0, le=10)] = key("scatter of start and stop", unit="s", default=0.1)
+    resolution_s: Annotated[Float, Field(ge=1e-6, le=10)] = key("step of the stopwatch", default=0.1)
+    reaction_s: Annotated[Float, Field(ge=0, le=10)] = key("scatter of start and stop", default=0.1)
     tests: Annotated[dict[str, _TestTable], Field(min_length=1)] = key(
         "as `shapegcode characterize --write` wrote them"
     )

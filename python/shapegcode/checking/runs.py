@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import fanuc_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program
 
 _CUTTING, _RAPID, _DWELL = (

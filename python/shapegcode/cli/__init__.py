@@ -93,7 +93,7 @@ class _Version(argparse.Action):
     """``--version``; looks the version up only when asked."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        from shapegcode.results.made import this_version
+        from shapegcode.results.json import this_version
 
         print(this_version())
         parser.exit(ExitCode.OK)

@@ -3,10 +3,259 @@
 from __future__ import annotations
 
 import argparse
+import math
+import re
 import textwrap
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NoReturn
 
-from shapegcode.cli.examples import EXAMPLES
+_LARGEST_OVERRIDE = 2.54
+_SIZE_UNITS = {"": 1, "k": 1024, "M": 1024**2, "G": 1024**3}
+_LENGTH_UNITS = {"um": 1.0, "µm": 1.0, "mm": 1e3}
+_TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+
+
+def _refuse(text: str, must: str) -> NoReturn:
+    raise argparse.ArgumentTypeError(f"{text!r}: must be {must}")
+
+
+def program_number(text: str) -> int:
+    """An O number with or without its letter."""
+    match = re.fullmatch(r"[Oo]?0*([1-9][0-9]{0,7})", text)
+    return int(match[1]) if match else _refuse(text, "a program number, O1 ... O99999999")
+
+
+def program_choice(text: str) -> int | str:
+    """Which program of a file: its O number, an address, or all of them."""
+    if text == "all" or re.fullmatch(r"#[1-9][0-9]{0,8}|(.*/)?<[^<>]+>|.*/[Oo]?[0-9]{1,8}", text):
+        return text
+    try:
+        return program_number(text)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{error}, /FOLDER/O1, <NAME>, #3 for the third one, or all") from None
+
+
+def axes(text: str) -> str:
+    """Axes such as ``XZ``, ``x,z`` or ``"x z"``."""
+    letters = set(re.sub(r"[\s,]+", "", text.lower()))
+    if not letters or letters - set("xyz"):
+        _refuse(text, "axes, for example X or XZ")
+    return "".join(sorted(letters))
+
+
+def line_range(text: str) -> tuple[int, int]:
+    """Lines such as ``120-180`` or ``120``, first and last, from 1."""
+    match = re.fullmatch(r"0*([1-9][0-9]{0,9})(?:-0*([1-9][0-9]{0,9}))?", text)
+    first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+    return (first, last) if first <= last else _refuse(text, "lines, first to last, for example 120-180")
+
+
+def line_ranges(text: str) -> tuple[tuple[int, int], ...]:
+    """Ranges of lines such as ``12-80,95-240``."""
+    return tuple(line_range(part.strip()) for part in text.split(","))
+
+
+def count(text: str) -> int:
+    """A whole number, 1 or more."""
+    match = re.fullmatch(r"0*([1-9][0-9]{0,11})", text)
+    return int(match[1]) if match else _refuse(text, "a whole number, 1 or more")
+
+
+def _share(text: str) -> float:
+    return number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+
+
+def ratio(text: str) -> float:
+    """A share such as ``60%`` or ``0.6``, above 0 and at most 1."""
+    return value if 0.0 < (value := _share(text)) <= 1.0 else _refuse(text, "above 0 and at most 100%")
+
+
+def share(text: str) -> float:
+    """A share such as ``3%`` or ``0.03``, at least 0 and below 1."""
+    return value if 0.0 <= (value := _share(text)) < 1.0 else _refuse(text, "at least 0 and below 100%")
+
+
+def override(text: str) -> float:
+    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
+    most = _LARGEST_OVERRIDE
+    return value if 0.0 < (value := _share(text)) <= most else _refuse(text, f"above 0 and at most {most:.0%}")
+
+
+def seconds(text: str) -> float:
+    """A time with its unit, such as ``5ms`` or ``0.005s``."""
+    return _with_unit(text, "time", _TIME_UNITS, "5ms")
+
+
+def start_time(text: str) -> float:
+    """A time with its unit, or 0, which needs none."""
+    return 0.0 if text in ("0", "0s", "0ms") else seconds(text)
+
+
+def frequency_band(text: str) -> tuple[float, float]:
+    """Two frequencies in Hz such as ``20:400``, ascending."""
+    try:
+        low, high = map(float, text.split(":"))
+    except ValueError:
+        low, high = math.nan, math.nan
+    return (low, high) if 0.0 <= low < high < math.inf else _refuse(text, "two frequencies in Hz, for example 20:400")
+
+
+def micrometres(text: str) -> float:
+    """A length with its unit, such as ``5um`` or ``0.005mm``, in µm."""
+    return _with_unit(text, "length", _LENGTH_UNITS, "5um")
+
+
+def _with_unit(text: str, what: str, units: Mapping[str, float], example: str) -> float:
+    """A number above 0 with one of the units, times what the unit stands for."""
+    match = re.fullmatch(rf"([-+.\d]+(?:[eE][-+]?\d+)?)\s*({'|'.join(units)})", text)
+    try:
+        value = float(match[1]) * units[match[2]] if match else 0.0
+    except ValueError:
+        value = 0.0
+    typed = ", ".join(unit for unit in units if unit.isascii())
+    good = math.isfinite(value) and value > 0.0
+    return value if good else _refuse(text, f"a {what} above 0 with its unit ({typed}), for example {example}")
+
+
+def size(text: str) -> int:
+    """A number of bytes such as ``262144``, ``256k``, ``1M`` or ``2G`` (1024 bytes, 1024 k, 1024 M), above 0."""
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([kMG]?)", text)
+    value = math.floor(float(match[1]) * _SIZE_UNITS[match[2]]) if match else 0
+    return value if value >= 1 else _refuse(text, "a number of bytes above 0, for example 65536, 64k or 1M")
+
+
+def positive(text: str) -> float:
+    """A number above 0."""
+    return value if math.isfinite(value := number(text)) and value > 0.0 else _refuse(text, "above 0")
+
+
+def nonzero(text: str) -> float:
+    """A number other than 0."""
+    return value if math.isfinite(value := number(text)) and value != 0.0 else _refuse(text, "a number other than 0")
+
+
+def number(text: str) -> float:
+    """A number."""
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number") from None
+
+
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "convert": (
+        "shapegcode convert part.nc -m vx500 -o shaped.nc",
+        "shapegcode convert part.nc -m mine.toml -o shaped.nc --max-bytes 256k --html result.html",
+    ),
+    "shaper": (
+        "shapegcode shaper --mode 46:0.02±5% --mode 131:0.02 --block-period 5ms",
+        "shapegcode shaper -m mine.toml --objective robust --plots plots",
+    ),
+    "simulate": (
+        "shapegcode simulate part.nc -m vx500 --html motion.html",
+        "shapegcode simulate part.nc -m mine.toml --plant feed-drive --npz motion.npz --plots plots",
+    ),
+    "feed": (
+        "shapegcode feed part.nc -m vx500 --tool T8.toml --stock block.toml -o part-feed.nc",
+        "shapegcode feed part.nc -m mine.toml --tool T8.toml --stock block.toml -o out.nc --margin 3%",
+    ),
+    "expand": (
+        "shapegcode expand part.nc -m vx500 -o plain.nc",
+        "shapegcode expand memory.nc -m mine.toml --program O1234 -o - --compensation keep",
+    ),
+    "measure": (
+        "shapegcode measure part.nc shaped.nc -m vx500 --tool-diameter 3mm --plots plots",
+        "shapegcode measure part.nc -m mine.toml --tool-diameter 10mm --lines 20-40",
+    ),
+    "time": (
+        "shapegcode time part.nc -m vx500",
+        "shapegcode time part.nc -m mine.toml --override 80% --csv blocks.csv",
+    ),
+    "check": (
+        "shapegcode check part.nc -m vx500",
+        "shapegcode check memory.nc -m mine.toml --program all --json check.json",
+    ),
+    "compare": (
+        "shapegcode compare part.nc shaped.nc --allow feeds,blocks,path=30um",
+        "shapegcode compare part.nc shaped.nc -m mine.toml --allow feeds,blocks,path=0.02mm,calls --json compare.json",
+    ),
+    "batch": (
+        "shapegcode batch parts -m mine.toml -o shaped --html pages",
+        "shapegcode batch 'parts/**/*.nc' -m a.toml -m b.toml -o times --command time --resume",
+    ),
+    "study": (
+        "shapegcode study STUDY.toml --plots plots",
+        "shapegcode study STUDY.toml -m mine.toml -n 10000 --html study.html --csv draws.csv",
+    ),
+    "optimize": (
+        "shapegcode optimize STUDY.toml",
+        "shapegcode optimize STUDY.toml -m mine.toml --at-least 99% --html optimum.html --json optimum.json",
+    ),
+    "setup": (
+        "shapegcode setup -o mine.toml",
+        "shapegcode setup --answers answers.toml -o mine.toml --force",
+    ),
+    "machine": (
+        "shapegcode machine init vx500 -o mine.toml",
+        "shapegcode machine import CNC-PARA.TXT --from vx500 -o mine.toml",
+    ),
+    "machine init": (
+        "shapegcode machine init",
+        "shapegcode machine init vx500 -o mine.toml --full",
+    ),
+    "machine import": (
+        "shapegcode machine import CNC-PARA.TXT -o mine.toml",
+        "shapegcode machine import CNC-PARA.TXT TOOLOFST.TXT MACRO.TXT --from vx500 -o mine.toml",
+    ),
+    "machine show": (
+        "shapegcode machine show vx500",
+        "shapegcode machine show mine.toml --for part.nc",
+    ),
+    "machine diff": (
+        "shapegcode machine diff vx500 mine.toml",
+        "shapegcode machine diff old.toml mine.toml --json diff.json",
+    ),
+    "machine schema": (
+        "shapegcode machine schema -o machine.schema.json",
+        "shapegcode machine schema tool -o tool.schema.json",
+    ),
+    "characterize": (
+        "shapegcode characterize --write tests -m mine.toml --box 0:100,0:100,0:20",
+        "shapegcode characterize --fit tests/RESULTS.toml -m mine.toml -o measured.toml",
+    ),
+    "identify": (
+        "shapegcode identify tap1.csv tap2.csv tap3.csv --axis x --update mine.toml --plots plots",
+        "shapegcode identify --tap-plan -m mine.toml",
+    ),
+    "testcut": (
+        "shapegcode testcut taper -m vx500 --tool em8.toml -S 1800 -F 216 -a 15 -o TAPER.NC",
+        "shapegcode testcut fit pass1.csv pass2.csv pass3.csv --cut TAPER.json -o cutting.toml",
+    ),
+    "testcut taper": (
+        "shapegcode testcut taper -m vx500 --tool em8.toml -S 1800 -F 216 -a 15 -o TAPER.NC",
+        "shapegcode testcut taper -m mine.toml --tool em8.toml -F 108,216,432 -a 10 -o TAPER.NC",
+    ),
+    "testcut corner": (
+        "shapegcode testcut corner -m vx500 --tool em8.toml -F 216 -a 15 -o CORNER.NC",
+        "shapegcode testcut corner -m mine.toml --tool em8.toml -F 216 -a 15 --interval 0.4 -o CORNER.NC",
+    ),
+    "testcut interval": (
+        "shapegcode testcut interval -m vx500 --tool em8.toml -F 216 -a 15 -o INTERVAL.NC",
+        "shapegcode testcut interval -m mine.toml --tool em8.toml -F 216 -a 15 --intervals 0.3,0.6 -o I.NC",
+    ),
+    "testcut fit": (
+        "shapegcode testcut fit pass1.csv pass2.csv pass3.csv --cut TAPER.json -o cutting.toml",
+        "shapegcode testcut fit 2=pass2.csv --cut CORNER.json --plots plots",
+    ),
+    "report": (
+        "shapegcode report result.json",
+        "shapegcode report result.json -o result.html --html-script beside",
+    ),
+    "completion": ("shapegcode completion bash", "shapegcode completion fish"),
+    "demo": ("shapegcode demo path", "shapegcode demo path --json path.json --html path.html"),
+}
+"""By command and action: what a user could type. Each is read by that command's parser in a test."""
+
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "input": (

@@ -6,8 +6,8 @@ import argparse
 import shlex
 from pathlib import Path
 
+from shapegcode.cli.arguments import count, seconds, size
 from shapegcode.cli.options import add_amount_arguments, add_cluster_arguments, cluster_of
-from shapegcode.cli.typed import count, seconds, size
 
 _INDEX = "index.html"
 

@@ -9,7 +9,7 @@ from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli.arguments import add_alias
+from shapegcode.cli.arguments import add_alias, line_ranges, positive, ratio, seconds, size
 from shapegcode.cli.feed import add_cutting_arguments
 from shapegcode.cli.options import (
     add_machine_argument,
@@ -21,10 +21,9 @@ from shapegcode.cli.options import (
     output_file,
     overridden,
 )
-from shapegcode.cli.typed import line_ranges, positive, ratio, seconds, size
 
 if TYPE_CHECKING:
-    from shapegcode.cli.console import ProgressBar
+    from shapegcode.cli.runner import ProgressBar
     from shapegcode.conversion.result import Conversion
     from shapegcode.machine import Machine
     from shapegcode.program import Program

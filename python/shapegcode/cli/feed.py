@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from shapegcode.cli.arguments import micrometres, share
 from shapegcode.cli.options import (
     add_input_arguments,
     add_plots_argument,
@@ -12,7 +13,6 @@ from shapegcode.cli.options import (
     load_machine,
     output_file,
 )
-from shapegcode.cli.typed import micrometres, share
 
 
 def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:

@@ -23,10 +23,10 @@ from typing import Any
 
 from shapegcode.batching.process import FAILED_CODES
 from shapegcode.io.atomic import write_in_passing
-from shapegcode.results.made import this_version
+from shapegcode.results.json import this_version
 
 _LOADED = (
-    "shapegcode.cli.runner", "shapegcode.cli.options", "shapegcode.cli.typed",
+    "shapegcode.cli.runner", "shapegcode.cli.options", "shapegcode.cli.arguments",
     "shapegcode.results.table", "rich.console", "rich.table", "rich._emoji_codes", "importlib.metadata",
     "importlib.readers", "email.parser", "shlex",
 )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli import options, typed
+from shapegcode.cli import arguments, options
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -22,17 +22,17 @@ _OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
     ("--time-unit", "time_unit", {"metavar": "UNIT"}, "s, ms or us"),
     ("--force-unit", "force_unit", {"metavar": "UNIT"}, "N, kN, kgf or lbf"),
     ("--response-unit", "response_unit", {"metavar": "UNIT"}, "for example m/s^2, g, mm/s or um"),
-    ("--sample-period", "period_s", {"metavar": "TIME", "type": typed.seconds}, "between samples, such as 0.1ms"),
+    ("--sample-period", "period_s", {"metavar": "TIME", "type": arguments.seconds}, "between samples, such as 0.1ms"),
     (
         "--quantity", "quantity", {"choices": ("acceleration", "velocity", "displacement")},
         "what the sensor measured",
     ),
     (
-        "--force-scale", "force_scale", {"metavar": "N", "type": typed.nonzero},
+        "--force-scale", "force_scale", {"metavar": "N", "type": arguments.nonzero},
         "N for 1 in the file (integer WAV: full scale)",
     ),
     (
-        "--response-scale", "response_scale", {"metavar": "X", "type": typed.nonzero},
+        "--response-scale", "response_scale", {"metavar": "X", "type": arguments.nonzero},
         "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)",
     ),
     (
@@ -68,14 +68,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_modes_arguments(parser, "--keep-modes")
     add("--tap-plan", action="store_true", help="say how to do the test (for the modes of -m MACHINE), nothing else")
     options.add_machine_argument(parser, required=False)
-    add("--modes", metavar="N", type=typed.count, help="how many (default: chosen by evidence)")
+    add("--modes", metavar="N", type=arguments.count, help="how many (default: chosen by evidence)")
     most = "largest number of modes that is tried (default: %(default)s)"
-    add("--most-modes", metavar="N", type=typed.count, default=_MOST_MODES, help=most)
+    add("--most-modes", metavar="N", type=arguments.count, default=_MOST_MODES, help=most)
     within = "look for modes between these frequencies, Hz"
-    add("--frequencies", metavar="LOW:HIGH", type=typed.frequency_band, help=within)
+    add("--frequencies", metavar="LOW:HIGH", type=arguments.frequency_band, help=within)
     ignore = "take it as a free decay: do not use the force, even if there is one"
     add("--decay", "--ignore-force", dest="ignore_force", action="store_true", help=ignore)
-    add("--start", metavar="TIME", type=typed.start_time, help=_HELP_TIME)
+    add("--start", metavar="TIME", type=arguments.start_time, help=_HELP_TIME)
     for name, field, how, said in _OF_FILES:
         add(name, dest=field, help=said, **({"default": None} | how))
     options.add_plots_argument(
@@ -109,7 +109,7 @@ def _identify(args: argparse.Namespace) -> int:
     from shapegcode.identification.identify import identify
     from shapegcode.identification.update import check_updatable, update_machine
     from shapegcode.io.atomic import write_text
-    from shapegcode.io.read import ReadOptions
+    from shapegcode.io.record import ReadOptions
 
     if args.update is not None:
         options.refuse_same_file([Path(args.update)], map(Path, args.files))

@@ -159,7 +159,7 @@ def _sorted(files: list[str]) -> tuple[str, list[str]]:
     """The parameter dump among some files, and the tables."""
     from shapegcode.errors import ArgumentError
     from shapegcode.io.data_file import read_file
-    from shapegcode.machine.fanuc_tables import is_table
+    from shapegcode.machine.fanuc_dump import is_table
 
     if len(files) == 1:
         return files[0], []
@@ -188,12 +188,7 @@ def _show(args: argparse.Namespace) -> int:
 
 
 def _write_origins(name: str) -> None:
-    """Write where the values of a machine file come from as a table into it; everything else stays.
-
-    Raises:
-        ArgumentError: a built-in machine.
-        MachineError, OSError: the file is bad, or cannot be read or written.
-    """
+    """Write where the values of a machine file come from as a table into it; everything else stays."""
     from pathlib import Path
 
     from shapegcode.identification.update import check_updatable
@@ -249,7 +244,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
 
 def _diff(args: argparse.Namespace) -> int:
     from shapegcode.cli import runner
-    from shapegcode.machine.difference_result import machine_difference
+    from shapegcode.machine.description_result import machine_difference
 
     runner.check_files(args)
     return runner.finish(machine_difference(*args.files), args)
@@ -261,7 +256,7 @@ def file_schema(kind: str) -> str:
     from shapegcode.cutting.tool import Tool
     from shapegcode.machine import Machine
     from shapegcode.results.json import to_text
-    from shapegcode.settings.schema import toml_schema
+    from shapegcode.settings.describe import toml_schema
     from shapegcode.studies.study_file import study_schema
 
     title = f"{kind} file of shapegcode"

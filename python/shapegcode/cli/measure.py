@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from shapegcode.cli.arguments import add_alias
+from shapegcode.cli.arguments import add_alias, line_range, micrometres
 from shapegcode.cli.options import (
     add_machine_argument,
     add_plots_argument,
@@ -13,7 +13,6 @@ from shapegcode.cli.options import (
     add_result_arguments,
     load_machine,
 )
-from shapegcode.cli.typed import line_range, micrometres
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

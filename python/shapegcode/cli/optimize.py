@@ -6,9 +6,9 @@ import argparse
 import shlex
 from dataclasses import replace
 
+from shapegcode.cli.arguments import ratio
 from shapegcode.cli.options import add_plots_argument, add_result_arguments
 from shapegcode.cli.study import add_study_arguments, load
-from shapegcode.cli.typed import ratio
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,11 +9,10 @@ from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
-from shapegcode.cli.arguments import one_of
-from shapegcode.cli.typed import axes, micrometres, number, program_choice, seconds
+from shapegcode.cli.arguments import axes, micrometres, number, one_of, program_choice, seconds
 
 if TYPE_CHECKING:
-    from shapegcode.batching.cluster import Cluster
+    from shapegcode.batching.process import Cluster
     from shapegcode.machine import Machine
 
 
@@ -94,7 +93,7 @@ def add_cluster_arguments(parser: argparse.ArgumentParser, what: str) -> None:
 
 def cluster_of(args: argparse.Namespace) -> Cluster | None:
     """What `add_cluster_arguments` declared."""
-    from shapegcode.batching.cluster import Cluster
+    from shapegcode.batching.process import Cluster
 
     return None if args.scheduler is None else Cluster(args.scheduler, args.tls_ca, args.tls_cert, args.tls_key)
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
     from shapegcode.model.playable import PlayedPrograms
-    from shapegcode.results.made import Made, MadeFile
+    from shapegcode.results.json import Made, MadeFile
 
 _WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement", "Simulation")
 
@@ -37,7 +37,7 @@ def changes(made: Made, folder: Path) -> tuple[dict[tuple[str, str], Path], list
 def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
     from shapegcode.cli.runner import MACHINES
     from shapegcode.machine import Machine
-    from shapegcode.results.made import MadeFile, file_hash
+    from shapegcode.results.json import MadeFile, file_hash
 
     if file.role in MACHINES and file.name in Machine.builtin_names() and not Path(file.name).exists():
         now = MadeFile.of(file.role, file.name, Machine.builtin_text(file.name).encode()).sha256

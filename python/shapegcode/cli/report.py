@@ -70,10 +70,10 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
 
     from shapegcode._core import ArgumentError
     from shapegcode.cli.replay import changes, played_again
-    from shapegcode.results.made import this_version
-    from shapegcode.results.outcome import NotKeptError
+    from shapegcode.results.json import this_version
     from shapegcode.results.page.default import raw_page
     from shapegcode.results.revive import made_of, revived
+    from shapegcode.results.values import NotKeptError
 
     try:
         made = made_of(report)

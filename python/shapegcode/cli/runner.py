@@ -12,20 +12,99 @@ def run(args):
 from __future__ import annotations
 
 import argparse
+import contextlib
+import itertools
+import json
+import os
 import shlex
+import shutil
 import sys
+import textwrap
+import threading
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
-from shapegcode.cli import console as terminal
-from shapegcode.io.atomic import write_bytes
+from shapegcode.io.atomic import write_bytes, write_lines
 
 if TYPE_CHECKING:
-    from shapegcode.results.made import Made, MadeFile
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from shapegcode.results.json import Made, MadeFile
     from shapegcode.results.result import Result
     from shapegcode.results.table import Table
+
+_PIPE_WIDTH = 120
+_PIECES = 4096
+_PROGRESS_DELAY_S = 1.0
+
+
+def output_console(json_target: str | None = None, *, file: TextIO | None = None, least: int = 0) -> Console:
+    """Console for tables and text on standard output; silent where the JSON goes there (``--json -``)."""
+    from rich.console import Console
+
+    stream = file or sys.stdout
+    # A pipe has no width: rich would take 80 characters and break the tables.
+    width = None if stream.isatty() or "COLUMNS" in os.environ else _PIPE_WIDTH
+    # rich would still print in bold.
+    colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
+    console = Console(
+        file=stream, width=width, quiet=json_target == "-", highlight=False, soft_wrap=False, color_system=colours
+    )
+    if least > console.width:
+        console.width = least
+    return console
+
+
+def wrapped(text: str) -> str:
+    """Text in lines between words on a terminal; elsewhere, where a line is searched for, as it is."""
+    if not sys.stdout.isatty():
+        return text
+    width = shutil.get_terminal_size().columns
+    lines = [textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False) for line in text.split("\n")]
+    return "\n".join("\n".join(parts) for parts in lines)
+
+
+def write_json(data: object, target: str | Path) -> None:
+    """Write *data* as stable JSON: sorted keys, two spaces, one newline at the end; ``-`` is standard output."""
+    encoder = json.JSONEncoder(sort_keys=True, indent=2, allow_nan=False, ensure_ascii=False)
+    pieces = itertools.chain(encoder.iterencode(data), ["\n"])
+    # Not word by word, nor all at once: there may be millions.
+    write_lines(str(target), iter(lambda: "".join(itertools.islice(pieces, _PIECES)), ""))
+
+
+class ProgressBar:
+    """A bar on standard error; until it is opened nothing is shown."""
+
+    def __init__(self, description: str) -> None:
+        """Say what is being done."""
+        self._description = description
+        self.bar: Progress | None = None
+
+    def update(self, fraction: float) -> None:
+        """Tell how much of the work is done, 0 to 1; cheap enough for every step of a loop."""
+        if self.bar is not None:
+            self.bar.update(self.bar.task_ids[0], completed=min(max(fraction, 0.0), 1.0), total=1.0)
+
+    def say(self, text: str) -> None:
+        """Say what is being done in other words."""
+        self._description = text
+        if self.bar is not None:
+            self.bar.update(self.bar.task_ids[0], description=text)
+
+    def open(self) -> None:
+        """Show it."""
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        text = TextColumn("{task.description}", markup=False)
+        columns = (text, BarColumn(), TimeRemainingColumn(), TimeElapsedColumn())
+        bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        bar.add_task(self._description, total=None)
+        bar.start()
+        self.bar = bar
+
 
 # Options that name a file which a command writes.
 _WRITTEN = ("output", "json", "csv", "npz", "html")
@@ -58,9 +137,26 @@ def standard_output(args: argparse.Namespace) -> str | None:
     return "-" if "-" in [getattr(args, name, None) for name in _WRITTEN] else None
 
 
-def progress(description: str, args: argparse.Namespace) -> AbstractContextManager[terminal.ProgressBar]:
-    """A bar on standard error for the block, if that is a terminal and the work takes longer than a second."""
-    return terminal.progress(description, standard_output(args))
+@contextlib.contextmanager
+def progress(description: str, args: argparse.Namespace) -> Iterator[ProgressBar]:
+    """A _bar bar for the block, from its first second on, also as long as nobody tells how much of it is done.
+
+    There is none if standard error is no terminal or a file goes to standard output.
+    """
+    bar = ProgressBar(description)
+    later = threading.Timer(_PROGRESS_DELAY_S, bar.open)
+    later.daemon = True
+    shown = sys.stderr.isatty() and standard_output(args) != "-"
+    if shown:
+        later.start()
+    try:
+        yield bar
+    finally:
+        if shown:
+            later.cancel()
+            later.join()  # it may be opening just now
+        if bar.bar is not None:
+            bar.bar.stop()
 
 
 def write_program(target: str | Path, content: bytes | memoryview) -> None:
@@ -73,12 +169,12 @@ def write_program(target: str | Path, content: bytes | memoryview) -> None:
 
 def _write(report: dict[str, Any], json: str | None, output: tuple[str | Path, bytes | memoryview] | None) -> None:
     if json not in (None, "-"):
-        terminal.write_json(report, str(json))
+        write_json(report, str(json))
     if output is not None:
         # Last of all, so that no program stands there when something else could not be written.
         write_program(*output)
     if json == "-":
-        terminal.write_json(report, json)
+        write_json(report, json)
 
 
 def _write_page(
@@ -165,10 +261,10 @@ def _say(
     quiet, verbose = getattr(args, "quiet", False), getattr(args, "verbose", False)
     shown = () if quiet else [table.everything() for table in tables] if verbose else tables
     least = max((table.width() for table in shown), default=0) if verbose else 0
-    console = terminal.output_console(standard_output(args), least=least)
+    console = output_console(standard_output(args), least=least)
 
     def say(text: str, style: str | None = None) -> None:
-        console.print(terminal.wrapped(text), markup=False, soft_wrap=True, style=style)
+        console.print(wrapped(text), markup=False, soft_wrap=True, style=style)
 
     say(result.answer, "bold" if result.ok else "bold red")
     for table in shown:
@@ -213,7 +309,7 @@ def made_by(
     wrote: Sequence[str | Path] = (),
 ) -> Made:
     """Of what a command made its result."""
-    from shapegcode.results.made import FORMAT, Made, MadeFile, this_version
+    from shapegcode.results.json import FORMAT, Made, MadeFile, this_version
 
     files = [_read(role, name) for role, name in given_files(args)]
     if output is not None:
@@ -225,7 +321,7 @@ def made_by(
 
 
 def _read(role: str, name: str) -> MadeFile:
-    from shapegcode.results.made import MadeFile
+    from shapegcode.results.json import MadeFile
 
     if role in MACHINES and not Path(name).exists():
         from shapegcode.machine import Machine

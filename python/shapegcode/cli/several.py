@@ -83,8 +83,7 @@ def _left_over(several: Gathered) -> set[int]:
 
 def _run_one(args: argparse.Namespace, several: Gathered) -> int:
     from shapegcode._core import ProgramError
-    from shapegcode.cli.console import output_console
-    from shapegcode.cli.runner import standard_output
+    from shapegcode.cli.runner import output_console, standard_output
 
     one = argparse.Namespace(**vars(args))
     one.program, one.several = f"#{several.at + 1}", several
@@ -108,8 +107,7 @@ def _run_one(args: argparse.Namespace, several: Gathered) -> int:
 
 def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left: set[int]) -> None:
     """Write the one JSON and the one program, and say it."""
-    from shapegcode.cli import console as terminal
-    from shapegcode.cli.runner import standard_output, write_program
+    from shapegcode.cli.runner import output_console, standard_output, write_json, write_program
 
     target = getattr(args, "json", None)
     outputs = {str(output) for output, _ in several.written.values()}
@@ -120,12 +118,12 @@ def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left:
         if output is not None and "output" in report:
             report["output"] = output
     if target not in (None, "-"):
-        terminal.write_json(several.reports, target)
+        write_json(several.reports, target)
     if output is not None:
         write_program(output, several.joined())
     if target == "-":
-        terminal.write_json(several.reports, target)
-    console = terminal.output_console(standard_output(args))
+        write_json(several.reports, target)
+    console = output_console(standard_output(args))
     if called:
         console.print(f"called by others and done there: {several.names(called)}", markup=False, soft_wrap=True)
     if left:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
-from shapegcode.cli.arguments import add_alias
+from shapegcode.cli.arguments import add_alias, positive, ratio, seconds, share
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
-from shapegcode.cli.typed import positive, ratio, seconds, share
 
 # The registry's, whose solvers take too long to load for a help text.
 _FAMILIES = (
@@ -21,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
         "Designs every family of input shapers for some vibration modes and compares them: duration, what is left of "
-        "the vibration if the frequencies are off, contour cost, negative taps; and recommends one. "
+        "the vibration if the frequencies are off, contour cost, negative impulses; and recommends one. "
         "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input."
     )
     add = parser.add_argument
@@ -68,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what is least in the design to take, within the limit: duration, contour cost, or what is left of the "
         "vibration (default: %(default)s)",
     )  # fmt: skip
-    add("--negative", action="store_true", help="a design with negative taps may be recommended")
+    add("--negative", action="store_true", help="a design with negative impulses may be recommended")
     add("--taps", metavar="TIME:A,...", help='compare a shaper of your own: "0:.5,10.9ms:.5"')
     add(
         "--speed", metavar="MM/S", type=positive, default=200.0,
@@ -87,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     """Compare shapers."""
     from shapegcode._core import ArgumentError
     from shapegcode.cli import runner
-    from shapegcode.cli.console import output_console
+    from shapegcode.cli.runner import output_console
     from shapegcode.shaping.comparison import choose_shaper
     from shapegcode.shaping.result import families_table
 

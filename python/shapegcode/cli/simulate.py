@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from shapegcode.cli.arguments import count, line_range
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
-from shapegcode.cli.typed import count, line_range
 
 # Of the progress bar, for the regions; the rest is the motion in time, which takes most of it.
 _REGIONS_SHARE = 0.1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.cli.arguments import count
 from shapegcode.cli.options import (
     add_cluster_arguments,
     add_machine_argument,
@@ -13,7 +14,6 @@ from shapegcode.cli.options import (
     cluster_of,
     load_machine,
 )
-from shapegcode.cli.typed import count
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine

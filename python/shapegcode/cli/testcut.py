@@ -6,8 +6,8 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.cli.arguments import positive, program_number
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
-from shapegcode.cli.typed import positive, program_number
 
 if TYPE_CHECKING:
     from shapegcode.testcut.design import CornerShape, CutConditions

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from shapegcode.cli.arguments import override, ratio
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
-from shapegcode.cli.typed import override, ratio
 
 # A table of more blocks is built only where it is written.
 _MOST_BLOCKS_SHOWN = 100_000

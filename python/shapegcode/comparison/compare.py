@@ -12,8 +12,7 @@ from pathlib import Path
 
 from shapegcode import _core
 from shapegcode._core import ProgramError
-from shapegcode.comparison.allowed import Allowed
-from shapegcode.comparison.result import Comparison, KindCount, ProgramDifference
+from shapegcode.comparison.result import Allowed, Comparison, KindCount, ProgramDifference
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.compensation import guard_lines

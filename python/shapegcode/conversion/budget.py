@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.conversion.region_text import EmittedRegion
+from shapegcode.conversion.write import EmittedRegion
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.results.result import Xyz
@@ -118,7 +118,7 @@ class TextNeeds:
 
 @dataclass(frozen=True)
 class GivenUp:
-    """A region that keeps its text.
+    """A region that is left unchanged.
 
     Attributes:
         lines: of the original, first and last.
@@ -143,7 +143,7 @@ class BudgetOutcome:
             before any region is slowed for the contour tolerance.
         after: of the text as it is.
         block_period_s: on which it is written.
-        given_up: regions that keep their text.
+        given_up: regions that are left unchanged.
     """
 
     limits: Budget
@@ -210,7 +210,7 @@ class Spending:
     def __init__(self, budget: Budget, program: Program, machine: Machine) -> None:
         self.budget = budget
         self.given_up: dict[int, GivenUp] = {}
-        """Regions that keep their text, per index."""
+        """Regions that are left unchanged, per index."""
         self._program = program
         self._tick_s = machine.controller.interpolation_period_s
         self._most_ticks = math.floor(machine.shaping.max_duration_s / self._tick_s + _ROUNDING)
@@ -257,7 +257,7 @@ class Spending:
         return best
 
     def give_up(self, grid: Grid, written: WrittenText, verdicts: Sequence[RegionVerdict]) -> bool:
-        """Choose regions that must keep their text; False if the text fits."""
+        """Choose regions that must be left unchanged; False if the text fits."""
         self._before = self._before or _needs(grid, written)
         loads = written.loads
         played = dict(zip(loads, verdicts, strict=True))

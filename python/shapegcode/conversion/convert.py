@@ -1,46 +1,36 @@
-"""The converter: regions of a program shaped, written, read back and judged."""
+"""The converter, as its picture in ARCHITECTURE.md: one function for each box, in their order."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import compress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shapegcode import _core
-from shapegcode.comparison.allowed import Allowed
-from shapegcode.comparison.compare import compare
-from shapegcode.conversion.aims import ToleranceCurve
 from shapegcode.conversion.budget import Budget
-from shapegcode.conversion.operating import at_the_control
-from shapegcode.conversion.rapids.shape import ShapedRapids
-from shapegcode.conversion.recommendation import Situation, filter_advice, most_to_gain_um, recommend
-from shapegcode.conversion.restart import restart_points
-from shapegcode.conversion.rests import RestsOn, rests_on
-from shapegcode.conversion.result import ChangeProof, Conversion
-from shapegcode.conversion.run import CutChoice, Progress, Run, Settled
-from shapegcode.conversion.tables import CutOutcome, chosen_cuts, outcome_of, tools_of_cuts
-from shapegcode.conversion.warnings import open_axes, played_warnings, text_warnings
-from shapegcode.conversion.whole_text import Written
+from shapegcode.conversion.outcome import judge, result_of
+from shapegcode.conversion.plan import ConversionPlan, CutChoice, Progress, Shaped
+from shapegcode.conversion.recommendation import gain_um
+from shapegcode.conversion.rests import Begun, begin_rests
+from shapegcode.conversion.result import Conversion
+from shapegcode.conversion.tables import chosen_cuts
+from shapegcode.conversion.whole_text import TextWriter, Written
 from shapegcode.machine import Machine
-from shapegcode.model.modes import machine_warnings, region_range_warnings
-from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
-from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.ahead import cores
-from shapegcode.verdict.figures import (
-    AppliedLimits,
-    BlockCount,
-    FollowingShapers,
-    GridTaps,
-    PlayedFigures,
-    UsedShaper,
-)
-from shapegcode.verdict.program import rapid_vibration_um
+
+if TYPE_CHECKING:
+    from shapegcode.conversion.rapids.shape import ShapedRapids
+
+_ATTEMPTS = 10  # each for cuts that left their tolerance, ran too fast or cost too much; few need more than two
+_PRICE_ROUNDS = 6
 
 
 def convert(
@@ -99,7 +89,6 @@ def convert(
             controller cannot play, a budget without a choice, lines without a cut.
         RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
     """
-    machine = Machine.of(machine)
     stated = {
         "shaping.contour": contour,
         "tolerance.contour_um": contour_tolerance_um,
@@ -110,27 +99,34 @@ def convert(
         "price.program_time_percent": max_time_increase_percent,
         "price.cut_time_percent": max_cut_time_increase_percent,
     }
-    if stated := {key: value for key, value in stated.items() if value is not None}:
-        machine = machine.with_values(stated, source="options of convert")
+    program, machine = read(program, machine, stated)
+    choice = CutChoice(chosen_cuts(program, only, leave), shape_all, tolerance_curve)
+    pool = ThreadPoolExecutor(max_workers=cores())
+    try:
+        plan = ConversionPlan(program, machine, block_period_s, budget, choice, pool, on_progress)
+        plan.leave_out()
+        choose_block_period(plan)
+        shaped = keep_what_pays(plan, settle(plan))
+        if machine.shaping.rapids:
+            shaped = shape_rapids(plan, shaped)
+        return result_of(plan, shaped, judge(plan, shaped))
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def read(
+    program: Program | str | Path, machine: Machine | str | Path, stated: Mapping[str, object]
+) -> tuple[Program, Machine]:
+    """The program as it can be shaped, and the machine with the options that were given."""
+    machine = Machine.of(machine)
+    if given := {key: value for key, value in stated.items() if value is not None}:
+        machine = machine.with_values(given, source="options of convert")
     program = program_for_conversion(program, machine)
     if program.stamp is not None:
         raise _core.ProgramError(
             f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
         )
-    _refuse_own_marks(program)
-    choice = CutChoice(chosen_cuts(program, only, leave), shape_all, tolerance_curve)
-    # Shapes regions, plays the originals, and what was emitted, on all cores.
-    pool = ThreadPoolExecutor(max_workers=cores())
-    try:
-        run = Run(program, machine, block_period_s, budget, choice, pool, on_progress)
-        found = run.shaped()
-        return _result(run, found.settled, found.rapids, original_within=found.original_within)
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _refuse_own_marks(program: Program) -> None:
-    """A comment of an original that the emitted program would say of its own blocks."""
+    # A comment of an original that the emitted program would say of its own blocks.
     for mark in (REGION_MARK.encode(), RAPID_MARK.encode(), STAMP_BEGIN):
         if (at := program.core.find(mark)) >= 0:
             line = program.core.slice(0, at).count(b"\n") + 1
@@ -138,204 +134,169 @@ def _refuse_own_marks(program: Program) -> None:
                 f"{program.place(line)}:1: the comment {mark.decode()} is how a shaped program marks its own blocks: "
                 "give it other words"
             )
+    return program, machine
 
 
-def _result(run: Run, settled: Settled, rapids: ShapedRapids | None, *, original_within: bool) -> Conversion:
-    program, machine, written = run.program, run.machine, settled.written
-    core = program.core
-    # For a core that waits while the last simulations run.
-    mark = run.pool.submit(lambda: settled.emitted.mark)
-    emitted_s = run.pool.submit(run.model.cycle_time_s, settled.emitted.core)
-    between = run.rapid_vibration
-    if rapids is not None and rapids.outcome.shaped:
-        between = run.pool.submit(rapid_vibration_um, settled.emitted, run.model)
-    rapids_shaped = rapids is not None and rapids.outcome.shaped > 0
-    proving = None
-    # Without header comments nothing tells shaped rapids from cuts.
-    if written.placed and (machine.emission.header or not rapids_shaped):
-        proving = run.pool.submit(prove, program, settled.emitted, machine, rapids_shaped=rapids_shaped)
-    every = sorted(
-        [*zip(written.placed, settled.figures, strict=True), *run.unchanged(settled, rapids)],
-        key=lambda pair: pair[0].original_lines,
-    )
-    figures = run.judge.summarise(
-        [each for _, each in every], [place for place, _ in every], run.grid.block_period_s,
-        Pair(run.rapid_vibration.result(), between.result()),
-    )  # fmt: skip
-    cutting = figures.region_time_s()
-    cuts = _cuts(run, settled, figures)
-    times = _cycle_time_s(run, settled, emitted_s.result(), cutting, rapids)
-    proof = None if proving is None else proving.result()
-    grade, reason = recommend(
-        Situation(
-            figures.all_cuts, len(written.placed), original_within=original_within,
-            could_gain=any(cut.gain_um >= machine.shaping.least_gain_um for cut in cuts),
-            benefit=run.is_benefit(settled), other_changes=proof.refused if proof is not None else (),
-        )
-    )  # fmt: skip
-    warnings = _warnings(run, written, figures)
-    if rapids is not None:
-        warnings += rapids.warnings
-    rests, tried = _rests_on(run, settled)
-    mark.result()
-    emitted = settled.emitted.with_verdict(good=grade != "do not run", better=grade == "better, tolerance not met")
-    return Conversion(
-        **vars(figures),
-        program=program.source,
-        machine=machine.name,
-        recommendation=grade,
-        reason=reason,
-        cuts=cuts,
-        tolerance_curve=_curve(run, times) if run.choice.tolerance_curve else None,
-        proof=proof,
-        advice=filter_advice(program, machine, run.model, run.judge, [original.result() for original in run.originals]),
-        cycle_time_s=times,
-        cutting_time_s=cutting,
-        block_period_s=run.grid.block_period_s,
-        shaper=_used_shaper(run.grid),
-        blocks=BlockCount(core.block_count, written.blocks),
-        expanded=core.expanded,
-        expanded_radii_mm={f"D{number}": radius for number, radius in core.expanded_radii_mm.items()},
-        bytes_read=core.size,
-        bytes_emitted=written.size,
-        limits=AppliedLimits(
-            machine.tolerance.contour_um,
-            run.judge.target,
-            machine.tolerance.residual_ratio,
-            machine.tolerance.residual_floor_um,
-            machine.tolerance.residual_floor_increments,
-            machine.tolerance.feed_excess_ratio,
-            machine.verdict.plant,
-            machine.price.program_time_percent,
-            machine.price.cut_time_percent,
-        ),
-        warnings=tuple(warnings),
-        budget=run.spending.outcome(run.grid, written) if run.spending is not None else None,
-        rapids=rapids.outcome if rapids is not None else None,
-        least_gain_um=machine.shaping.least_gain_um,
-        rests_on=rests,
-        unmeasured_tried=tried,
-        at_the_control=at_the_control(
-            settled.emitted,
-            written.placed,
-            written.loads,
-            figures,
-            run.model,
-            run.grid.block_period_s,
-            written.restarts,
-        ),
-        restart_points=restart_points(program, zip(written.placed, written.restarts, strict=True)),
-        emitted=emitted,
-        placed=tuple(written.placed),
-        model=run.model,
-        played=PlayedPrograms(program, machine, emitted, plant=machine.verdict.plant),
-    )
+def choose_block_period(plan: ConversionPlan) -> None:
+    """Another grid where a budget limits the rate of the line."""
+    spending = plan.spending
+    if spending is not None and spending.budget.limits_rate and not plan.fixed_period:
+        weights = [float(play.result().residual_mm.max()) for play in plan.originals]
+        plan.grid = spending.choose_period(plan.grid, weights, plan.grid_for, partial(write, plan))
 
 
-def _cuts(run: Run, settled: Settled, figures: PlayedFigures) -> tuple[CutOutcome, ...]:
-    """One row for each cut."""
-    tools = tools_of_cuts(run.program)
-    sizes = {
-        run.aims.index(place.region): text.size
-        for place, (text, _) in zip(settled.written.placed, settled.written.texts, strict=True)
+def settle(plan: ConversionPlan) -> Shaped:
+    """Write, read back and simulate; again where a cut left its tolerance, ran too fast or took too long."""
+    for attempt in range(_ATTEMPTS):
+        written = write(plan, plan.grid, "shaping" if attempt == 0 else "shaping again, slower")
+        shaped = simulate(plan, read_back(plan, written), ahead=attempt == 0)
+        figures, aims = shaped.figures, plan.aims
+        aims.note(written, figures)
+        changed = aims.slow_down(written, figures)
+        last = attempt + 1 == _ATTEMPTS
+        changed = (not last and aims.tighten(written, figures, plan.judge)) or changed
+        changed = aims.keep_cut_price(written, plan.is_keepable, _ATTEMPTS - 1 - attempt) or changed
+        if not changed:
+            return shaped
+        shaped.trackers.clear()  # nobody asks for them any more: they take room beside the next text
+        for run in shaped.begun.values():
+            run.cancel()
+    return simulate(plan, read_back(plan, write(plan, plan.grid)))
+
+
+def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
+    """Shape the chosen cuts on a grid, and write the whole text."""
+    if plan.writer.grid is not grid:
+        plan.writer = TextWriter(plan.program, plan.model, grid, plan.pool)
+    # Of what was given up for a budget, or is left unchanged by choice, the table of cuts speaks.
+    given_up = {} if plan.spending is None else plan.spending.given_up
+    untold = {*given_up, *plan.left, *plan.aims.emitted_s}
+    on_progress = partial(plan.on_progress, stage) if stage else lambda _done, _total: None
+    written = plan.writer.write(plan.reasons, plan.aims.room_um, plan.aims.feed_ratio, untold, on_progress)
+    for index, reason in written.no_room.items():
+        plan.reasons[index] = reason
+    plan.curves.note(written)
+    return written
+
+
+@dataclass(frozen=True)
+class ReadBack:
+    """A text read back and held against the original; trackers of the cuts that were not in the text before."""
+
+    written: Written
+    emitted: Program
+    trackers: dict[int, _core.ContourTracker]  # by the rank of the cut
+
+
+def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
+    """Read the text, and hold its end points and modal state against the original."""
+    following = {
+        rank: plan.pool.submit(_core.ContourTracker, place.region.path)
+        for rank, (place, (text, _)) in enumerate(zip(written.placed, written.texts, strict=True))
+        if (known := plan.simulated.get(plan.aims.index(place.region))) is None or known[0] is not text
     }
-    rows = []
-    for index, (region, cut) in enumerate(zip(run.program.regions, figures.all_cuts, strict=True)):
-        read = region.text_end - region.text_begin
-        gained = run.gains_um.get(index)
-        if gained is None:
-            gained = most_to_gain_um(run.originals[index].result())
-        rows.append(
-            outcome_of(
-                cut, is_shaped=index in sizes, reason=run.reasons[index], gain_um=gained,
-                tolerance_um=run.aims.shaped_for_um(index), tool=tools.get(index),
-                size=Pair(read, sizes.get(index, read)),
-            )
-        )  # fmt: skip
-    return tuple(rows)
+    emitted = written.read_back(plan.machine)
+    return ReadBack(written, emitted, {rank: each.result() for rank, each in following.items()})
 
 
-def _curve(run: Run, times: Pair[float]) -> ToleranceCurve | None:
-    """Tolerance against time, of the cuts that were shaped once; None: there are none."""
-    original_um = max(
-        (getattr(original.result(), run.judge.target).max_abs_mm for original in run.originals), default=0.0
-    )
-    return run.aims.tolerance_curve(times.original, original_um * 1e3)
+def simulate(plan: ConversionPlan, text: ReadBack, *, ahead: bool = False) -> Shaped:
+    """Simulate every shaped cut under the operating conditions; one whose text is as before is not simulated again.
 
-
-def _rests_on(run: Run, settled: Settled) -> tuple[tuple[RestsOn, ...], int]:
-    """Sensitivity of the shaped cut that comes nearest to a limit."""
-    deciding = run.judge.deciding(settled.figures, settled.written.placed)
-    if deciding is None:
-        return (), 0
-    simulated = zip(settled.written.placed, settled.figures, settled.trackers, strict=True)
-    return rests_on(
-        run.judge, run.machine, list(simulated), settled.emitted, deciding, run.pool,
-        settled.begun, partial(run.on_progress, "sensitivity to unverified parameters"),
+    `ahead`: its sensitivity to unverified parameters too, where which cut decides is known already.
+    """
+    placed, trackers = text.written.placed, text.trackers
+    indices = [plan.aims.index(place.region) for place in placed]
+    places = [placed[rank] for rank in trackers]
+    playing = plan.judge.begin(text.emitted, places, list(trackers.values()), plan.pool)
+    begun: Begun = {}
+    if ahead and cores() > 1 and len(placed) == len(trackers) == 1:
+        begun = begin_rests(plan.judge, plan.machine, places[0], text.emitted, trackers[0], plan.pool)
+    originals = [plan.originals[indices[rank]] for rank in trackers]
+    found = plan.judge.figures(playing, originals, partial(plan.on_progress, "round trip"))
+    for rank, figures in zip(trackers, found, strict=True):
+        plan.simulated[indices[rank]] = text.written.texts[rank][0], figures
+    return Shaped(
+        text.written, text.emitted, [plan.simulated[index][1] for index in indices],
+        [trackers.get(rank) for rank in range(len(placed))], begun,
     )  # fmt: skip
 
 
-def _cycle_time_s(
-    run: Run, settled: Settled, emitted_s: float, cutting: Pair[float], rapids: ShapedRapids | None
-) -> Pair[float]:
-    """What `shapegcode time` says of both texts."""
-    original_s = run.original_s.result()
-    if run.machine.emission.header:
-        return Pair(original_s, emitted_s)
-    # Nothing in such a text says which regions are shaped.
-    added_s = run.machine.emission.prefill_dwell_s * len(settled.written.placed)
-    added_s += rapids.extra_s if rapids else 0.0
-    return Pair(original_s, original_s - cutting.original + cutting.emitted + added_s)
+def keep_what_pays(plan: ConversionPlan, shaped: Shaped) -> Shaped:
+    """The same with cuts loosened or left unchanged for the budget, for what they gain, and for the program's price."""
+    while plan.spending is not None and plan.spending.give_up(plan.grid, shaped.written, plan.verdicts(shaped)):
+        for index, given_up in plan.spending.given_up.items():
+            plan.reasons[index] = given_up.reason
+        shaped = settle(plan)
+    shaped = _without_what_gains_nothing(plan, shaped)
+    for _ in range(_PRICE_ROUNDS):
+        excess_s = plan.excess_s(shaped)
+        gains = {index: plan.gains_um.get(index, 0.0) for index in plan.chosen}
+        if excess_s <= 0.0 or not plan.aims.keep_program_price(excess_s, gains, plan.is_keepable):
+            break
+        shaped = _without_what_gains_nothing(plan, settle(plan))
+    if not plan.choice.shape_all and not plan.is_benefit(shaped):
+        chosen = plan.chosen
+        plan.leave_everything("")
+        shaped = _rewritten(plan, shaped, chosen)
+    if not shaped.written.placed and not plan.machine.shaping.rapids:
+        shaped = _as_it_was(plan, shaped)
+    return shaped
 
 
-def _warnings(run: Run, written: Written, figures: PlayedFigures) -> list[str]:
-    program, machine = run.program, run.machine
-    warnings = [*program.warnings, *written.kept_warnings, *machine_warnings(machine)]
-    warnings += [run.grid.note] if run.grid.note else []
-    warnings += region_range_warnings(program.regions, machine)
-    if run.spending is not None and (sentence := run.spending.warning(run.grid)):
-        warnings.append(sentence)
-    elif not program.regions:
-        warnings.append(f"{program.source}: no cutting moves that can be shaped: the program is unchanged")
-    if not written.placed:
-        # Where something was shaped, the sensitivity to unverified parameters names them.
-        warnings += open_axes(program, machine)
-    warnings += played_warnings(program, figures, machine, is_priced=bool(run.aims.priced))
-    return warnings + text_warnings(program, written.placed, figures, machine, written.size, written.blocks)
+def _without_what_gains_nothing(plan: ConversionPlan, shaped: Shaped) -> Shaped:
+    """The same without the cuts that gained too little or became worse: these are left unchanged."""
+    least = plan.machine.shaping.least_gain_um
+    chosen = plan.chosen
+    for index, figures, verdict in zip(chosen, shaped.figures, plan.verdicts(shaped), strict=True):
+        gained = plan.gains_um[index] = gain_um(figures)
+        stays = not plan.is_keepable(index) or plan.choice.shape_all
+        if not stays and (gained < least or verdict.worse):
+            plan.leave(index, verdict.worse[0] if verdict.worse else f"shaping gains {gained:.1f} µm", gained)
+    return _rewritten(plan, shaped, chosen)
 
 
-def _used_shaper(grid: Grid) -> UsedShaper:
-    following = None
-    if grid.track is not None:
-        nodes = grid.track.nodes
-        following = FollowingShapers(
-            "xyz"[grid.track.axis],
-            tuple(node.position_mm for node in nodes),
-            tuple(tuple(node.shaper.times_s) for node in nodes),
-            tuple(tuple(node.shaper.amplitudes) for node in nodes),
-            grid.track.worst_residual,
-        )
-    return UsedShaper(
-        tuple(grid.shaper.times_s),
-        tuple(grid.shaper.amplitudes),
-        grid.family,
-        grid.duration_s,
-        tuple(GridTaps(tuple(fir.delays), tuple(fir.taps)) for fir in grid.axis_firs),
-        grid.per_axis_duration_s,
-        following,
-    )
+def _rewritten(plan: ConversionPlan, shaped: Shaped, before: Sequence[int]) -> Shaped:
+    """Some cuts are left unchanged now; what stays shaped is as before: neither shaped nor simulated again."""
+    stay = [not plan.reasons[index] for index in before]
+    if all(stay):
+        return shaped
+    written = write(plan, plan.grid)
+    figures, trackers = [*compress(shaped.figures, stay)], [*compress(shaped.trackers, stay)]
+    return Shaped(written, written.read_back(plan.machine), figures, trackers, {})
 
 
-def prove(original: Program, emitted: Program, machine: Machine, *, rapids_shaped: bool) -> ChangeProof:
-    """Compare an emitted program with its original.
+def _as_it_was(plan: ConversionPlan, shaped: Shaped) -> Shaped:
+    """The file as it was given, if it was one program: not what it was expanded into."""
+    if plan.program.number is not None:
+        return shaped
+    return replace(shaped, written=replace(shaped.written, size=plan.program.size), emitted=plan.program)
 
-    What shaping changes is allowed: blocks and feeds of cuts, calls that were expanded, the path within its tolerance,
-    which the verdict judges.
-    """
-    kinds = {"feeds", "blocks", "calls"}
-    kinds |= {"shaped-rapids"} if rapids_shaped else set()
-    kinds |= {"compensation"} if original.core.expanded_radii_mm else set()
-    found = compare(original, emitted, machine, allow=Allowed(frozenset(kinds), math.inf))
-    # Without header comments nothing says that lines of emission.* are the converter's own.
-    refused = tuple(each for each in found.refused if machine.emission.header or each.kind != "emission")
-    return ChangeProof(found.answer, found.counts, found.path_um, refused)
+
+def shape_rapids(plan: ConversionPlan, shaped: Shaped) -> Shaped:
+    """Rapids as shaped moves where that saves time; none where the program would take more time than its price."""
+    from shapegcode.conversion.rapids import shape
+
+    found = shape.shape_rapids(shaped.emitted, shaped.written.placed, plan.model, plan.grid, plan.pool, plan.budget)
+    found = _within_price(plan, shaped, found)
+    written = replace(shaped.written, size=found.emitted.size, placed=found.placed)
+    shaped = replace(shaped, written=written, emitted=found.emitted, rapids=found)
+    return shaped if written.placed or found.outcome.shaped else _as_it_was(plan, shaped)
+
+
+def _within_price(plan: ConversionPlan, shaped: Shaped, rapids: ShapedRapids) -> ShapedRapids:
+    """The shaped rapids, or none where with them the program would take more time than its price."""
+    price_s = plan.price_s()
+    if plan.machine.emission.header:
+        added_s = plan.model.cycle_time_s(rapids.emitted.core) - plan.original_s.result()
+    else:
+        added_s = plan.excess_s(shaped) + price_s + rapids.extra_s
+    if not rapids.outcome.shaped or added_s <= price_s:
+        return rapids
+    outcome, count = rapids.outcome, rapids.outcome.shaped
+    kept = {**outcome.kept, "the price of the program": count}
+    outcome = replace(outcome, shaped=0, kept=kept, time_saved_s=0.0, blocks=0, slowed_blocks=0, moves=())
+    why = f"{count} rapids stay rapids: with them as cutting moves the program would take {added_s:.2f} s more"
+    return replace(
+        rapids, emitted=shaped.emitted, placed=shaped.written.placed, outcome=outcome, extra_s=0.0,
+        warnings=[f"{why}, price {price_s:.2f} s (price.program_time_percent)"],
+    )  # fmt: skip

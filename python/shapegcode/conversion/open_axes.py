@@ -1,4 +1,4 @@
-"""What a program would shake on a machine of which nobody knows a mode: there is nothing to shape for, and no verdict.
+"""What a program would shake on a machine without a known mode: there is nothing to shape for, and no verdict.
 
 What matters then is which axis to tap first.
 """
@@ -14,7 +14,7 @@ from shapegcode.simulation.simulate import simulate
 
 
 def open_axes(program: Program | str | Path, machine: Machine) -> tuple[RestsOn, ...]:
-    """Axes that may have a mode or not, by how much a usual mode would swing behind the program as it is."""
+    """Axes that may have a mode or not, by how much a usual mode would vibrate behind the program as it is."""
     unknown = unknown_axes(machine)
     assumed = {
         key: value

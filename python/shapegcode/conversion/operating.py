@@ -53,7 +53,7 @@ def at_the_control(
     block_period_s: float,
     restarts: Sequence[CutRestarts],
 ) -> tuple[ControlNote, ...]:
-    """What to heed with an emitted program."""
+    """Cautions with an emitted program."""
     if not placed:
         return ()
     machine = model.machine

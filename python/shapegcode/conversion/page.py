@@ -14,7 +14,7 @@ from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled import ScheduledConversion
 from shapegcode.conversion.tables import CutOutcome, before_after_table, rests_table
 from shapegcode.machine import Machine
-from shapegcode.results.made import Made
+from shapegcode.results.json import Made
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
 from shapegcode.results.page.model import (
     Bars,
@@ -235,7 +235,7 @@ def _times(conversion: Conversion) -> Section:
 
 
 def _machine(machine: Machine) -> Section:
-    """What the machine was taken for: modes, tolerances, and every value that nobody measured."""
+    """What the machine was taken for: modes, tolerances, and every value that was not measured."""
     values = [value for value in machine.values() if value.unmeasured or value.key.startswith(_SHOWN_KEYS)]
     unmeasured = sum(value.unmeasured for value in values)
     columns = (

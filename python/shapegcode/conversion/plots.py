@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from shapegcode.conversion.aims import ToleranceCurve
 from shapegcode.conversion.result import Conversion
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.results import plot
-from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
+from shapegcode.results.path_plots import RECORD_SAMPLES, PlayedRegion, motion_pictures
 from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
@@ -57,7 +58,9 @@ def _played(conversion: Conversion) -> PlayedRegion:
     worst = max(
         range(len(conversion.regions)), key=lambda rank: max(conversion.regions[rank].residual_vibration_um.original)
     )
-    place, model = conversion.placed[worst], conversion.model
+    place, handle = conversion.placed[worst], conversion.played
+    assert handle is not None  # a conversion from JSON has no places either
+    model = MachineModel(handle.machine)
     path, blocks = place.region.path, place.blocks(conversion.emitted)
     offset = model.offset(place.region)
     runs = {

@@ -1,7 +1,7 @@
-"""What a verdict rests on: values that nobody measured on this machine, by how far each moves it.
+"""What a verdict rests on: values that were not measured on this machine, by how far each moves it.
 
-The deciding region, the one that comes nearest to a limit, is played again with each value moved by its stated
-uncertainty, or by what is usual where none is stated. That takes no more playbacks than the verdict itself.
+The deciding region, the one that comes nearest to a limit, is simulated again with each value moved by its stated
+uncertainty, or by what is usual where none is stated. That takes no more simulations than the verdict itself.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.settings.keys import KeyValue
-from shapegcode.verdict.case_player import case_figures
-from shapegcode.verdict.cases import Case, CaseFigures, Judged, RegionLimits, judge_region
+from shapegcode.verdict.cases import Case, CaseFigures, Judged, RegionLimits, case_figures, judge_region
 from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge, RegionFigures
 
@@ -26,8 +25,8 @@ LEAST_SHARE = 0.01
 """Of a limit: a value that moves its figure by less does not matter."""
 
 _MOST_SHOWN = 8
-_FREE_S = 60.0  # of motion: so much is always played
-_FULL_RUNS = 2  # about half as often as a verdict plays every region with its contour
+_FREE_S = 60.0  # of motion: so much is always simulated
+_FULL_RUNS = 2  # about half as often as a verdict simulates every region with its contour
 _FILTER_S = 0.024  # moving average of 1769 or 1622 on a machining centre, where the file says that there is none
 _MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # of an axis of a machining centre, where none is known
 _PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  # where no uncertainty is stated
@@ -35,7 +34,7 @@ _PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  
 
 @dataclass(frozen=True)
 class RestsOn:
-    """A value of the machine file that nobody measured, and what it would do to the verdict.
+    """A value of the machine file that was not measured, and what it would do to the verdict.
 
     Attributes:
         key: dotted name in the machine file.
@@ -84,7 +83,7 @@ Begun = Mapping[tuple[str, str], "Future[CaseFigures]"]
 
 @dataclass(frozen=True)
 class _Region:
-    """A region, how it is played, and what its figures are judged by."""
+    """A region, how it is simulated, and what its figures are judged by."""
 
     place: Placed
     emitted: Program
@@ -219,7 +218,7 @@ def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
 
 @dataclass(frozen=True)
 class UnknownAxis:
-    """An axis of which nobody knows whether it has a mode.
+    """An axis of which it is not known whether it has a mode.
 
     Attributes:
         value: its key of the machine file.
@@ -233,7 +232,7 @@ class UnknownAxis:
 
 
 def unknown_axes(machine: Machine) -> dict[str, UnknownAxis]:
-    """Axes of which nobody knows whether they have a mode, each with a usual one."""
+    """Axes of which it is not known whether they have a mode, each with a usual one."""
     values = {value.key: value for value in machine.values()}
     return {
         letter: UnknownAxis(
@@ -302,7 +301,7 @@ def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
 
 
 def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[RestsOn]:
-    """What was played anyway and counts for nothing: the other rule of block timing, look-ahead on, an empty buffer."""
+    """What was simulated anyway and does not count: the other rule of block timing, look-ahead on, an underrun."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
     for case, played in zip(region.judge.cases, figures.cases, strict=True):
         key, said = _key_of(case)

@@ -10,25 +10,23 @@ from shapegcode.comparison.result import KindCount, ProgramDifference
 from shapegcode.conversion.aims import ToleranceCurve, curve_table
 from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.operating import ControlNote, control_table, restart_table
-from shapegcode.conversion.rapids.shape import RapidsOutcome
 from shapegcode.conversion.recommendation import FilterAdvice, Grade
 from shapegcode.conversion.restart import RestartPoint
 from shapegcode.conversion.rests import RestsOn
 from shapegcode.conversion.tables import (
     BeforeAfter,
     CutOutcome,
+    RapidsOutcome,
     before_after_table,
     change_percent,
     cut_table,
     percent,
     rests_table,
 )
-from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.results.figures import CONTOURS, ContourError
-from shapegcode.results.json import exact, hidden, sparse
-from shapegcode.results.made import Made
+from shapegcode.results.json import Made, exact, hidden, sparse
 from shapegcode.results.page.model import Light, Page, Section
 from shapegcode.results.result import Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table
@@ -84,14 +82,13 @@ class Conversion(PlayedFigures, Result):
         budget: only under one: what it allowed, and what was given up for it.
         rapids: only where rapids may be shaped: what became of them.
         least_gain_um: what is too little.
-        rests_on: values that nobody measured on this machine, by how far each moves the deciding figure to its limit.
+        rests_on: values that were not measured on this machine, by how far each moves the deciding figure to its limit.
         unmeasured_tried: how many such values were moved.
         at_the_control: caution, before you run when it is loaded and run; empty where nothing was shaped.
         restart_points: blocks inside of shaped cuts at which the control can begin.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
-        model: the machine that it was played on.
-        played: original and emitted program, to play them again for a page.
+        played: a handle and no data: both programs and the machine, to simulate them again for a picture or a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool, "shaped_cuts_within": bool}
@@ -124,7 +121,6 @@ class Conversion(PlayedFigures, Result):
     restart_points: tuple[RestartPoint, ...] = ()
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
-    model: MachineModel = field(metadata=hidden())
     played: PlayedPrograms | None = field(default=None, compare=False, metadata=hidden())
 
     __eq__ = Result.__eq__
@@ -243,7 +239,7 @@ class Conversion(PlayedFigures, Result):
                     "--set power_on.units=G20 (inch) or G21 (mm), and write that code into it."
                 )
             if self.recommendation.startswith("already"):
-                return "run the program as it is; --shape-all shapes it all the same."
+                return "run the program as it is; --shape-all shapes it nevertheless."
             return "run the original program: nothing in it was shaped."
         if self.recommendation.startswith("no benefit"):
             return "run the original program: the shaped one brings no benefit."
@@ -385,7 +381,7 @@ class Conversion(PlayedFigures, Result):
             The page, as data.
 
         Raises:
-            MachineError, NumericError: a program cannot be played.
+            MachineError, NumericError: a program cannot be simulated.
         """
         page = super().page(**options)
         if page.scene is None or self.from_json:

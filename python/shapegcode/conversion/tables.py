@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from shapegcode import _core
 from shapegcode.conversion.rests import RestsOn
 from shapegcode.program import Program
-from shapegcode.results.result import Pair
+from shapegcode.results.result import Pair, Xyz
 from shapegcode.results.table import NO_BREAK, Column, Table
 from shapegcode.verdict.cases import unbroken
 from shapegcode.verdict.figures import RegionVerdict
@@ -79,7 +79,7 @@ def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
 
 
 def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
-    """The values that nobody measured on this machine and that the verdict rests on."""
+    """The values that were not measured on this machine and that the verdict rests on."""
     columns = (
         Column("key", left=True),
         Column("assumed → tested", value=_moved, text=True),
@@ -279,3 +279,53 @@ def tools_of_cuts(program: Program) -> Mapping[int, int]:
         elif kind == _core.StepKind.region and current >= 0:
             found[index] = current
     return found
+
+
+@dataclass(frozen=True)
+class RapidMove:
+    """A rapid that is a shaped cutting move now.
+
+    Attributes:
+        lines: of the original, first and last.
+        emitted_lines: of the emitted program.
+        time_s: until the set-points rest.
+        in_position_s: wait for in-position behind them.
+        settling_s: from the end of the set-points until the table stays within the band.
+        residual_vibration_um: largest |table - command| while the set-points rest.
+        residual_limit_um: what the emitted one is judged by.
+        misses: tolerances that it leaves; always empty: such a rapid is left unchanged.
+    """
+
+    lines: tuple[int, int]
+    emitted_lines: tuple[int, int]
+    time_s: Pair[float]
+    in_position_s: Pair[float]
+    settling_s: Pair[float]
+    residual_vibration_um: Pair[Xyz[float]]
+    residual_limit_um: Xyz[float]
+    misses: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RapidsOutcome:
+    """The rapids of a program: how many are shaped moves now, why the others stay, and what that saves.
+
+    Attributes:
+        found: rapids in the program.
+        shaped: of them, shaped moves now.
+        kept: how many stay, by reason.
+        time_saved_s: by which the table is ready for the next cuts sooner, in all.
+        settle_band_um: half the width of the band in which vibration counts as having decayed.
+        blocks: shaped blocks that replace them.
+        slowed_blocks: of these, such as step an axis by more than the corner limit of the look-ahead.
+        moves: those that are shaped.
+    """
+
+    found: int
+    shaped: int
+    kept: Mapping[str, int]
+    time_saved_s: float
+    settle_band_um: float
+    blocks: int
+    slowed_blocks: int
+    moves: tuple[RapidMove, ...]

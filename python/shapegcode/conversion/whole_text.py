@@ -11,9 +11,8 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad, keepable, measure_load
-from shapegcode.conversion.region_text import EmittedRegion, NoRoomError, RegionText, Room
 from shapegcode.conversion.restart import CutRestarts, FreeNumbers
-from shapegcode.conversion.write import RegionWriter
+from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionText, RegionWriter, Room
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
@@ -73,11 +72,11 @@ class Written:
         size: bytes of the whole text.
         placed: its shaped regions.
         blocks: shaped blocks in it.
-        kept_warnings: a sentence for every region that keeps its text.
+        kept_warnings: a sentence for every region that is left unchanged.
         planned_um: per index of a shaped region the deviation that its feed was planned for, µm, where the contour is
             kept by a target.
         loads: per index of a shaped region what it asks of memory, line and control.
-        no_room: per index of a region that was to be shaped and keeps its text why there is no room for it.
+        no_room: per index of a region that was to be shaped and is left unchanged why there is no room for it.
         unslowed: indices of shaped cuts that their contour tolerance does not slow.
         durations_s: per index of a shaped cut the time of its blocks.
         restarts: of each shaped region, as in `placed`.
@@ -236,7 +235,7 @@ class TextWriter:
             self._begun = None
             return begun
         regions = self._program.regions
-        # None may have more than the whole program; beside the others it may turn out to be too much all the same.
+        # None may have more than the whole program; beside the others it may turn out to be too much nevertheless.
         room = self._room(0, 0)
 
         def shaping(index: int, region: _core.Region, aim: Aim) -> Callable[[OnShare], EmittedRegion]:
@@ -270,7 +269,7 @@ class TextWriter:
             raise self._program.region_error(region, str(error)) from error
 
     def _keep(self, region: _core.Region, reason: str) -> str:
-        """The warning for a region that keeps its text."""
+        """The warning for a region that is left unchanged."""
         if not keepable(region, self._machine):
             raise self._program.region_error(
                 region, f"{reason}; its arcs have absolute centres and cannot be left unchanged"
@@ -307,7 +306,7 @@ def _lines(parts: Sequence[bytes]) -> int:
 
 
 def _aims(reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> dict[int, Aim]:
-    """For what each region that does not keep its text is shaped."""
+    """For what each region that is not left unchanged is shaped."""
     return {index: (room_um[index], feed_share[index]) for index, why in enumerate(reasons) if not why}
 
 

@@ -14,8 +14,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from shapegcode.errors import Problem, StockError
 from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTable, key
-from shapegcode.settings.load import parsed, read_text, validated
-from shapegcode.settings.problems import KeyProblem, line_of
+from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
 
 Range = tuple[Float, Float]
 Point = tuple[Float, Float]
@@ -32,9 +31,9 @@ def _ascends(table: TomlTable, *names: str) -> None:
 class Box(TomlTable):
     """A block."""
 
-    x_mm: Range = key("from ... to along X", unit="mm")
-    y_mm: Range = key("from ... to along Y", unit="mm")
-    z_mm: Range = key("bottom and top", unit="mm")
+    x_mm: Range = key("from ... to along X")
+    y_mm: Range = key("from ... to along Y")
+    z_mm: Range = key("bottom and top")
 
     @model_validator(mode="after")
     def _ordered(self) -> Box:
@@ -45,9 +44,9 @@ class Box(TomlTable):
 class Polygon(TomlTable):
     """A prism over a polygon."""
 
-    points_mm: Ring = key("corners [x, y] in order, three or more; the last is joined to the first", unit="mm")
-    holes_mm: tuple[Ring, ...] = key("holes that go through, each as its corners", unit="mm", default=())
-    z_mm: Range = key("bottom and top", unit="mm")
+    points_mm: Ring = key("corners [x, y] in order, three or more; the last is joined to the first")
+    holes_mm: tuple[Ring, ...] = key("holes that go through, each as its corners", default=())
+    z_mm: Range = key("bottom and top")
 
     @model_validator(mode="after")
     def _ordered(self) -> Polygon:
@@ -58,29 +57,26 @@ class Polygon(TomlTable):
 class Allowance(TomlTable):
     """What roughing left on the walls that this program finishes."""
 
-    allowance_mm: Positive = key("thickness that is left on the walls", unit="mm")
+    allowance_mm: Positive = key("thickness that is left on the walls")
     corner_radius_mm: NonNegative = key(
         "radius that roughing left in inside corners: that of the roughing tool, or of its path there; wider corners "
-        "keep their own. Not below the radius of the finishing tool",
-        unit="mm",
+        "keep their own. Not below the radius of the finishing tool"
     )
     wall: Literal["left", "right"] = key(
         "side of the tool's travel on which the wall of the part lies: right in climb milling with a clockwise "
         "spindle (as with G41), left in conventional milling"
     )
-    z_mm: Range = key("bottom and top", unit="mm")
+    z_mm: Range = key("bottom and top")
     width_mm: Positive = key(
         "how deep behind the finished wall the material is taken into account: more than the tool could gouge",
-        unit="mm",
         default=5.0,
     )
     lead_in_mm: NonNegative = key(
         "length of the travel before the wall begins, in each run of cutting moves that does not close upon itself "
         "(where one does, what leads to the closed contour is left out by itself)",
-        unit="mm",
         default=0.0,
     )
-    lead_out_mm: NonNegative = key("length of the travel behind the wall's end, likewise", unit="mm", default=0.0)
+    lead_out_mm: NonNegative = key("length of the travel behind the wall's end, likewise", default=0.0)
 
     @model_validator(mode="after")
     def _ordered(self) -> Allowance:

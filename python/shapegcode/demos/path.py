@@ -16,8 +16,7 @@ from shapegcode import _core
 from shapegcode.conversion.convert import convert
 from shapegcode.machine import Machine
 from shapegcode.machine.output import ANY_PRICE
-from shapegcode.model.controller import motion_limits
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, motion_limits
 from shapegcode.program import Program
 from shapegcode.results.figures import largest_xyz_um
 from shapegcode.results.result import Result, Xyz

@@ -14,8 +14,6 @@ from shapegcode.identification.prepared import Prepared, Refused
 from shapegcode.identification.quality import DECAYED, excited_hz, is_clipped, refuse_short
 from shapegcode.io.record import UNITS, FloatArray, Record
 
-__all__ = ["DOUBLE_HIT", "LEAST_FORCE", "LEAST_LEAD", "LEAST_PULSE", "prepare"]
-
 #: A second pulse above this share of the first is refused: the momentum, and so the mass, would be off by as much.
 #: Below, it may be the ringing of an anti-aliasing filter, which reaches 9 %.
 DOUBLE_HIT = 0.1

@@ -14,8 +14,6 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.spectra import decay_spectrum
 from shapegcode.io.record import FloatArray, Record
 
-__all__ = ["find_decay"]
-
 #: The envelope is the RMS over so many periods of the slowest mode, and over a beat of the two closest modes.
 _ENVELOPE_PERIODS = 2.0
 #: While the modes are not known, it is the RMS over this share of the record, at least.
@@ -102,17 +100,11 @@ def _longest(envelope: FloatArray) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class _Scales:
-    """Of the modes in the tail of a decay, in samples.
+    """Of the modes in the tail of a decay, in samples."""
 
-    Attributes:
-        slowest: period of the slowest mode.
-        strongest: period of the strongest.
-        window: over which the envelope is smooth.
-    """
-
-    slowest: float
-    strongest: float
-    window: float
+    slowest: float  # period of the slowest mode
+    strongest: float  # period of the strongest
+    window: float  # over which the envelope is smooth
 
 
 def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_samples: float) -> _Scales:

@@ -22,8 +22,6 @@ from shapegcode.io.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
-__all__ = ["find_modes"]
-
 _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white
 _SPECTRUM = 4096  # points of the force's transform
 _FOLDED = 2.0 / 3.0

@@ -24,8 +24,6 @@ from shapegcode.identification.support import (
 )
 from shapegcode.io.frequency_response import FrequencyResponse
 
-__all__ = ["find_frf_modes"]
-
 #: A resonance narrower than so many distances of two lines tells its damping by its window, not by its structure.
 _LEAST_WIDTH = 1.0
 _ROUNDS = 2  # of weights taken from what the model leaves

@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 
-__all__ = ["POWERS", "FrfFit", "FrfLines", "fit_frf", "mode_columns"]
-
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -26,52 +24,30 @@ _LEAST_DAMPING, _MOST_DAMPING = 1e-6, 0.99
 
 @dataclass(frozen=True, eq=False)
 class FrfLines:
-    """Lines of one or several frequency responses of a point, one behind another.
+    """Lines of one or several frequency responses of a point, one behind another."""
 
-    Attributes:
-        omega: (n,) rad/s.
-        response: (n,) complex, SI over N.
-        weight: (n,) 1 over the noise's standard deviation, up to a common factor.
-        quantity: what was divided by the force.
-        below: a free mass stands for the modes below the lines.
-        above: a spring without mass stands for those above.
-    """
-
-    omega: FloatArray
-    response: ComplexArray
-    weight: FloatArray
-    quantity: str
-    below: bool
-    above: bool
+    omega: FloatArray  # (n,) rad/s
+    response: ComplexArray  # (n,) complex, SI over N
+    weight: FloatArray  # (n,) 1 over the noise's standard deviation, up to a common factor
+    quantity: str  # what was divided by the force
+    below: bool  # a free mass stands for the modes below the lines
+    above: bool  # a spring without mass stands for those above
 
 
 @dataclass(frozen=True, eq=False)
 class FrfFit:
-    """Result of `fit_frf`, with the names of the core's fits.
+    """Result of `fit_frf`, with the names of the core's fits."""
 
-    Attributes:
-        omega_rad_s: (m,) undamped natural frequencies.
-        damping_ratio: (m,).
-        inverse_mass: (m,) residues 1/m in 1/kg.
-        covariance: (3m, 3m) of omega, zeta, 1/m of the first mode, then of the second, ...
-        sum_of_squares: of the weighted residuals.
-        samples: real and imaginary parts together.
-        parameters: fitted ones.
-        residual_autocorrelation: of the weighted residuals between neighbouring lines.
-        fitted: the model's lines, (n,) complex.
-        converged: whether a minimum was found.
-    """
-
-    omega_rad_s: FloatArray
-    damping_ratio: FloatArray
-    inverse_mass: FloatArray
-    covariance: FloatArray
-    sum_of_squares: float
-    samples: int
-    parameters: int
-    residual_autocorrelation: float
-    fitted: list[ComplexArray]
-    converged: bool
+    omega_rad_s: FloatArray  # (m,) undamped natural frequencies
+    damping_ratio: FloatArray  # (m,)
+    inverse_mass: FloatArray  # (m,) residues 1/m in 1/kg
+    covariance: FloatArray  # (3m, 3m) of omega, zeta, 1/m of the first mode, then of the second,
+    sum_of_squares: float  # of the weighted residuals
+    samples: int  # real and imaginary parts together
+    parameters: int  # fitted ones
+    residual_autocorrelation: float  # of the weighted residuals between neighbouring lines
+    fitted: list[ComplexArray]  # the model's lines, (n,) complex
+    converged: bool  # whether a minimum was found
 
 
 def mode_columns(

@@ -15,8 +15,6 @@ from shapegcode.identification.frf_model import POWERS, FrfFit, FrfLines, fit_fr
 from shapegcode.identification.model_search import Fit, Starts, starts_of
 from shapegcode.io.frequency_response import FrequencyResponse
 
-__all__ = ["FrfProblem", "frf_problem_of"]
-
 FloatArray = npt.NDArray[np.float64]
 
 _STEPS, _QUICK_STEPS = 60, 15
@@ -35,23 +33,14 @@ _THIRD_DIFFERENCE = 20.0
 
 @dataclass(frozen=True, eq=False)
 class FrfProblem:
-    """Lines of frequency responses of one point, as a search wants them.
+    """Lines of frequency responses of one point, as a search wants them."""
 
-    Attributes:
-        lines: of all responses, one behind another.
-        counts: lines of each response.
-        band_hz: modes are looked for in it.
-        resolution_hz: usual distance of two lines.
-        white_share: of the lines, how many are independent.
-        noise_correlation: that of white noise.
-    """
-
-    lines: FrfLines
-    counts: tuple[int, ...]
-    band_hz: tuple[float, float]
-    resolution_hz: float
-    white_share: float = 1.0
-    noise_correlation: float = 0.0
+    lines: FrfLines  # of all responses, one behind another
+    counts: tuple[int, ...]  # lines of each response
+    band_hz: tuple[float, float]  # modes are looked for in it
+    resolution_hz: float  # usual distance of two lines
+    white_share: float = 1.0  # of the lines, how many are independent
+    noise_correlation: float = 0.0  # that of white noise
 
     @property
     def squares(self) -> float:

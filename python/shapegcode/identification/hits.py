@@ -8,8 +8,6 @@ import numpy as np
 
 from shapegcode.io.record import FloatArray, Record
 
-__all__ = ["Hit", "find_hits", "robust_sigma", "split_hits"]
-
 #: A pulse ends where it falls below this share of its peak; a half sine has then lost 0.01 % of its momentum.
 _PULSE_ENDS = 0.01
 #: ... or into the noise, so many standard deviations.
@@ -35,23 +33,14 @@ _MAD = 1.4826
 
 @dataclass(frozen=True)
 class Hit:
-    """One hit of the hammer.
+    """One hit of the hammer."""
 
-    Attributes:
-        first: first sample of the pulse.
-        peak: sample of its largest force.
-        end: first sample after the pulse.
-        peak_n: largest force over the offset; negative where the force is.
-        second_share: largest later pulse before the next hit, as a share of this one; 0: none.
-        second_s: how long after this one it comes.
-    """
-
-    first: int
-    peak: int
-    end: int
-    peak_n: float
-    second_share: float = 0.0
-    second_s: float = 0.0
+    first: int  # first sample of the pulse
+    peak: int  # sample of its largest force
+    end: int  # first sample after the pulse
+    peak_n: float  # largest force over the offset; negative where the force is
+    second_share: float = 0.0  # largest later pulse before the next hit, as a share of this one; 0: none
+    second_s: float = 0.0  # how long after this one it comes
 
 
 def robust_sigma(values: FloatArray) -> float:

@@ -19,12 +19,10 @@ from shapegcode.identification.support import ACCEPTED_PERCENT
 from shapegcode.identification.sweep import find_swept_modes
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse
-from shapegcode.io.klipper import is_klipper, read_sweep
-from shapegcode.io.read import ReadOptions, read_measurement
-from shapegcode.io.record import Quantity, Record
+from shapegcode.io.read import read_measurement
+from shapegcode.io.record import Quantity, ReadOptions, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
-
-__all__ = ["MOST_MODES", "identify"]
+from shapegcode.io.taps import is_klipper, read_sweep
 
 MOST_MODES = 8
 """Largest number of modes that is tried unless asked otherwise."""

@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["Estimate", "IdentifiedMode", "estimate_cell", "mode_line"]
-
 
 @dataclass(frozen=True)
 class Estimate:

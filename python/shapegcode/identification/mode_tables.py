@@ -27,8 +27,6 @@ from shapegcode.settings.edit import (
 from shapegcode.settings.keys import toml
 from shapegcode.settings.remarks import remarks_of, with_origin_table
 
-__all__ = ["ModeTables"]
-
 _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
 _SUM_SLACK = 1e-3  # of the participations: rounding
@@ -44,11 +42,7 @@ _KEYS = (
 
 
 class ModeTables:
-    """The modes of one axis in the text of a machine file.
-
-    Attributes:
-        notes: what was replaced, kept, removed and added, one sentence each.
-    """
+    """The modes of one axis in the text of a machine file."""
 
     def __init__(self, text: str, axis: str, source: str, file: str) -> None:
         """Find them."""
@@ -58,7 +52,7 @@ class ModeTables:
         self.document = parse_exactly(text + self._last_end, file)
         self.data: dict[str, Any] = tomllib.loads(text)
         self.axis, self.source, self.file = axis, source, file
-        self.notes: list[str] = []
+        self.notes: list[str] = []  # what was replaced, kept, removed and added, one sentence each
         self._gap: list[Entry] = []  # the blank line behind the first table, if that went
         self.name = f"axes.{self.axis}.modes"
         self.old: list[dict[str, Any]] = list(self.data["axes"][self.axis].get("modes", []))

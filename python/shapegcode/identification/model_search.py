@@ -73,16 +73,12 @@ class FitProblem(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Models by number of modes.
+    """Models by number of modes."""
 
-    Attributes:
-        fits: the best fit of each number of modes, from 1.
-        evidence: by number of modes, from 0: samples * ln(mean square of the residual) + (parameters + modes) *
-            ln(samples); lower is better. One more than the parameters is counted for each mode, because its place was
-            looked for among all frequencies.
-    """
-
-    fits: tuple[Fit, ...]
+    fits: tuple[Fit, ...]  # the best fit of each number of modes, from 1
+    # by number of modes, from 0: samples * ln(mean square of the residual) + (parameters + modes) * ln(samples);
+    # lower is better. One more than the parameters is counted for each mode, because its place was looked for
+    # among all frequencies
     evidence: tuple[float, ...]
 
     @property

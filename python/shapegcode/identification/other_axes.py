@@ -10,8 +10,6 @@ from shapegcode.identification.mode_tables import ModeTables
 from shapegcode.machine import Machine, check_axes
 from shapegcode.settings.remarks import with_remarks
 
-__all__ = ["decide_axes", "open_modes", "require_decisions"]
-
 _KEPT = ", kept"
 _ORIGIN = re.compile(r"^(from [^:]*|assumed|not known|not measured)")
 

@@ -9,8 +9,6 @@ from scipy.optimize import linear_sum_assignment
 
 from shapegcode.identification.mode import IdentifiedMode
 
-__all__ = ["SAME_MODE", "matches", "shares_of"]
-
 SAME_MODE = 0.1
 """Two frequencies, relative to the old one, within which a mode is taken as the one that the file has."""
 

@@ -15,8 +15,6 @@ from shapegcode.machine import Machine
 if TYPE_CHECKING:
     from shapegcode.machine import Axis
 
-__all__ = ["rapid_stop_program", "recording_for", "tap_plan"]
-
 #: Modes of a machining centre that its own motion excites, Hz; for a plan without a machine file.
 _USUAL_HZ = (20.0, 200.0)
 #: Damping ratio where none is known: welded and cast structures with guides have 0.01 to 0.05.

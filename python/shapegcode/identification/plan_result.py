@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-__all__ = ["AxisRecording", "RapidStop", "TapPlan"]
-
 
 @dataclass(frozen=True)
 class AxisRecording:

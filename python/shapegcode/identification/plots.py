@@ -20,16 +20,6 @@ from shapegcode.results.result import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "plot_decay",
-    "plot_response",
-    "plot_spectrum",
-    "plot_stabilisation",
-    "plot_sweep",
-    "plot_traces",
-    "plots_of",
-]
-
 _MOST_TRACES = 3
 _SEEN = 0.02
 _ROOM = 2.5

@@ -17,8 +17,6 @@ from shapegcode.identification.thinning import FLAT, Thinned, are_blows, highest
 
 FloatArray = npt.NDArray[np.float64]
 
-__all__ = ["HIGHEST_SHARE", "Decays", "Taps", "problem_of"]
-
 #: Of the sampling rate: the force between samples is known up to there.
 HIGHEST_SHARE = 0.45
 _STEPS = 60  # of a fit
@@ -79,31 +77,18 @@ class _OverTime:
 
 @dataclass(frozen=True, eq=False)
 class Taps(_OverTime):
-    """Records with force.
+    """Records with force."""
 
-    Attributes:
-        forces: (n,) each, N.
-        responses: (n,) each, in the unit of the quantity.
-        period_s: time between two samples.
-        band_hz: modes are looked for in it.
-        quantity: what the sensor measured.
-        force_noise_n: RMS of the force off the pulse.
-        hold: course of the force between samples: "band_limited", "linear" or "impulse".
-        thinned: what was thinned out before the fit; None: every sample is fitted.
-        begun: the record begins within the pulse.
-        widened: what intervals are multiplied with; see `Record`.
-    """
-
-    forces: list[FloatArray]
-    responses: list[FloatArray]
-    period_s: float
-    band_hz: tuple[float, float]
-    quantity: str
-    force_noise_n: float
-    hold: str
-    thinned: Thinned | None = None
-    begun: bool = False
-    widened: float = 1.0
+    forces: list[FloatArray]  # (n,) each, N
+    responses: list[FloatArray]  # (n,) each, in the unit of the quantity
+    period_s: float  # time between two samples
+    band_hz: tuple[float, float]  # modes are looked for in it
+    quantity: str  # what the sensor measured
+    force_noise_n: float  # RMS of the force off the pulse
+    hold: str  # course of the force between samples: "band_limited", "linear" or "impulse"
+    thinned: Thinned | None = None  # what was thinned out before the fit; None: every sample is fitted
+    begun: bool = False  # the record begins within the pulse
+    widened: float = 1.0  # what intervals are multiplied with; see `Record`
 
     @property
     def white_share(self) -> float:
@@ -190,21 +175,13 @@ class Taps(_OverTime):
 
 @dataclass(frozen=True, eq=False)
 class Decays(_OverTime):
-    """Records without force.
+    """Records without force."""
 
-    Attributes:
-        responses: (n,) each.
-        period_s: time between two samples.
-        band_hz: modes are looked for in it.
-        white_share: of the samples, how many are independent.
-        noise_correlation: none.
-    """
-
-    responses: list[FloatArray]
-    period_s: float
-    band_hz: tuple[float, float]
-    white_share: float = 1.0
-    noise_correlation: float = 0.0
+    responses: list[FloatArray]  # (n,) each
+    period_s: float  # time between two samples
+    band_hz: tuple[float, float]  # modes are looked for in it
+    white_share: float = 1.0  # of the samples, how many are independent
+    noise_correlation: float = 0.0  # none
 
     def fit(self, starts: Starts, coloured: bool = False) -> _core.DecayFit:
         """The best model near some modes, its residual white or coloured."""

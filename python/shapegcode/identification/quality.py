@@ -11,8 +11,6 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.spectra import decay_spectrum
 from shapegcode.io.record import FloatArray, Record
 
-__all__ = ["DECAYED", "EXCITED_HALF_SINE", "FOLDING", "LEAST_PERIODS", "excited_hz", "is_clipped", "refuse_short"]
-
 #: So many equal extreme samples on end may be an overload; two can lie on either side of a smooth peak.
 _CLIPPED_RUN = 3
 #: Values closer than this share of the range are equal: converters with filters do not clip to one value.

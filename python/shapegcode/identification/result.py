@@ -20,26 +20,16 @@ from shapegcode.results.table import Column, Table
 
 FloatArray = npt.NDArray[np.float64]
 
-__all__ = ["ChartPole", "Identification", "MachineFile", "MassCheck", "RecordUse", "Sweep", "reason_for"]
-
 
 @dataclass(frozen=True)
 class ChartPole:
-    """A pole of the stabilisation chart.
+    """A pole of the stabilisation chart."""
 
-    Attributes:
-        order: number of modes of the model that it belongs to.
-        frequency_hz: undamped natural frequency.
-        damping_ratio: of the pole.
-        stable_frequency: the model one order lower has it too, within 1 %.
-        stable_damping: and within 5 % of the damping ratio.
-    """
-
-    order: int
-    frequency_hz: float
-    damping_ratio: float
-    stable_frequency: bool
-    stable_damping: bool
+    order: int  # number of modes of the model that it belongs to
+    frequency_hz: float  # undamped natural frequency
+    damping_ratio: float  # of the pole
+    stable_frequency: bool  # the model one order lower has it too, within 1 %
+    stable_damping: bool  # and within 5 % of the damping ratio
 
 
 @dataclass(frozen=True)
@@ -91,25 +81,15 @@ class RecordUse:
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What a sweep without force showed.
+    """What a sweep without force showed."""
 
-    Attributes:
-        source: of the record.
-        axis: "x", "y" or "z"; None: not known.
-        samples: that were recorded.
-        period_s: time between two samples.
-        frequency_hz: (n,) middles of the bins.
-        amplitude: (n,) of the response over the command's course, any unit.
-        fitted: (n,) of the model.
-    """
-
-    source: str
-    axis: str | None
-    samples: int
-    period_s: float
-    frequency_hz: FloatArray
-    amplitude: FloatArray
-    fitted: FloatArray
+    source: str  # of the record
+    axis: str | None  # "x", "y" or "z"; None: not known
+    samples: int  # that were recorded
+    period_s: float  # time between two samples
+    frequency_hz: FloatArray  # (n,) middles of the bins
+    amplitude: FloatArray  # (n,) of the response over the command's course, any unit
+    fitted: FloatArray  # (n,) of the model
 
 
 @dataclass(frozen=True)

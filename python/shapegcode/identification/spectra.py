@@ -12,8 +12,6 @@ from scipy import fft, signal
 from shapegcode.errors import RecordError
 from shapegcode.io.record import FloatArray, Record
 
-__all__ = ["Envelope", "Frf", "Peak", "Spectrum", "decay_spectrum", "envelope", "frf", "mode_envelopes"]
-
 ComplexArray = npt.NDArray[np.complex128]
 
 #: A peak counts above this share of the largest (-40 dB) ...
@@ -32,23 +30,14 @@ _BAND_ORDER = 2
 
 @dataclass(frozen=True, eq=False)
 class Frf:
-    """Frequency response of several taps of the same point.
+    """Frequency response of several taps of the same point."""
 
-    Attributes:
-        frequency_hz: (m,), from 0 to half the sampling rate.
-        response: (m,) complex, H1: response over force, in the unit of the response per N.
-        coherence: (m,) 0 to 1; None: one tap, whose coherence is 1 whatever it holds.
-        force_spectrum: (m,) energy spectral density of the force, mean of the taps, (N·s)².
-        response_spectrum: (m,) of the response, (unit·s)².
-        taps: number of taps.
-    """
-
-    frequency_hz: FloatArray
-    response: ComplexArray
-    coherence: FloatArray | None
-    force_spectrum: FloatArray
-    response_spectrum: FloatArray
-    taps: int
+    frequency_hz: FloatArray  # (m,), from 0 to half the sampling rate
+    response: ComplexArray  # (m,) complex, H1: response over force, in the unit of the response per N
+    coherence: FloatArray | None  # (m,) 0 to 1; None: one tap, whose coherence is 1 whatever it holds
+    force_spectrum: FloatArray  # (m,) energy spectral density of the force, mean of the taps, (N·s)²
+    response_spectrum: FloatArray  # (m,) of the response, (unit·s)²
+    taps: int  # number of taps
 
 
 def frf(records: Sequence[Record]) -> Frf:
@@ -90,36 +79,22 @@ def frf(records: Sequence[Record]) -> Frf:
 
 @dataclass(frozen=True)
 class Peak:
-    """A peak of a spectrum.
+    """A peak of a spectrum."""
 
-    Attributes:
-        frequency_hz: of its top, between the points of the spectrum.
-        amplitude: there.
-        label: for the picture, such as "46.0 Hz".
-    """
-
-    frequency_hz: float
-    amplitude: float
-    label: str
+    frequency_hz: float  # of its top, between the points of the spectrum
+    amplitude: float  # there
+    label: str  # for the picture, such as "46.0 Hz"
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Amplitude spectrum of a decay.
+    """Amplitude spectrum of a decay."""
 
-    Attributes:
-        frequency_hz: (m,), from 0 to half the sampling rate.
-        amplitude: (m,) in the unit of the response: the amplitude of a steady sine that would give the same.
-        peaks: the largest first.
-        window: what the samples were multiplied by.
-        resolution_hz: 1 / duration: peaks closer than this are one.
-    """
-
-    frequency_hz: FloatArray
-    amplitude: FloatArray
-    peaks: tuple[Peak, ...]
-    window: str
-    resolution_hz: float
+    frequency_hz: FloatArray  # (m,), from 0 to half the sampling rate
+    amplitude: FloatArray  # (m,) in the unit of the response: the amplitude of a steady sine that would give the same
+    peaks: tuple[Peak, ...]  # the largest first
+    window: str  # what the samples were multiplied by
+    resolution_hz: float  # 1 / duration: peaks closer than this are one
 
 
 def decay_spectrum(record: Record) -> Spectrum:
@@ -165,19 +140,12 @@ def _peaks(frequency: FloatArray, amplitude: FloatArray, resolution_hz: float) -
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
-    """A response within a band, and its envelope.
+    """A response within a band, and its envelope."""
 
-    Attributes:
-        time_s: (n,).
-        response: (n,) within the band, without phase shift, in the unit of the record.
-        envelope: (n,) magnitude of the analytic signal.
-        band_hz: limits of the band; None: the whole response.
-    """
-
-    time_s: FloatArray
-    response: FloatArray
-    envelope: FloatArray
-    band_hz: tuple[float, float] | None
+    time_s: FloatArray  # (n,)
+    response: FloatArray  # (n,) within the band, without phase shift, in the unit of the record
+    envelope: FloatArray  # (n,) magnitude of the analytic signal
+    band_hz: tuple[float, float] | None  # limits of the band; None: the whole response
 
 
 def envelope(record: Record, band_hz: tuple[float, float] | None = None) -> Envelope:

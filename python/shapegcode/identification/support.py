@@ -32,57 +32,34 @@ _SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
 
 @dataclass(frozen=True)
 class Estimates:
-    """One mode of a fit. SI units; the last three are None for a free decay.
+    """One mode of a fit. SI units; the last three are None for a free decay."""
 
-    Attributes:
-        frequency_hz: undamped natural frequency.
-        damping_ratio: no unit.
-        mass_kg: equivalent mass.
-        damping_n_s_per_m: equivalent viscous damping.
-        stiffness_n_per_m: equivalent stiffness.
-        opposed: the residue is negative: the mode moves against the push.
-    """
-
-    frequency_hz: Estimate
-    damping_ratio: Estimate
-    mass_kg: Estimate | None
-    damping_n_s_per_m: Estimate | None
-    stiffness_n_per_m: Estimate | None
-    opposed: bool = False
+    frequency_hz: Estimate  # undamped natural frequency
+    damping_ratio: Estimate  # no unit
+    mass_kg: Estimate | None  # equivalent mass
+    damping_n_s_per_m: Estimate | None  # equivalent viscous damping
+    stiffness_n_per_m: Estimate | None  # equivalent stiffness
+    opposed: bool = False  # the residue is negative: the mode moves against the push
 
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """Another model that the data do not clearly refuse.
+    """Another model that the data do not clearly refuse."""
 
-    Attributes:
-        fit: of the same records.
-        condition: under which it would be the right one.
-        remedy: what would decide.
-    """
-
-    fit: Fit
-    condition: str
-    remedy: str
+    fit: Fit  # of the same records
+    condition: str  # under which it would be the right one
+    remedy: str  # what would decide
 
 
 @dataclass(frozen=True, eq=False)
 class Doubts:
-    """What a mode must stand up to.
+    """What a mode must stand up to."""
 
-    Attributes:
-        limit_percent: least certainty of damping ratio and stiffness.
-        band_hz: frequencies that were searched.
-        record_s: length of the longest record.
-        rivals: models of nearly the same evidence.
-        aliased: see `estimates_of`.
-    """
-
-    limit_percent: float
-    band_hz: tuple[float, float]
-    record_s: float
-    rivals: Sequence[Rival] = ()
-    aliased: Callable[[float], float] = lambda _hz: 0.0
+    limit_percent: float  # least certainty of damping ratio and stiffness
+    band_hz: tuple[float, float]  # frequencies that were searched
+    record_s: float  # length of the longest record
+    rivals: Sequence[Rival] = ()  # models of nearly the same evidence
+    aliased: Callable[[float], float] = lambda _hz: 0.0  # see `estimates_of`
 
 
 def estimates_of(

@@ -20,8 +20,6 @@ from shapegcode.identification.mode import Estimate, IdentifiedMode
 from shapegcode.identification.result import Identification, Sweep, reason_for
 from shapegcode.io.record import Record
 
-__all__ = ["SWEPT_HZ", "find_swept_modes"]
-
 FloatArray = npt.NDArray[np.float64]
 
 #: What Klipper sweeps unless told otherwise is 5 to 133 Hz; its ends are no steady sweep.

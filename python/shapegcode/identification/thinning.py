@@ -12,8 +12,6 @@ from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.spectra import decay_spectrum
 from shapegcode.io.record import FloatArray, Record
 
-__all__ = ["FLAT", "Thinned", "are_blows", "highest_of_interest_hz", "thin"]
-
 #: Of the new sampling rate: the filter is flat up to here ...
 FLAT = 0.35
 #: ... and has fallen to -80 dB at half of it, as the filters of recorders do.
@@ -30,30 +28,19 @@ _GRID = 8  # points of the filter's transform per tap
 
 @dataclass(frozen=True, eq=False)
 class Thinned:
-    """Taps with fewer samples.
+    """Taps with fewer samples."""
 
-    Attributes:
-        responses: (n,) each.
-        forces: (n,) each, of a recorder's force.
-        straight: (n,) each, of a force that runs straight from sample to sample.
-        period_s: time between two samples.
-        factor: of how many samples one is left.
-        white_share: share of the band up to half the new rate that the filter lets pass, in power: what is left of
-            white noise.
-        noise_correlation: between two samples on end of white noise behind the filter.
-        force_noise: noise per sample of the pulse, as a share of what it was: the pulse's momentum is known as before.
-        first_s: time of the first new sample after that of the old first, per record; negative: before it.
-    """
-
-    responses: list[FloatArray]
-    forces: list[FloatArray]
-    straight: list[FloatArray]
-    period_s: float
-    factor: int
+    responses: list[FloatArray]  # (n,) each
+    forces: list[FloatArray]  # (n,) each, of a recorder's force
+    straight: list[FloatArray]  # (n,) each, of a force that runs straight from sample to sample
+    period_s: float  # time between two samples
+    factor: int  # of how many samples one is left
+    # share of the band up to half the new rate that the filter lets pass, in power: what is left of white noise
     white_share: float
-    noise_correlation: float
+    noise_correlation: float  # between two samples on end of white noise behind the filter
+    # noise per sample of the pulse, as a share of what it was: the pulse's momentum is known as before
     force_noise: float
-    first_s: list[float]
+    first_s: list[float]  # time of the first new sample after that of the old first, per record; negative: before it
 
 
 def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:

@@ -14,8 +14,6 @@ from shapegcode.identification.result import Identification, MachineFile
 from shapegcode.machine import Machine
 from shapegcode.settings.load import read_text
 
-__all__ = ["MachineUpdate", "check_updatable", "update_machine", "update_machine_file", "update_modes"]
-
 
 @dataclass(frozen=True)
 class MachineUpdate:

@@ -13,16 +13,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = [
-    "is_temporary",
-    "named_errors",
-    "replaced_file",
-    "write_bytes",
-    "write_in_passing",
-    "write_lines",
-    "write_text",
-]
-
 _passing = False
 _LONGEST_NAME = 200  # of a file, so that more has room behind it
 

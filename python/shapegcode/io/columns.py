@@ -15,22 +15,14 @@ from typing import Literal
 from shapegcode.errors import RecordError
 from shapegcode.io.units import Measured, Unit, find_unit, is_foreign_unit, units_of
 
-__all__ = ["Label", "Meaning", "Names", "read_label", "tap_label", "unit_of", "words_of"]
-
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name stands for.
+    """What a name stands for."""
 
-    Attributes:
-        what: the quantity under the name that the reader of the file gives it, such as "fx".
-        measures: its kind; "response" for a response of unknown kind.
-        axis: "x", "y" or "z"; None: no axis.
-    """
-
-    what: str
-    measures: Measured | Literal["response"]
-    axis: str | None = None
+    what: str  # the quantity under the name that the reader of the file gives it, such as "fx"
+    measures: Measured | Literal["response"]  # its kind; "response" for a response of unknown kind
+    axis: str | None = None  # "x", "y" or "z"; None: no axis
 
 
 Names = Callable[[str], Meaning | None]
@@ -39,19 +31,12 @@ Names = Callable[[str], Meaning | None]
 
 @dataclass(frozen=True)
 class Label:
-    """What a column's or a channel's label says.
+    """What a column's or a channel's label says."""
 
-    Attributes:
-        text: the label.
-        meaning: None where it says nothing.
-        unit: where it is known.
-        unknown_unit: text where a unit stands that is not known.
-    """
-
-    text: str
-    meaning: Meaning | None
-    unit: Unit | None
-    unknown_unit: str = ""
+    text: str  # the label
+    meaning: Meaning | None  # None where it says nothing
+    unit: Unit | None  # where it is known
+    unknown_unit: str = ""  # text where a unit stands that is not known
 
     @property
     def measures(self) -> Measured | Literal["response"] | None:

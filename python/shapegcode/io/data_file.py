@@ -22,8 +22,6 @@ from typing import Any, BinaryIO, Self, cast
 from shapegcode.errors import ArgumentError, RecordError, ShapegcodeError
 from shapegcode.io.atomic import named_errors
 
-__all__ = ["MAX_DEPTH", "MAX_SETTINGS_BYTES", "MAX_TEXT_BYTES", "DataFile", "open_file", "read_file", "toml_tables"]
-
 MAX_DEPTH = 64
 """Lists and tables within each other."""
 MAX_TEXT_BYTES = 1 << 20
@@ -98,19 +96,13 @@ def read_file(path: str | Path, most: int = _MAX_BYTES) -> bytes:
 
 
 class DataFile:
-    """One file that is read, plain or packed, and how much of its limits is used up.
-
-    Attributes:
-        path: of the file.
-        size: on the disk, bytes.
-        kind: "gzip", "zip", or "" where it is not packed.
-    """
+    """One file that is read, plain or packed, and how much of its limits is used up."""
 
     def __init__(self, path: str | Path, fault: Fault = RecordError) -> None:
         """Open it."""
         self.path, self._fault = Path(path), fault
         self._file = open_file(path)
-        self.size = os.fstat(self._file.fileno()).st_size
+        self.size = os.fstat(self._file.fileno()).st_size  # on the disk, bytes
         head = self._file.read(4)
         self._file.seek(0)
         self.kind = "gzip" if head[:2] == _GZIP else "zip" if head == _ZIP else ""

@@ -12,8 +12,6 @@ import numpy.typing as npt
 
 from shapegcode.errors import RecordError
 
-__all__ = ["EdgeAxis", "EdgeBlock", "EdgeCall", "EdgeCapture", "EdgeGap", "EdgeValue"]
-
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 

@@ -8,20 +8,258 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import DataFile
-from shapegcode.io.edge_capture import EdgeAxis, EdgeCapture, EdgeGap
-from shapegcode.io.edge_events import EVENTS, Events, key_of
-from shapegcode.io.edge_rows import Rows, read_rows
+from shapegcode.io.edge_capture import EdgeAxis, EdgeBlock, EdgeCall, EdgeCapture, EdgeGap, EdgeValue
+from shapegcode.io.run_tracks import RunLog, Signal
 
-__all__ = ["is_edge_json", "read_edge_json"]
+FloatArray = npt.NDArray[np.float64]
+_FEWEST = 2
+_LARGEST = 1e12
+_NUMBERS = {int, float, type(None)}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Samples."""
+
+    counter: npt.NDArray[np.int64]  # (n,) rising
+    columns: Mapping[str, FloatArray]  # (n,) by address, without the counter
+    notes: tuple[str, ...]  # what was left out
+
+
+def read_rows(source: str, addresses: tuple[str, ...], files: Iterable[tuple[str, list[Any]]]) -> Rows:
+    """Join the rows of all entries "HFData"."""
+    pieces: list[FloatArray] = []
+    places: list[str] = []  # of each piece, for messages
+    for name, payload in files:
+        for index, entry in enumerate(payload):
+            if "HFData" not in entry:
+                continue
+            where = f"{name}: Payload[{index}].HFData"
+            piece = _numbers(where, entry["HFData"], addresses)
+            if len(piece):
+                pieces.append(piece)
+                places.append(where)
+    if sum(map(len, pieces)) < _FEWEST:
+        raise RecordError(f"{source}: the Payload holds {sum(map(len, pieces))} rows of HFData: at least 2 are needed")
+    values = np.concatenate(pieces)
+    starts = np.cumsum([0, *(len(piece) for piece in pieces)])
+    counter, kept, notes = _counters(values, addresses.index("CYCLE"), places, starts)
+    columns: dict[str, FloatArray] = {}
+    for place, address in enumerate(addresses):
+        if address == "CYCLE":
+            continue
+        columns[address] = column = np.ascontiguousarray(values[kept, place])
+        missing = np.flatnonzero(np.isnan(column))
+        if missing.size:
+            rest = (
+                "no value at all"
+                if missing.size == len(column)
+                else f"no value in {missing.size} of {len(column)} samples"
+            )
+            notes.append(f"{address}: {rest}, the first at counter {counter[missing[0]]}")
+    return Rows(counter, columns, tuple(notes))
+
+
+def _numbers(where: str, rows: Any, addresses: tuple[str, ...]) -> FloatArray:
+    """(rows, signals) numbers of one entry; NaN for null."""
+    if not isinstance(rows, list):
+        raise RecordError(f"{where} = {str(rows)[:40]!r}: must be a list of rows")
+    for index, row in enumerate(rows):
+        if not isinstance(row, list) or len(row) != len(addresses):
+            found = f"{len(row)} values" if isinstance(row, list) else repr(str(row)[:40])
+            raise RecordError(
+                f"{where}[{index}] has {found}: SignalListHFData lists {len(addresses)} signals, and each row has one "
+                "value of each"
+            )
+        if not set(map(type, row)) <= _NUMBERS:
+            place = next(at for at, value in enumerate(row) if type(value) not in _NUMBERS)
+            raise RecordError(f"{where}[{index}]: {addresses[place]} = {row[place]!r}: must be a number")
+    try:
+        values: FloatArray = np.array(rows, dtype=np.float64).reshape(len(rows), len(addresses))
+    except OverflowError as error:
+        raise RecordError(f"{where}: a number is too large: {error}") from error
+    wild = np.argwhere(np.abs(values) > _LARGEST)
+    if len(wild):
+        at, place = wild[0]
+        raise RecordError(
+            f"{where}[{at}]: {addresses[place]} = {values[at, place]:g}: must be finite and at most {_LARGEST:g}"
+        )
+    return values
+
+
+def _counters(
+    values: FloatArray, place: int, places: list[str], starts: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_], list[str]]:
+    """Counter of each row that is kept, which rows these are, and notes."""
+    raw = values[:, place]
+
+    def at(row: int) -> str:
+        piece = int(np.searchsorted(starts, row, side="right")) - 1
+        return f"{places[piece]}[{row - starts[piece]}]"
+
+    bad = np.flatnonzero(~((raw >= 0) & (raw < COUNTER_RANGE) & (raw == np.floor(raw))))
+    if bad.size:
+        raise RecordError(f"{at(bad[0])}: CYCLE = {raw[bad[0]]:g}: must be a whole number, 0 to {COUNTER_RANGE - 1}")
+    notes: list[str] = []
+    steps = np.diff(raw)
+    over = steps < -COUNTER_RANGE / 2
+    if over.any():
+        notes.append(f"the counter begins anew at 0 behind {int(raw[np.flatnonzero(over)[0]])}: counted on")
+    counter = raw.astype(np.int64)
+    counter[1:] += COUNTER_RANGE * np.cumsum(over)
+    repeated = np.flatnonzero(np.diff(counter) == 0) + 1
+    same = np.array([np.array_equal(values[row], values[row - 1], equal_nan=True) for row in repeated], dtype=bool)
+    kept = np.ones(len(counter), dtype=bool)
+    kept[repeated[same]] = False
+    if same.any():
+        notes.append(f"{same.sum()} rows stand there twice and were taken once, the first at {at(repeated[same][0])}")
+    back = np.flatnonzero((np.diff(counter) <= 0) & kept[1:])
+    if back.size:
+        row = int(back[0]) + 1
+        said = "other values under the same counter" if counter[row] == counter[row - 1] else "the counter goes back"
+        raise RecordError(
+            f"{at(row)}: CYCLE = {raw[row]:.0f} behind {raw[row - 1]:.0f}: {said}; it must rise from row to row"
+        )
+    return counter[kept], kept, notes
+
+
+EVENTS = ("HFBlockEvent", "HFCallEvent", "HFTimestamp")
+"""Entries of a payload that are one event each."""
+COUNTER_RANGE = 1 << 31
+"""Behind its last number the counter begins anew at 0."""
+_APART_S = 0.5
+
+
+def key_of(table: Mapping[str, Any], name: str) -> Any:
+    """A value by its key in whatever case: versions differ ("HfProbeCounter"); None where there is none."""
+    if name in table:
+        return table[name]
+    return next((value for key, value in table.items() if key.lower() == name.lower()), None)
+
+
+@dataclass
+class Events:
+    """Blocks, calls, slow values and time stamps of the files, in their order there."""
+
+    start: int
+    cycle_s: float
+    blocks: list[EdgeBlock] = field(default_factory=list)
+    calls: list[EdgeCall] = field(default_factory=list)
+    values: list[EdgeValue] = field(default_factory=list)
+    stamps: list[tuple[int, str]] = field(default_factory=list)
+    others: Counter[str] = field(default_factory=Counter)
+    path: str = ""
+
+    def read(self, name: str, payload: list[dict[str, Any]]) -> None:
+        """Take the events of a file."""
+        for index, entry in enumerate(payload):
+            for kind, content in entry.items():
+                where = f"{name}: Payload[{index}].{kind}"
+                if kind not in ("HFData", "LFData", *EVENTS):
+                    self.others[kind] += 1
+                elif kind == "LFData":
+                    self._values(where, content)
+                elif kind in EVENTS:
+                    if not isinstance(content, dict):
+                        raise RecordError(f"{where} = {str(content)[:40]!r}: must be an object")
+                    self._event(where, kind, content)
+
+    def notes(self) -> list[str]:
+        """What was left out, and where the clock does not go with the counter."""
+        left = [f"{count} entries {kind} in the payload were left out" for kind, count in self.others.items()]
+        return left + _clock_notes(self.stamps, self.cycle_s)
+
+    def _event(self, where: str, kind: str, event: dict[str, Any]) -> None:
+        counter, time_s = self._when(where, event)
+        channel = _integer(where, event, "Channel")
+        line = _integer(where, event, "SeekOffset")
+        if kind == "HFTimestamp":
+            self.stamps.append((counter, str(event.get("Time"))))
+        elif kind == "HFCallEvent":
+            self.path = str(event.get("Path") or "")
+            level = _integer(where, event, "CallStackLevel")
+            self.calls.append(EdgeCall(counter, time_s, self.path, line, level, channel))
+        else:
+            block = EdgeBlock(
+                counter, time_s, str(event.get("GCode") or ""), line, self.path,
+                _integer(where, event, "SelectedTool"), _integer(where, event, "ActiveTool"),
+                str(event.get("IpoGC") or ""), _integer(where, event, "laBuf"), channel,
+            )  # fmt: skip
+            # A file of a chain begins with the last block of the file before it.
+            if not self.blocks or self.blocks[-1] != block:
+                self.blocks.append(block)
+
+    def _when(self, where: str, event: dict[str, Any]) -> tuple[int, float]:
+        """Counter and time of an event."""
+        counter = _integer(where, event, "HFProbeCounter")
+        if counter is None:
+            raise RecordError(f"{where}.HFProbeCounter is missing: nobody knows when it was")
+        if self.start - counter > COUNTER_RANGE // 2:
+            counter += COUNTER_RANGE  # it began anew at 0 after the first sample
+        return counter, (counter - self.start) * self.cycle_s
+
+    def _values(self, where: str, content: Any) -> None:
+        if not isinstance(content, list):
+            raise RecordError(f"{where} = {str(content)[:40]!r}: must be a list")
+        for index, each in enumerate(content):
+            if not isinstance(each, dict):
+                raise RecordError(f"{where}[{index}] = {str(each)[:40]!r}: must be an object")
+            counter, time_s = self._when(f"{where}[{index}]", each)
+            self.values.append(EdgeValue(counter, time_s, str(each.get("address", "")), str(each.get("value", ""))))
+
+
+def _integer(where: str, table: Mapping[str, Any], name: str) -> int | None:
+    """A whole number, which versions write as number or as text; None where there is none."""
+    value = key_of(table, name)
+    if value is None or value == "":
+        return None
+    try:
+        number = float(value) if not isinstance(value, bool) else math.nan
+    except (TypeError, ValueError):
+        number = math.nan
+    if not number.is_integer():
+        raise RecordError(f"{where}.{name} = {value!r}: must be a whole number")
+    return int(number)
+
+
+def _clock_notes(stamps: Sequence[tuple[int, str]], cycle_s: float) -> list[str]:
+    """Where the clock and the counter go apart between two stamps, or a stamp is no time."""
+    notes: list[str] = []
+    jumps: list[tuple[int, float, float]] = []
+    before: tuple[int, datetime] | None = None
+    for counter, text in stamps:
+        try:
+            now = datetime.fromisoformat(text.replace("Z", "+00:00"))
+        except ValueError:
+            notes.append(f"the time stamp {text[:40]!r} at counter {counter} is no time")
+            continue
+        if before is not None and (now.tzinfo is None) == (before[1].tzinfo is None):
+            clock, counted = (now - before[1]).total_seconds(), (counter - before[0]) * cycle_s
+            if abs(clock - counted) > _APART_S:
+                jumps.append((counter, clock, counted))
+        before = counter, now
+    if jumps:
+        counter, clock, counted = jumps[0]
+        more = f", and {len(jumps) - 1} times more" if len(jumps) > 1 else ""
+        notes.append(
+            f"the clock and the counter disagree before counter {counter}{more}: {clock:.3f} s passed by the time "
+            f"stamps, {counted:.3f} s by the counter, which is taken"
+        )
+    return notes
+
 
 _VERSIONS = ((0, 6), (1, 1))
 _MOST_GAPS = 10
@@ -246,3 +484,56 @@ def _axes(signals: tuple[tuple[str, str], ...]) -> tuple[EdgeAxis, ...]:
         if bar and number.isdigit():
             found.setdefault(int(number), (label or number, []))[1].append(name)
     return tuple(EdgeAxis(number, label, tuple(names)) for number, (label, names) in sorted(found.items()))
+
+
+_END = re.compile(r"\s*(?:/?\s*N\d+\s*)?(?:M0?2|M30)\b", re.IGNORECASE)
+_AXES = ("x", "y", "z")
+
+
+def edge_runs(path: Path) -> Iterator[RunLog]:
+    """The run of a capture.
+
+    The blocks are those of the program that has most of them in the capture; those of cycles and subprograms stand in
+    the texts only, since their lines count in other files.
+    """
+    capture = read_edge_json(path)
+    count = Counter(block.path for block in capture.blocks if block.line is not None)
+    if not count:
+        raise RecordError(f"{path}: no block events (HFBlockEvent) with a line: nobody knows what ran; record them")
+    program = count.most_common(1)[0][0]
+    blocks = [block for block in capture.blocks if block.path == program and block.line is not None]
+    notes = list(capture.notes)
+    if len(count) > 1:
+        others = ", ".join(f"{name or 'without a name'} ({number})" for name, number in count.most_common()[1:6])
+        notes.append(f"line numbers are those of {program or 'no name'}; left out are blocks of {others}")
+    end = next((block.time_s for block in capture.blocks if _END.match(block.text)), None)
+    tools = [block for block in capture.blocks if block.active_tool is not None and block.active_tool < 65535]
+    yield RunLog(
+        source=str(path),
+        start="",
+        duration_s=None,
+        block=_signal(blocks, [float(block.line or 0) for block in blocks], "SeekOffset"),
+        tool=_signal(tools, [float(block.active_tool or 0) for block in tools], "ActiveTool") if tools else None,
+        position_mm=_positions(capture),
+        program=program or None,
+        notes=tuple(notes),
+        block_texts=tuple((block.time_s, block.text) for block in capture.blocks),
+        gaps=tuple((gap.start_s, gap.duration_s) for gap in capture.gaps),
+        ended_by=None if end is None else "M30",
+        cut_start=True,
+        cut_end=end is None,
+    )
+
+
+def _signal(blocks: list[EdgeBlock], values: list[float], name: str) -> Signal:
+    return Signal(np.array([block.time_s for block in blocks]), np.array(values), name)
+
+
+def _positions(capture: EdgeCapture) -> tuple[tuple[str, Signal], ...]:
+    """Commands of X, Y, Z by the labels of the axes."""
+    return tuple(
+        (letter, Signal(capture.time_s, capture.position(axis.number), f"DES_POS|{axis.number}"))
+        for letter in _AXES
+        for axis in capture.axes
+        if axis.name.lower().startswith(letter) and "DES_POS" in axis.signals
+    )

@@ -9,11 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.io.options import ReadOptions, stated_unit
-from shapegcode.io.record import FloatArray, Quantity
+from shapegcode.io.record import FloatArray, Quantity, ReadOptions, stated_unit
 from shapegcode.io.units import Unit, find_unit
-
-__all__ = ["FEWEST_LINES", "ComplexArray", "FrequencyResponse", "checked_lines", "quantity_of_name", "ratio_unit"]
 
 ComplexArray = npt.NDArray[np.complex128]
 

@@ -15,9 +15,7 @@ import numpy as np
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse, checked_lines, scale_of
-from shapegcode.io.options import ReadOptions
-
-__all__ = ["is_mat", "read_frf_mat"]
+from shapegcode.io.record import ReadOptions
 
 _FREQUENCIES = ("f", "freq", "frequency", "freqs", "frequencies", "f_hz", "freq_hz", "hz")
 _ANGULAR = ("w", "omega", "om")

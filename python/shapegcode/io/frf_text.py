@@ -8,14 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.cells import utf8_text
 from shapegcode.io.columns import Label, tap_label
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse, checked_lines, scale_of
-from shapegcode.io.options import ReadOptions
-from shapegcode.io.record import FloatArray
+from shapegcode.io.layout import utf8_text
+from shapegcode.io.record import FloatArray, ReadOptions
 from shapegcode.io.table import TextTable
-
-__all__ = ["is_frf_text", "read_frf_text"]
 
 _PARTS = {
     "frequency": "f freq frequency frequenz hz",

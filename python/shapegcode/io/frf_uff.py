@@ -9,12 +9,9 @@ import numpy as np
 
 from shapegcode.errors import RecordError
 from shapegcode.io.frequency_response import FrequencyResponse, checked_lines, scale_of
-from shapegcode.io.options import ReadOptions
-from shapegcode.io.record import FloatArray, Quantity
+from shapegcode.io.record import FloatArray, Quantity, ReadOptions
 from shapegcode.io.uff import UffFile
 from shapegcode.io.units import find_unit
-
-__all__ = ["is_frf_uff", "read_frf_uff"]
 
 _TIME_RESPONSE, _FRF, _COHERENCE = 1, 4, 6
 _RESPONSES: dict[int, Quantity] = {8: "displacement", 11: "velocity", 12: "acceleration"}

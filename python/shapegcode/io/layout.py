@@ -2,16 +2,121 @@
 
 from __future__ import annotations
 
+import codecs
+import csv
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from shapegcode.errors import RecordError
-from shapegcode.io.cells import cells_of, is_number
 from shapegcode.io.columns import tap_label
+from shapegcode.io.data_file import MAX_TEXT_BYTES, DataFile, read_file
 from shapegcode.io.units import find_unit
 
-__all__ = ["Layout", "find_layout"]
+_LOG_HEAD_BYTES = 65_536
+
+
+def chunks(path: Path) -> Iterator[bytes]:
+    """Pieces of a file as UTF-8, without a byte order mark."""
+    decoder: codecs.IncrementalDecoder | None = None
+    first = True
+    with DataFile(path) as file:
+        for raw in file.pieces():
+            piece = raw
+            if first and piece[:2] in {codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE}:
+                decoder = codecs.getincrementaldecoder("utf-16")(errors="replace")
+            if decoder is not None:
+                piece = decoder.decode(piece).encode("utf-8")
+            if first:
+                piece = piece.removeprefix(codecs.BOM_UTF8)
+            first = False
+            yield piece
+
+
+def line_chunks(path: Path) -> Iterator[list[bytes]]:
+    """The lines of a file, many at a time, without their ends."""
+    rest = b""
+    for piece in chunks(path):
+        lines = (rest + piece).split(b"\n")
+        rest = lines.pop()
+        if len(rest) > MAX_TEXT_BYTES:
+            raise RecordError(f"{path}: a line of more than {MAX_TEXT_BYTES} bytes: no text with lines")
+        yield lines
+    if rest:
+        yield [rest]
+
+
+def head_of(path: Path) -> bytes:
+    """The beginning of a file."""
+    head = next(chunks(path), b"")[:_LOG_HEAD_BYTES]
+    if not head.strip():
+        raise RecordError(f"{path}: the file is empty; needed is the log of a run")
+    if head[:4] != b"PK\x03\x04":
+        refuse_binary(path, head, "a log of a run: SHDR text, MTConnect streams, Sinumerik Edge JSON or a table")
+    return head
+
+
+_TEXT_BYTES = frozenset(range(32, 256)) | {9, 10, 12, 13}
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
+#: Behind a point for thousands stand three digits; the comma behind the last of them tells it from a decimal point.
+_THOUSANDS = r"\d{1,3}(?:\.\d{3})+(?=,\d)"
+_COMMA_NUMBER = re.compile(
+    rf"[+-]?({_THOUSANDS},\d+|\d+(,\d+)?|,\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE
+)
+
+
+def utf8_text(path: Path) -> bytes:
+    """The text as ASCII-compatible bytes with line feeds."""
+    data = read_file(path)
+    if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
+        data = data.decode("utf-16", errors="replace").encode("utf-8")
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    refuse_binary(path, data[:65536], "text with columns, UFF (dataset 58) or WAV")
+    if b"\n" not in data[:65536] and b"\r" in data[:65536]:
+        data = data.replace(b"\r", b"\n")
+    return data
+
+
+def refuse_binary(path: Path, head: bytes, needed: str) -> None:
+    """Refuse a file that is no text."""
+    strange = sorted(set(head) - _TEXT_BYTES)
+    if strange:
+        place = head.index(bytes([strange[0]]))
+        raise RecordError(f"{path}: a binary file (byte 0x{strange[0]:02x} at {place}); needed is {needed}")
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """The cells of a line, without quotes and surrounding blanks."""
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        row = next(iter(csv.reader([line], delimiter=delimiter, skipinitialspace=True)), [])
+        return [cell.strip() for cell in row]
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def is_number(cell: str, decimal_comma: bool) -> bool:
+    """Whether a cell is a number, NaN and infinity included."""
+    return (_COMMA_NUMBER if decimal_comma else _NUMBER).fullmatch(cell) is not None
+
+
+def is_clock_time(cell: str) -> bool:
+    """Whether a cell is a time of the day, with a date or without: ``10:15:00,000391``."""
+    return re.search(r"\d{1,2}:\d{2}", cell) is not None
+
+
+def has_thousands(cell: str) -> bool:
+    """Whether a number with a decimal comma has points for thousands: ``1.265,02``."""
+    return "." in cell and is_number(cell, True)
+
+
+def without_thousands(data: bytes) -> bytes:
+    """Text of numbers with decimal commas, points for thousands left out."""
+    if b"." not in data:
+        return data
+    return re.sub(rb"(?<![\d.,])" + _THOUSANDS.encode(), lambda found: found[0].replace(b".", b""), data)
+
 
 #: The header of loggers with long preambles stays within this.
 _HEAD_BYTES = 262_144
@@ -34,29 +139,17 @@ _STEP = re.compile(
 
 @dataclass(frozen=True)
 class Layout:
-    """How the file is written.
+    """How the file is written."""
 
-    Attributes:
-        delimiter: between cells; " " stands for any run of blanks.
-        decimal_comma: numbers have a comma for the point.
-        header: cells of the header; empty: there is none.
-        header_line: its line, from 1.
-        units: cells of the row of units below it; empty: there is none.
-        first_row: line of the first row of numbers, from 1.
-        columns: cells of that row.
-        skipped: lines of text before the header.
-        period_s: sampling period that the preamble states.
-    """
-
-    delimiter: str
-    decimal_comma: bool
-    header: list[str]
-    header_line: int
-    units: list[str]
-    first_row: int
-    columns: int
-    skipped: int
-    period_s: float | None = None
+    delimiter: str  # between cells; " " stands for any run of blanks
+    decimal_comma: bool  # numbers have a comma for the point
+    header: list[str]  # cells of the header; empty: there is none
+    header_line: int  # its line, from 1
+    units: list[str]  # cells of the row of units below it; empty: there is none
+    first_row: int  # line of the first row of numbers, from 1
+    columns: int  # cells of that row
+    skipped: int  # lines of text before the header
+    period_s: float | None = None  # sampling period that the preamble states
 
     @property
     def delimiter_name(self) -> str:

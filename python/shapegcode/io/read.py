@@ -7,10 +7,7 @@ from pathlib import Path
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse
-from shapegcode.io.options import ReadOptions
-from shapegcode.io.record import Record
-
-__all__ = ["ReadOptions", "read_measurement", "read_records"]
+from shapegcode.io.record import ReadOptions, Record
 
 _BYTES_TO_KNOW = 4096
 _WAV = (b"RIFF", b"RIFX", b"RF64")
@@ -43,8 +40,7 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
                 f"{path}: not a {kind} file: it begins with {head[:16]!r} instead of {begins}; rename it if it is text "
                 "with columns"
             )
-    from shapegcode.io.klipper import is_klipper, klipper_options
-    from shapegcode.io.taps import read_csv
+    from shapegcode.io.taps import is_klipper, klipper_options, read_csv
 
     return read_csv(path, klipper_options(options) if is_klipper(head) else options)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
+from shapegcode.io.units import Measured, Unit, find_unit, units_of
 
 FloatArray = npt.NDArray[np.float64]
 Quantity = Literal["acceleration", "velocity", "displacement"]
@@ -71,3 +73,96 @@ def _check_samples(source: str, what: str, values: FloatArray) -> None:
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         raise RecordError(f"{source}: sample {bad[0]} of the {what} is {array[bad[0]]}: must be finite")
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What the user says about a file, over what the file says itself.
+
+    Attributes:
+        axis: use the response along this axis only ("x", "y" or "z"); where the file names no axis, it is this one.
+        time_column: header or number (from 1) of the column with the time.
+        force_column: the same for the force of the hammer.
+        response_columns: the same for the responses; empty: all that the header names.
+        time_unit: unit of the time column, whatever the header says.
+        force_unit: of the force.
+        response_unit: of the response.
+        period_s: time between two samples, where the file has no time, or to check it.
+        quantity: what the sensor measured, where the file does not say.
+        force_scale: N for 1 in the file; of an integer WAV, N at full scale.
+        response_scale: m/s², m/s or m (see *quantity*) for 1 in the file; of an integer WAV, at full scale.
+        response_first: in a WAV file, the response is the first channel and the force the second.
+        force_sensitivity: of the hammer, such as "2.25 mV/N", where the force is in volts.
+        response_sensitivity: of the sensor, such as "100 mV/g", where the response is in volts.
+        ignore_force: read the response only, as a free decay.
+    """
+
+    axis: str | None = None
+    time_column: str | None = None
+    force_column: str | None = None
+    response_columns: tuple[str, ...] = ()
+    time_unit: str | None = None
+    force_unit: str | None = None
+    response_unit: str | None = None
+    period_s: float | None = None
+    quantity: Quantity | None = None
+    force_scale: float | None = None
+    response_scale: float | None = None
+    response_first: bool = False
+    force_sensitivity: str | None = None
+    response_sensitivity: str | None = None
+    ignore_force: bool = False
+
+    def __post_init__(self) -> None:
+        if self.axis not in {None, "x", "y", "z"}:
+            raise RecordError(f"axis {self.axis!r}: must be x, y or z")
+        for name in ("period_s", "force_scale", "response_scale"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < abs(value) < float("inf"):
+                raise RecordError(f"{name} = {value:g}: must be a number other than 0")
+        if self.period_s is not None and self.period_s < 0.0:
+            raise RecordError(f"period_s = {self.period_s:g}: must be above 0")
+        stated: tuple[tuple[str, str | None, tuple[Measured, ...]], ...] = (
+            ("time_unit", self.time_unit, ("time",)),
+            ("force_unit", self.force_unit, ("force",)),
+            ("response_unit", self.response_unit, ("acceleration", "velocity", "displacement")),
+        )
+        for option, text, allowed in stated:
+            if text is not None and stated_unit(text, allowed) is None:
+                raise RecordError(f"{option} {text!r} is not known: must be one of {units_of(*allowed)}")
+        for option, text, allowed in (
+            ("force_sensitivity", self.force_sensitivity, ("force",)),
+            ("response_sensitivity", self.response_sensitivity, ("acceleration", "velocity", "displacement")),
+        ):
+            if text is not None:
+                per_volt(option, text, allowed)
+            if text is not None and getattr(self, option.replace("sensitivity", "scale")) is not None:
+                raise RecordError(f"{option} {text!r} and {option.replace('sensitivity', 'scale')}: state one of both")
+
+
+_VOLTS = {"v": 1.0, "mv": 1e-3, "µv": 1e-6, "uv": 1e-6}
+
+
+def volts_of(unit_text: str) -> float | None:
+    """What a value in V, mV or µV is multiplied with to give volts."""
+    plain = unit_text.strip().lower().replace("μ", "µ")
+    return 1.0 if plain in {"", "volt", "volts"} else _VOLTS.get(plain)
+
+
+def per_volt(option: str, text: str, allowed: tuple[Measured, ...]) -> tuple[Unit, float]:
+    """What one volt means by a sensitivity."""
+    match = re.fullmatch(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([mµuμ]?V)\s*/\s*\(?(.+?)\)?\s*", text)
+    unit = find_unit(match[3]) if match else None
+    volts = volts_of(match[2]) if match else None
+    if match is None or unit is None or volts is None or unit.measures not in allowed or not float(match[1]) > 0.0:
+        example = "2.25 mV/N" if allowed == ("force",) else "100 mV/g"
+        raise RecordError(
+            f"{option} {text!r}: must be V, mV or µV over one of {units_of(*allowed)}, such as {example!r}"
+        )
+    return unit, unit.factor / (float(match[1]) * volts)
+
+
+def stated_unit(text: str | None, allowed: tuple[Measured, ...]) -> Unit | None:
+    """The unit of an option, if it is one of the quantities allowed."""
+    unit = find_unit(text) if text else None
+    return unit if unit is not None and unit.measures in allowed else None

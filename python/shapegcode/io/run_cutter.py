@@ -8,12 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from shapegcode.errors import RecordError
-from shapegcode.io.run_items import STATES, Item, ItemTable, State, plain_name
-from shapegcode.io.run_notes import Event, FileNotes
-from shapegcode.io.run_record import RunLog
-from shapegcode.io.run_tracks import Hold, RunPart, Track, run_of
-
-__all__ = ["RunCutter"]
+from shapegcode.io.run_items import STATES, Event, FileNotes, Item, ItemTable, State, plain_name
+from shapegcode.io.run_tracks import Hold, RunLog, RunPart, Track, run_of
 
 #: A step back up to this is an adapter whose items overtake each other; more is a clock that was set.
 _DISORDER_S = 1.0

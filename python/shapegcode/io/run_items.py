@@ -6,12 +6,11 @@ import difflib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from datetime import UTC, datetime, timedelta, timezone
+from typing import Literal, TypeAlias, get_args
 
 from shapegcode.errors import RecordError
 from shapegcode.io.units import find_unit, units_of
-
-__all__ = ["ROLES", "STATES", "Item", "ItemTable", "Role", "State", "plain_name", "stated_feed_unit"]
 
 Role = Literal[
     "time", "block", "sequence", "block_text", "feed", "tool", "spindle", "feed_override", "rapid_override", "status",
@@ -84,29 +83,19 @@ def stated_feed_unit(text: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """An item of a file that is used.
+    """An item of a file that is used."""
 
-    Attributes:
-        name: in the file.
-        role: what it is.
-        rank: of its name among those of its role; the lowest is taken.
-    """
-
-    name: str
-    role: Role
-    rank: int
+    name: str  # in the file
+    role: Role  # what it is
+    rank: int  # of its name among those of its role; the lowest is taken
 
 
 @dataclass
 class ItemTable:
-    """Finds out what the items of a file are.
+    """Finds out what the items of a file are."""
 
-    Attributes:
-        chosen: names by role, which hold over the known ones.
-        seen: names that were met in the file, and what they are.
-    """
-
-    chosen: Mapping[str, str] | None = None
+    chosen: Mapping[str, str] | None = None  # names by role, which hold over the known ones
+    # names that were met in the file, and what they are
     seen: dict[str, Item | None] = field(init=False, default_factory=dict)
     _chosen: dict[str, tuple[Role, int]] = field(init=False, default_factory=dict)
     _items: dict[tuple[str, Role], Item] = field(init=False, default_factory=dict)
@@ -147,3 +136,105 @@ class ItemTable:
     def sought(self, role: Role) -> str:
         """The names that are looked for, for messages."""
         return (self.chosen or {}).get(role) or ", ".join(_NAMES[role].split()[:6])
+
+
+Event: TypeAlias = tuple[int, float, bytes, Item, bytes]
+"""(line, time in s, time stamp, item, value as text)."""
+
+_SHOWN = 3
+
+
+class FileNotes:
+    """Notes since the last run."""
+
+    def __init__(self) -> None:
+        """None yet."""
+        self.feed_unit: str | None = None  # what the file itself says of the unit of the feed
+        self._kinds: dict[str, tuple[list[str], int, int]] = {}
+
+    def add(self, kind: str, line: int, text: str) -> None:
+        """Note something."""
+        shown, count, _ = self._kinds.get(kind, ([], 0, 0))
+        if len(shown) < _SHOWN:
+            shown.append(f"line {line}: {text}" if line else text)
+        self._kinds[kind] = shown, count + 1, line
+
+    def taken(self) -> tuple[str, ...]:
+        """The notes, which are forgotten then."""
+        found: list[str] = []
+        for shown, count, line in self._kinds.values():
+            found += shown
+            if count > len(shown):
+                found.append(f"{count - len(shown)} more like the last one" + (f", up to line {line}" if line else ""))
+        self._kinds = {}
+        return tuple(found)
+
+
+#: 2017-02-10T18:33: stands before the seconds.
+_MINUTE = 17
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_ISO = re.compile(
+    r"(\d{4})[-/](\d\d)[-/](\d\d)[T ](\d\d):(\d\d)(?::(\d\d)([.,]\d+)?)? ?(Z|[+-]\d\d(?::?\d\d)?)?", re.IGNORECASE
+)
+_GERMAN = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})[T ](\d\d?):(\d\d)(?::(\d\d)([.,]\d+)?)?")
+_CLOCK = re.compile(r"(\d\d?):(\d\d):(\d\d)([.,]\d+)?")
+_NUMBER = re.compile(r"\d+(\.\d*)?(e[+-]?\d+)?", re.IGNORECASE)
+#: A plain number above it counts milliseconds since 1970: as seconds it would be the year 5138.
+_MILLISECONDS_FROM = 1e11
+_LATEST = 1e15
+
+
+class Stamps:
+    """Reads time stamps; those of the same minute quickly."""
+
+    def __init__(self) -> None:
+        """Nothing is known yet."""
+        self._minute = b"-"
+        self._base = 0.0
+
+    def seconds(self, stamp: bytes) -> float:
+        """A time stamp as seconds."""
+        if stamp[:_MINUTE] == self._minute and stamp[-1:] == b"Z":
+            try:
+                second = float(stamp[_MINUTE:-1])
+            except ValueError:  # 02,25 or worse: looked at below
+                second = -1.0
+            if 0.0 <= second < 61.0:
+                return self._base + second
+        text = stamp.decode("latin-1").partition("@")[0].strip()
+        found = _ISO.fullmatch(text)
+        if found is None:
+            return _other(text)
+        year, month, day, hour, minute, second_, fraction, zone = found.groups()
+        moment = datetime(int(year), int(month), int(day), int(hour), int(minute), tzinfo=_zone(zone))
+        base = (moment - _EPOCH).total_seconds()
+        if zone in ("Z", "z") and text[_MINUTE - 1 : _MINUTE] == ":":
+            self._minute, self._base = text[:_MINUTE].encode(), base
+        return base + _second(second_, fraction)
+
+
+def _second(second: str | None, fraction: str | None) -> float:
+    value = float((second or "0") + (fraction or "").replace(",", "."))
+    if value >= 61.0:
+        raise ValueError(f"second {value:g}")
+    return value
+
+
+def _zone(text: str | None) -> timezone:
+    if text is None or text in "Zz":
+        return UTC
+    digits = text[1:].replace(":", "")
+    offset = timedelta(hours=int(digits[:2]), minutes=int(digits[2:] or 0))
+    return timezone(-offset if text[0] == "-" else offset)
+
+
+def _other(text: str) -> float:
+    if found := _GERMAN.fullmatch(text):
+        day, month, year, hour, minute = (int(word) for word in found.groups()[:5])
+        moment = datetime(year, month, day, hour, minute, tzinfo=UTC)
+        return (moment - _EPOCH).total_seconds() + _second(found[6], found[7])
+    if found := _CLOCK.fullmatch(text):
+        return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + _second(found[3], found[4])
+    if _NUMBER.fullmatch(text) and (value := float(text)) < _LATEST:
+        return value / 1000.0 if value > _MILLISECONDS_FROM else value
+    raise ValueError(f"{text!r} is no time")

@@ -3,7 +3,7 @@
 >>> for run in iter_run_logs("monday.txt.gz"):
 ...     print(run.start, run.program, run.duration_s)
 
-Formats: SHDR text (`shdr`), MTConnect streams (`mtconnect_xml`), Sinumerik Edge (`edge_runs`), tables (`run_table`).
+Formats: SHDR text and MTConnect streams (`mtconnect`), Sinumerik Edge (`edge_json`), tables (`run_table`).
 Each makes events of a file; `run_cutter` cuts them into runs. What the items are called stands in `run_items`.
 """
 
@@ -15,12 +15,10 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from shapegcode.errors import RecordError
+from shapegcode.io.layout import head_of
 from shapegcode.io.run_cutter import RunCutter
 from shapegcode.io.run_items import ItemTable, stated_feed_unit
-from shapegcode.io.run_record import RunLog, Signal
-from shapegcode.io.text_lines import head_of
-
-__all__ = ["MAX_VALUES", "LogFormat", "RunLog", "Signal", "iter_run_logs", "read_run_logs"]
+from shapegcode.io.run_tracks import RunLog
 
 LogFormat = Literal["shdr", "mtconnect", "edge", "csv"]
 
@@ -113,17 +111,17 @@ def iter_run_logs(
 
 def _runs(path: Path, kind: LogFormat, table: ItemTable, unit: str | None, max_values: int) -> Iterator[RunLog]:
     if kind == "edge":
-        from shapegcode.io.edge_runs import edge_runs
+        from shapegcode.io.edge_json import edge_runs
 
         yield from edge_runs(path)
         return
     cutter = RunCutter(str(path), table, unit, max_values)
     if kind == "shdr":
-        from shapegcode.io.shdr import shdr_events
+        from shapegcode.io.mtconnect import shdr_events
 
         yield from cutter.runs(shdr_events(path, table, cutter.notes))
     elif kind == "mtconnect":
-        from shapegcode.io.mtconnect_xml import mtconnect_events
+        from shapegcode.io.mtconnect import mtconnect_events
 
         yield from cutter.runs(mtconnect_events(path, table, cutter.notes))
     else:

@@ -8,15 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shapegcode.errors import RecordError
-from shapegcode.io.cells import cells_of, is_number, without_thousands
 from shapegcode.io.columns import Label, Meaning, read_label
-from shapegcode.io.run_items import Item, ItemTable
-from shapegcode.io.run_notes import Event, FileNotes
-from shapegcode.io.stamps import Stamps
-from shapegcode.io.text_lines import head_of, line_chunks
+from shapegcode.io.layout import cells_of, head_of, is_number, line_chunks, without_thousands
+from shapegcode.io.run_items import Event, FileNotes, Item, ItemTable, Stamps
 from shapegcode.io.units import Measured, factor_between
-
-__all__ = ["table_events"]
 
 _DELIMITERS = ("\t", ";", ",", "|")
 _HEAD_LINES = 400

@@ -19,34 +19,32 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.cells import cells_of, has_thousands, is_clock_time, is_number, utf8_text, without_thousands
 from shapegcode.io.columns import Label
-from shapegcode.io.layout import find_layout
+from shapegcode.io.layout import (
+    cells_of,
+    find_layout,
+    has_thousands,
+    is_clock_time,
+    is_number,
+    utf8_text,
+    without_thousands,
+)
 from shapegcode.io.record import FloatArray
-
-__all__ = ["TextTable"]
 
 #: Faults are looked for in pieces of this size.
 _PIECE_BYTES = 4_000_000
 
 
 class TextTable:
-    """A text file with columns.
-
-    Attributes:
-        path: where it was read.
-        layout: how it is written.
-        where: file and line of the header, for messages.
-        used: indices of the columns that were asked for last.
-    """
+    """A text file with columns."""
 
     def __init__(self, path: Path, *, by_number: bool = False) -> None:
         """Read the file, and find out how it is written."""
-        self.path = path
+        self.path = path  # where it was read
         data = utf8_text(path)
-        self.layout = find_layout(path, data, by_number)
+        self.layout = find_layout(path, data, by_number)  # how it is written
         self.where = f"{path}:{self.layout.header_line}" if self.layout.header else f"{path}"
-        self.used: list[int] = []
+        self.used: list[int] = []  # indices of the columns that were asked for last
         offset = 0
         for _ in range(self.layout.first_row - 1):
             offset = data.index(b"\n", offset) + 1

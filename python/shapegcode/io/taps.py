@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -9,16 +10,12 @@ from typing import Literal
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.cells import is_clock_time
 from shapegcode.io.columns import Label, tap_label, unit_of
-from shapegcode.io.options import ReadOptions, per_volt, stated_unit, volts_of
-from shapegcode.io.record import UNITS, Quantity, Record
-from shapegcode.io.resampling import even_grid, resample
-from shapegcode.io.sampling import UnevenTimeError, even_period
+from shapegcode.io.layout import is_clock_time
+from shapegcode.io.record import UNITS, Quantity, ReadOptions, Record, per_volt, stated_unit, volts_of
+from shapegcode.io.sampling import UnevenTimeError, even_grid, even_period, resample
 from shapegcode.io.table import TextTable
 from shapegcode.io.units import Measured, Unit
-
-__all__ = ["read_csv"]
 
 _EXAMPLE = "time_s,force_N,acc_m/s^2"
 _RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")
@@ -271,3 +268,42 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
         )
         for k, column in enumerate(responses)
     ]
+
+
+_HEADER = re.compile(rb"^\s*#\s*time\s*,\s*accel_x\s*,\s*accel_y\s*,\s*accel_z\s*$", re.MULTILINE)
+_OF_NAME = re.compile(r"raw_data_([xyz])(?:[_.]|$)|axis=([-0-9.]+),([-0-9.]+)", re.IGNORECASE)
+
+
+def is_klipper(head: bytes) -> bool:
+    """Whether a file begins as Klipper's raw data do: ``#time,accel_x,accel_y,accel_z``."""
+    return _HEADER.search(head[:400]) is not None
+
+
+def klipper_options(options: ReadOptions) -> ReadOptions:
+    """Options with the units that Klipper writes without saying them: s and mm/s²."""
+    scaled = options.response_scale is not None or options.response_unit is not None
+    return replace(
+        options,
+        time_unit=options.time_unit or "s",
+        response_unit=options.response_unit if scaled else "mm/s^2",
+        ignore_force=True,
+    )
+
+
+def read_sweep(path: Path, options: ReadOptions) -> Record:
+    """The record along the axis that was shaken."""
+    told = options.axis or _axis_of_name(path.name)
+    records = read_csv(path, replace(klipper_options(options), axis=told))
+    record = max(records, key=lambda each: float(each.response.std()))
+    note = () if told else (f"{path}: the axis is not told: {(record.axis or '').upper()} moved most (--axis says it)",)
+    return replace(record, source=str(path), notes=(*record.notes, *note))
+
+
+def _axis_of_name(name: str) -> str | None:
+    match = _OF_NAME.search(name)
+    if match is None:
+        return None
+    if match[1]:
+        return match[1].lower()
+    x, y = (abs(float(part)) for part in match.group(2, 3))
+    return "x" if y == 0.0 < x else "y" if x == 0.0 < y else None

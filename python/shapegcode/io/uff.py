@@ -10,12 +10,9 @@ import numpy as np
 
 from shapegcode.errors import RecordError
 from shapegcode.io.columns import tap_label
-from shapegcode.io.options import ReadOptions, per_volt, stated_unit, volts_of
-from shapegcode.io.record import FloatArray, Quantity, Record
+from shapegcode.io.record import FloatArray, Quantity, ReadOptions, Record, per_volt, stated_unit, volts_of
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.units import find_unit, units_of
-
-__all__ = ["UffFile", "read_uff"]
 
 _TIME_RESPONSE = 1
 _FUNCTIONS = {
@@ -58,19 +55,14 @@ class _Channel:
 
 
 class UffFile:
-    """The datasets of one file.
-
-    Attributes:
-        types: number of the kind of each dataset.
-        warnings: what reading had to assume.
-    """
+    """The datasets of one file."""
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
         """Read which datasets there are."""
         import pyuff
 
         self.path, self.options = path, options
-        self.warnings: list[str] = []
+        self.warnings: list[str] = []  # what reading had to assume
         self.unitless: list[str] = []
         try:
             self.uff = pyuff.UFF(str(path))

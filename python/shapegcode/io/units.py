@@ -6,8 +6,6 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Measured", "Unit", "factor_between", "find_unit", "is_foreign_unit", "units_of"]
-
 Measured = Literal["time", "force", "torque", "acceleration", "velocity", "displacement"]
 
 #: Standard acceleration of gravity, m/s² (exact by definition).
@@ -63,17 +61,11 @@ _FOREIGN_TIMES = frozenset({"ns", "h", "hour", "hours", "tick", "ticks", "sample
 
 @dataclass(frozen=True)
 class Unit:
-    """A known unit.
+    """A known unit."""
 
-    Attributes:
-        measures: what it is a unit of.
-        name: as messages write it.
-        factor: multiplies a value to give SI (s, N, N·m, m/s², m/s, m).
-    """
-
-    measures: Measured
-    name: str
-    factor: float
+    measures: Measured  # what it is a unit of
+    name: str  # as messages write it
+    factor: float  # multiplies a value to give SI (s, N, N·m, m/s², m/s, m)
 
 
 _UNITS = {

@@ -11,11 +11,8 @@ from scipy.io import wavfile
 
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import read_file
-from shapegcode.io.options import ReadOptions
-from shapegcode.io.record import FloatArray, Record
+from shapegcode.io.record import FloatArray, ReadOptions, Record
 from shapegcode.io.sampling import STATED_RATE_TOLERANCE
-
-__all__ = ["read_wav"]
 
 
 def _channels(path: Path) -> tuple[int, FloatArray, bool]:

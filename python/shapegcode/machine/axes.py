@@ -7,8 +7,103 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from shapegcode.machine.drive import Drive
+from shapegcode.errors import ArgumentError
 from shapegcode.settings.keys import Bool, Float, InlineTable, NonNegative, Positive, Text, TomlTable, key, toml
+
+
+class Drive(TomlTable):
+    """Feed drive of an axis, for the simulation with friction."""
+
+    motor_inertia_kg_m2: Positive = key(
+        "moment of inertia that turns with the motor: rotor, brake, coupling and ball screw", unit="kg m²"
+    )
+    screw_lead_mm: Positive = key(
+        "travel for one turn of the motor: lead of the ball screw, times the gear ratio where there is one"
+    )
+    table_mass_kg: Positive = key("moving mass: table or slide with what it carries")
+    stiffness_n_per_um: Positive = key(
+        "axial stiffness from motor to table: screw, nut, bearings and coupling in series"
+    )
+    damping_ratio: Annotated[NonNegative, Field(lt=1)] = key(
+        "damping ratio of motor against table on that stiffness", default=0.05, assumed=True
+    )
+    backlash_um: NonNegative = key(
+        "free travel between motor and table (a ball bar shows it together with the stretch of the screw); 0: none",
+        default=0.0,
+        assumed=True,
+    )
+    position_feedback: Literal["motor", "table"] = key(
+        'what the position loop measures. "motor": the encoder of the motor (semi-closed); "table": a linear scale '
+        "(fully closed). Its gain is controller.position_gain_per_s, its feed-forward controller.feed_forward_ratio",
+        fanuc="1815#1",
+        default="motor",
+        assumed=True,
+    )
+    velocity_bandwidth_hz: Positive = key(
+        "bandwidth of the speed loop with all inertia as one mass; it states its gain", fanuc="2021, 2044"
+    )
+    velocity_integral_time_s: NonNegative = key(
+        "integral time of the speed loop; 0: no integral part", fanuc="2043", default=0.02, assumed=True
+    )
+    acceleration_feed_forward_ratio: Annotated[NonNegative, Field(le=1)] = key(
+        "share of the torque for the set-points' acceleration that is fed forward; 0: none",
+        fanuc="2069",
+        default=0.0,
+        assumed=True,
+    )
+    torque_limit_n_m: Positive | None = key(
+        "largest torque of the motor; left out: not limited", unit="N m", fanuc="2060", default=None
+    )
+    friction_model: Literal["viscous", "stribeck", "lugre"] = key(
+        'friction of the table. "viscous": in proportion to the speed alone; "stribeck": Coulomb, static and Stribeck '
+        'as a curve over the speed; "lugre": the same with presliding, as a table shows it at reversals',
+        default="viscous",
+        assumed=True,
+    )
+    friction_viscous_n_s_per_m: NonNegative = key(
+        "viscous friction of the guideways", unit="N s/m", default=0.0, assumed=True
+    )
+    friction_coulomb_n: Positive | None = key(
+        "sliding friction of the guideways; stribeck and lugre need it", default=None
+    )
+    friction_static_n: Positive | None = key(
+        "friction of the guideways to be overcome from rest, not below the sliding one; stribeck and lugre need it",
+        default=None,
+    )
+    friction_stribeck_velocity_mm_per_s: Positive = key(
+        "speed at which the friction has fallen from static to sliding", default=5.0, assumed=True
+    )
+    friction_smoothing_velocity_mm_per_s: Positive = key(
+        "speed within which the friction changes its sign (stribeck alone)", default=0.1, assumed=True
+    )
+    friction_bristle_stiffness_n_per_um: Positive = key(
+        "force over displacement before the table slides (lugre alone); static friction over it is the distance",
+        default=30.0,
+        assumed=True,
+    )
+    friction_bristle_damping_n_s_per_m: NonNegative = key(
+        "damping before the table slides (lugre alone)", unit="N s/m", default=30_000.0, assumed=True
+    )
+    motor_friction_viscous_n_m_s_per_rad: NonNegative = key(
+        "viscous friction of motor, bearings and nut", unit="N m s/rad", default=0.0, assumed=True
+    )
+
+    @model_validator(mode="after")
+    def _friction_is_complete(self) -> Drive:
+        if self.friction_model == "viscous":
+            return self
+        for name in ("friction_coulomb_n", "friction_static_n"):
+            if getattr(self, name) is None:
+                raise ValueError(f'friction_model is "{self.friction_model}": needs {name}')
+        assert self.friction_coulomb_n is not None
+        assert self.friction_static_n is not None
+        if self.friction_static_n < self.friction_coulomb_n:
+            raise ValueError(
+                f"friction_static_n is {toml(self.friction_static_n)}: must not be below "
+                f"friction_coulomb_n, {toml(self.friction_coulomb_n)} (unit: N)"
+            )
+        return self
+
 
 _MAX_MODES = 200  # identification finds 40 at most
 
@@ -18,12 +113,12 @@ class FrequencyOver(InlineTable):
 
     axis: Literal["x", "y", "z"] | None = key("axis whose position counts", default=None)
     position_mm: tuple[Float, ...] | None = key(
-        "positions of the axis, ascending, in the machine's coordinates", unit="mm", default=None
+        "positions of the axis, ascending, in the machine's coordinates", default=None
     )
-    mass_kg: tuple[NonNegative, ...] | None = key("masses of the part, ascending", unit="kg", default=None)
-    frequency_hz: tuple[Annotated[Positive, Field(le=10_000)], ...] = key("natural frequencies, one per row", unit="Hz")
+    mass_kg: tuple[NonNegative, ...] | None = key("masses of the part, ascending", default=None)
+    frequency_hz: tuple[Annotated[Positive, Field(le=10_000)], ...] = key("natural frequencies, one per row")
     damping_ratio: tuple[Annotated[NonNegative, Field(lt=1)], ...] | None = key(
-        "damping ratios, one per row", unit="1", default=None
+        "damping ratios, one per row", default=None
     )
 
     @model_validator(mode="after")
@@ -63,9 +158,9 @@ class AxisMode(TomlTable):
     """One vibration mode of an axis, excited by the motion of that axis."""
 
     frequency_hz: Annotated[Positive, Field(le=10_000)] = key(
-        "natural frequency; from a tap test, or from the decay after a rapid stop", unit="Hz"
+        "natural frequency; from a tap test, or from the decay after a rapid stop"
     )
-    damping_ratio: Annotated[NonNegative, Field(lt=1)] = key("damping ratio (1 = critically damped)", unit="1")
+    damping_ratio: Annotated[NonNegative, Field(lt=1)] = key("damping ratio (1 = critically damped)")
     participation: Positive = key(
         "share of this mode in the axis's deflection; several modes of one axis need not add up to 1",
         unit="1",
@@ -74,24 +169,19 @@ class AxisMode(TomlTable):
     frequency_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
         "the frequency may be off by this much either way (position of the table, weight of the workpiece); "
         "left out: not known. Only the nominal frequency is designed for then, and up to 0.2 %",
-        unit="%",
         default=None,
     )
     damping_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
         "the damping ratio may be off by this much of itself either way; left out: not known, and the ratio is taken "
         "as exact",
-        unit="%",
         default=None,
     )
     mass_kg: Positive | None = key(
         "equivalent mass of this mode at the point that was tapped; its stiffness there is mass_kg * (2 pi "
         "frequency_hz)^2. Shapers do not need it; left out: not measured",
-        unit="kg",
         default=None,
     )
-    mass_uncertainty_percent: NonNegative | None = key(
-        "the mass may be off by this much either way", unit="%", default=None
-    )
+    mass_uncertainty_percent: NonNegative | None = key("the mass may be off by this much either way", default=None)
     source: Text | None = key("where the values of this mode come from", default=None)
     frequency_over: FrequencyOver | None = key(
         'table of the frequency over the position of an axis, { axis = "z", position_mm = [0, 200, 400], '
@@ -123,12 +213,10 @@ class AxisMode(TomlTable):
 class Axis(TomlTable):
     """Limits of one axis; all three tables are required."""
 
-    max_feed_mm_per_min: Positive = key("largest cutting feed of this axis", unit="mm/min", fanuc="1430")
-    rapid_mm_per_min: Positive = key("rapid traverse (G00)", unit="mm/min", fanuc="1420")
-    max_acceleration_mm_s2: Positive = key("largest acceleration while cutting", unit="mm/s²", fanuc="1660")
-    max_jerk_mm_s3: Positive | None = key(
-        "largest jerk while cutting; left out: not limited", unit="mm/s³", default=None
-    )
+    max_feed_mm_per_min: Positive = key("largest cutting feed of this axis", fanuc="1430")
+    rapid_mm_per_min: Positive = key("rapid traverse (G00)", fanuc="1420")
+    max_acceleration_mm_s2: Positive = key("largest acceleration while cutting", fanuc="1660")
+    max_jerk_mm_s3: Positive | None = key("largest jerk while cutting; left out: not limited", default=None)
     modes: Annotated[tuple[AxisMode, ...], Field(max_length=_MAX_MODES)] = key(
         "vibration modes, one table each; none: the axis is taken as rigid", default=()
     )
@@ -158,3 +246,12 @@ class Axes(TomlTable):
     def as_tuple(self) -> tuple[Axis, Axis, Axis]:
         """The three axes in the order X, Y, Z."""
         return (self.x, self.y, self.z)
+
+
+def check_axes(keep: str, rigid: str) -> None:
+    """Whether axes are named as they can be."""
+    wrong = sorted({*keep, *rigid} - set("xyz"))
+    if wrong:
+        raise ArgumentError(f"{', '.join(wrong)}: axes are x, y and z")
+    if both := sorted({*keep} & {*rigid}):
+        raise ArgumentError(f"{', '.join(both).upper()}: its modes cannot be kept and it be rigid")

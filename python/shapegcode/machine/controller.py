@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, Strict, model_validator
@@ -12,6 +13,7 @@ from shapegcode.settings.keys import (
     AxisValues,
     Bool,
     Count,
+    InlineTable,
     NonNegative,
     Positive,
     PositiveAxisValues,
@@ -24,11 +26,10 @@ class Controller(TomlTable):
     """How the controller turns blocks into set-points, and what it accepts."""
 
     interpolation_period_s: Annotated[Positive, Field(le=0.1)] = key(
-        "time between two set-points", unit="s", default=0.001, assumed=True
+        "time between two set-points", default=0.001, assumed=True
     )
     block_time_s: Annotated[NonNegative, Field(le=1)] = key(
         "shortest time in which the controller can take in a block; emitted blocks are not shorter",
-        unit="s",
         default=0.005,
         assumed=True,
     )
@@ -54,14 +55,12 @@ class Controller(TomlTable):
     time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
         "duration of a speed change (look-ahead, constant time), or length of the moving average or time constant "
         "of the exponential (after interpolation)",
-        unit="s",
         fanuc="1622, 1771",
         default=0.05,
         assumed=True,
     )
     bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
         "time over which the acceleration itself is built up; length of the second moving average; 0: none",
-        unit="s",
         fanuc="1772",
         default=0.0,
         assumed=True,
@@ -75,7 +74,6 @@ class Controller(TomlTable):
     )
     look_ahead_filter_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
         "length of the moving average after interpolation in look-ahead mode; 0: none",
-        unit="s",
         fanuc="1769",
         default=0.0,
         assumed=True,
@@ -90,14 +88,12 @@ class Controller(TomlTable):
     )
     corner_speed_difference_mm_per_min: AxisValues = key(
         "largest speed step of an axis where two blocks meet; 0: stop at every corner. One number, or x, y, z",
-        unit="mm/min",
         fanuc="1783",
         default=500.0,
         assumed=True,
     )
     centripetal_acceleration_mm_s2: Positive = key(
         "largest acceleration across the path in arcs; it limits the feed there",
-        unit="mm/s²",
         fanuc="1735",
         default=1000.0,
         assumed=True,
@@ -105,28 +101,21 @@ class Controller(TomlTable):
     polyline_acceleration_mm_s2: Positive | None = key(
         "the same along polylines, where two lines meet; left out: as in arcs, under another corner_rule than "
         '"speed_difference" not limited',
-        unit="mm/s²",
         default=None,
     )
     junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = key(
         'deviation at a corner, run at the acceleration of the axes; corner_rule = "junction_deviation" needs it',
-        unit="mm",
         default=None,
     )
     corner_stop_angle_deg: Annotated[Positive, Field(le=180)] | None = key(
-        'least turn of a corner that is a stop; corner_rule = "stops" needs it',
-        unit="degrees",
-        default=None,
+        'least turn of a corner that is a stop; corner_rule = "stops" needs it', default=None
     )
     look_ahead_block_time_s: Annotated[NonNegative, Field(le=1)] = key(
-        "look-ahead runs no block off faster than it reads one; 0: not limited",
-        unit="s",
-        default=0.0,
+        "look-ahead runs no block off faster than it reads one; 0: not limited", default=0.0
     )
     contour_acceleration_mm_s2: PositiveAxisValues | None = key(
         "largest acceleration of an axis along a contour, corners and curves alike; left out: not limited. One "
         "number, or x, y, z",
-        unit="mm/s²",
         fanuc="1737",
         default=None,
     )
@@ -138,14 +127,12 @@ class Controller(TomlTable):
     )
     rapid_time_constant_s: AxisTimes = key(
         "time in which a rapid reaches its speed. One number, or x, y, z",
-        unit="s",
         fanuc="1620, 1773",
         default=0.15,
         assumed=True,
     )
     rapid_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
         "time over which the acceleration of a rapid is built up; 0: none",
-        unit="s",
         fanuc="1621, 1774",
         default=0.0,
         assumed=True,
@@ -153,7 +140,6 @@ class Controller(TomlTable):
     in_position_s: AxisValues = key(
         "wait for the axis to arrive after a rapid or an exact stop; the slowest axis that moved counts. One "
         "number, or x, y, z",
-        unit="s",
         default={"x": 0.025, "y": 0.025, "z": 0.12},
         assumed=True,
     )
@@ -164,21 +150,18 @@ class Controller(TomlTable):
     )
     in_position_width_um: PositiveAxisValues = key(
         "an axis has arrived when it lags by less than this. One number, or x, y, z",
-        unit="µm",
         fanuc="1826",
         default=20.0,
         assumed=True,
     )
     position_gain_per_s: PositiveAxisValues = key(
         "gain of the position loop (the parameter counts 0.01/s); the servo lag is feed / gain. One number, or x, y, z",
-        unit="1/s",
         fanuc="1825",
         default=30.0,
         assumed=True,
     )
     feed_forward_ratio: AxisRatios = key(
         "share of the servo lag that the feed-forward takes away; 0: none. One number, or x, y, z",
-        unit="1",
         fanuc="2005#1, 2068, 2092",
         default=0.0,
         assumed=True,
@@ -186,14 +169,12 @@ class Controller(TomlTable):
     shaped_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
         "length of the controller's own moving average after interpolation while a shaped program runs (it "
         "smooths the shaped blocks once more); 0: off",
-        unit="s",
         fanuc="1622, 1769",
         default=0.0,
         assumed=True,
     )
     shaped_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
         "length of its second moving average, where it builds up the acceleration as a bell; 0: none",
-        unit="s",
         fanuc="1622 with 1610#1",
         default=0.0,
         assumed=True,
@@ -206,13 +187,10 @@ class Controller(TomlTable):
         assumed=True,
     )
     program_memory_bytes: Annotated[int, Strict(), Field(gt=0)] = key(
-        "memory for programs; a larger output gets a warning", unit="bytes", default=262_144, assumed=True
+        "memory for programs; a larger output gets a warning", default=262_144, assumed=True
     )
     dnc_baud: Count = key(
-        "speed of the serial line when programs are drip fed; 0: not drip fed",
-        unit="baud",
-        fanuc="0103",
-        default=0,
+        "speed of the serial line when programs are drip fed; 0: not drip fed", fanuc="0103", default=0
     )
     macros: Bool = key(
         "whether programs may set and read variables (custom macros, an option of many controls)",
@@ -225,15 +203,10 @@ class Controller(TomlTable):
         default=11,
         assumed=True,
     )
-    least_increment_mm: Annotated[Positive, Field(le=0.1)] = key(
-        "smallest coordinate step in G21", unit="mm", default=0.001
-    )
-    least_increment_inch: Annotated[Positive, Field(le=0.01)] = key(
-        "smallest coordinate step in G20", unit="inch", default=0.0001
-    )
+    least_increment_mm: Annotated[Positive, Field(le=0.1)] = key("smallest coordinate step in G21", default=0.001)
+    least_increment_inch: Annotated[Positive, Field(le=0.01)] = key("smallest coordinate step in G20", default=0.0001)
     arc_radius_tolerance_mm: Positive = key(
         "start and end radius of an arc may differ by this much; beyond it the block is an error (alarm 0020)",
-        unit="mm",
         fanuc="3410",
         default=0.01,
         assumed=True,
@@ -249,9 +222,7 @@ class Controller(TomlTable):
     feed_decimals_inch: Annotated[int, Strict(), Field(ge=0, le=6)] = key(
         "decimals of an F word in inch/min", unit="digits", default=2, assumed=True
     )
-    minimum_feed_mm_per_min: Positive = key(
-        "smallest feed written in a block", unit="mm/min", default=1.0, assumed=True
-    )
+    minimum_feed_mm_per_min: Positive = key("smallest feed written in a block", default=1.0, assumed=True)
     no_buffer_m_codes: tuple[Annotated[int, Strict(), Field(ge=0, le=99_999_999)], ...] = key(
         "M codes at which the controller stops reading ahead, besides M00, M01, M02 and M30",
         fanuc="3411-3432",
@@ -284,18 +255,15 @@ class Controller(TomlTable):
     )
     max_program_bytes: Annotated[int, Strict(), Field(ge=1, le=4 * 10**9)] = key(
         "largest text that is read, with the programs that it calls, and largest text that is written",
-        unit="bytes",
         default=1_000_000_000,
     )
     max_expansion_bytes: Annotated[int, Strict(), Field(ge=1, le=4 * 10**9)] = key(
         "by how much the expanded program (macros, calls, modes resolved) may be longer than the text",
-        unit="bytes",
         default=33_554_432,
     )
     max_program_s: Annotated[Positive, Field(le=1e9)] = key(
         "time that a program may take at its feeds, with rapids and dwells: a slip of F or of a dwell is refused at "
         "its line instead of being played for hours",
-        unit="s",
         default=100_000.0,
     )
 
@@ -330,4 +298,99 @@ class PowerOn(TomlTable):
     )
     cycle_return: Literal["G98", "G99"] = key(
         "level to which a drilling cycle returns: initial (G98) or R (G99)", default="G98", assumed=True
+    )
+
+
+class FeedControl(TomlTable):
+    """How the controller follows changes of the feed."""
+
+    interval_mm: Positive = key(
+        "shortest piece of path over which the controller follows a change of the feed; scheduled blocks are not "
+        "shorter. A test cut with feeds that change every 0.2, 0.4 and 0.6 mm shows it (paper 001, figure 8)",
+        default=0.6,
+        assumed=True,
+    )
+    max_change_mm_per_min: Positive | None = key(
+        "largest change of the feed from one block to the next; left out: not limited", default=None
+    )
+    spindle_power_w: Positive | None = key(
+        "power that the spindle gives for as long as it takes; left out: not limited", default=None
+    )
+    spindle_torque_nm: Positive | None = key(
+        "torque that the spindle gives for as long as it takes; left out: not limited", default=None
+    )
+
+
+Seconds = Annotated[NonNegative, Field(le=3600)]
+
+
+class MCodeTimes(InlineTable):
+    """Times of single M codes."""
+
+    code: tuple[Annotated[int, Strict(), Field(ge=0, le=99_999_999)], ...] = key("M codes")
+    s: tuple[Seconds, ...] = key("their times", unit="s")
+
+    @model_validator(mode="after")
+    def _match(self) -> Self:
+        if len(self.code) != len(self.s) or len(set(self.code)) != len(self.code):
+            raise ValueError(f"{len(self.s)} times for {len(set(self.code))} M codes: one for each code is needed")
+        return self
+
+
+class SpindleTimes(InlineTable):
+    """Time that the spindle needs, by its speed: linear between the rows, and from 0 below the first."""
+
+    rpm: tuple[Positive, ...] = key("speeds, ascending", unit="1/min")
+    s: tuple[Seconds, ...] = key("times", unit="s")
+
+    @model_validator(mode="after")
+    def _match(self) -> Self:
+        if len(self.rpm) != len(self.s) or not self.rpm:
+            raise ValueError(f"{len(self.s)} times for {len(self.rpm)} speeds: one for each speed is needed")
+        if any(after <= before for before, after in pairwise(self.rpm)):
+            raise ValueError(f"rpm = {list(self.rpm)}: must ascend")
+        return self
+
+    @property
+    def rows(self) -> list[tuple[float, float]]:
+        """(speed in 1/min, time in s)."""
+        return list(zip(self.rpm, self.s, strict=True))
+
+
+class Times(TomlTable):
+    """What takes time beside the motion."""
+
+    program_start_s: Seconds = key("from the start key to the first block", default=0.0, assumed=True)
+    last_tool_in_spindle: Bool = key(
+        "parts are made in series: the last tool of a program is in the spindle when it starts anew, and an M06 that "
+        "calls it changes nothing; false: every M06 changes",
+        default=False,
+        assumed=True,
+    )
+    feed_override_percent: Annotated[Positive, Field(le=200)] = key(
+        "override of the feed at which this shop usually runs; `time` counts with it unless it is told another",
+        default=100.0,
+        assumed=True,
+    )
+    rapid_override_percent: Annotated[Positive, Field(le=200)] = key("the same of rapids", default=100.0, assumed=True)
+    tool_change_s: Seconds = key("an M06", default=0.0, assumed=True)
+    m_function_s: Seconds = key("any other M code that m_codes does not name", default=0.0, assumed=True)
+    m_codes: MCodeTimes | None = key(
+        "M codes with a time of their own, { code = [1, 8], s = [0.3, 5.1] }; left out: none", default=None
+    )
+    spindle_start: SpindleTimes | None = key(
+        "time in which the spindle comes from rest to a speed, { rpm = [5000, 12000], s = [1.0, 7.3] }; it passes "
+        "while the axes move, and what is left is waited for before the next M code or cut; left out: none",
+        default=None,
+    )
+    spindle_stop: SpindleTimes | None = key(
+        "likewise to rest behind M05; what is left is waited for by M00, M01, M02, M30, M06 and the next M03; left "
+        "out: none",
+        default=None,
+    )
+    unknown_move_s: AxisTimes = key(
+        "a rapid of an axis on a way of which the program does not tell start or end: G28, G30, G53, and the first one "
+        "behind them or behind M06. One number, or x, y, z",
+        default=0.0,
+        assumed=True,
     )

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from shapegcode.errors import Problem
-from shapegcode.machine.fanuc_dump import Dump
-from shapegcode.machine.fanuc_values import DumpValues
+from shapegcode.errors import ArgumentError, Problem
+from shapegcode.machine.axes import check_axes
+from shapegcode.machine.fanuc_dump import Dump, DumpValues
+from shapegcode.machine.machine import Machine
 from shapegcode.machine.result import AssumedValue, MissingParameter, ReadParameter, ReadTable, Value
 from shapegcode.results.result import Xyz
-
-__all__ = ["Draft"]
 
 
 class Draft:
@@ -20,27 +19,17 @@ class Draft:
     Args:
         dump: the records.
         data: tables of the machine from which it starts.
-
-    Attributes:
-        dump: the records.
-        values: the same as numbers and bits.
-        data: tables of the machine file.
-        read: every value of the dump that went into a key.
-        tables: tables of offsets and variables that went into keys.
-        assumed: what was taken though nobody says it.
-        missing: what the dump does not say, what was not understood, what is read and not used.
-        remarks: per dotted key, where its value comes from.
     """
 
     def __init__(self, dump: Dump, data: dict[str, Any]) -> None:
-        self.dump = dump
-        self.values = DumpValues(dump)
-        self.data = data
-        self.read: list[ReadParameter] = []
-        self.tables: list[ReadTable] = []
-        self.assumed: list[AssumedValue] = []
+        self.dump = dump  # the records
+        self.values = DumpValues(dump)  # the same as numbers and bits
+        self.data = data  # tables of the machine file
+        self.read: list[ReadParameter] = []  # every value of the dump that went into a key
+        self.tables: list[ReadTable] = []  # tables of offsets and variables that went into keys
+        self.assumed: list[AssumedValue] = []  # what was taken though nobody says it
         self.missing: list[MissingParameter] = []
-        self.remarks: dict[str, str] = {}
+        self.remarks: dict[str, str] = {}  # per dotted key, where its value comes from
 
     def problem(self, number: int, said: str) -> None:
         """Something that makes the dump useless; the line is that of the parameter."""
@@ -104,3 +93,31 @@ class Draft:
         table[name] = value
         shown: Value = "; ".join(f"{k} = {v}" for k, v in value.items()) or "none" if isinstance(value, dict) else value
         return shown
+
+
+def take_modes(draft: Draft, base: Machine | None, keep: str, rigid: str) -> None:
+    """Keep the modes of the base where somebody says that they are those of this machine; leave them out elsewhere."""
+    check_axes(keep, rigid)
+    for axis in "xyz":
+        modes = getattr(base.axes, axis).modes if base else ()
+        key = f"axes.{axis}"
+        if axis in keep:
+            if not modes:
+                raise ArgumentError(f"{axis.upper()}: {base.name if base else 'no base machine'} has no mode to keep")
+            draft.remarks[f"{key}.rigid"] = "its modes are kept"
+            continue
+        for name in ("modes", "rigid"):
+            draft.drop(f"{key}.{name}")
+        if axis in rigid:
+            draft.put(f"{key}.rigid", True)
+            draft.remarks[f"{key}.rigid"] = "decided when the dump was imported"
+            continue
+        found = ", ".join(f"{mode.frequency_hz:g} Hz" for mode in modes)
+        whose = (
+            f"; {found} of {base.name} are not taken over: --keep-modes {axis.upper()} does" if base and found else ""
+        )
+        draft.remarks[f"{key}.modes"] = "not measured"
+        draft.remarks[f"{key}.rigid"] = "assumed: not measured"
+        draft.miss(
+            "", f"{key}.modes: no dump holds them{whose}; identify finds them; --rigid {axis.upper()}: it has none"
+        )

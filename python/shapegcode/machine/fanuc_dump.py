@@ -6,13 +6,203 @@ Both grammars are read: ``N01420Q1A1P24000.0A2P24000.0`` (30i, 0i-D, 0i-F; the 1
 
 from __future__ import annotations
 
+import ast
+import math
+import operator
 import re
-from collections.abc import Container
+import struct
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 
 from shapegcode.errors import MachineError, Problem
 
-__all__ = ["Dump", "Entry", "read_dump"]
+_TABLE_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_G10 = re.compile(r"(?:N\s*\d+\s*)?(?:G9[01]\s*)?G10\b|(?:N\s*\d+\s*)?(?:G9[01]\s*)?G10(?=[A-Z])", re.ASCII)
+_WORD = re.compile(rf"([A-Z])\s*({_TABLE_NUMBER})\s*", re.ASCII)
+_DOUBLE = re.compile(r"\(\s*([0-9A-Fa-f]{16})\s*\)", re.ASCII)
+_ASSIGNMENT = re.compile(r"#\s*(\d{1,5})\s*=\s*(.+)", re.ASCII)
+_HARMLESS = re.compile(r"(?:O\d+|:\d+|M\d+|G90|G91|G11|SETVN\d+\[.*\]|\(.*\))?\s*;?", re.ASCII)
+_OPERATORS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
+_KEPT = range(500, 1000)
+_SYSTEMS = {number: f"G{53 + number}" for number in range(1, 7)}
+
+
+@dataclass
+class ControlTables:
+    """What the tables say, in the units that they are written in."""
+
+    # kinds of tool offset by number of G10: 1 (one value for all), 10 and 11 (geometry and wear of both, or of the
+    # length), 12 and 13 (of the radius)
+    kinds: set[int] = field(default_factory=set)
+    tools: dict[int, dict[int, tuple[float, bool]]] = field(default_factory=dict)  # per kind the offsets by number
+    # work offsets by name, "" for the one that is added to all
+    systems: dict[str, dict[str, tuple[float, bool]]] = field(default_factory=dict)
+    variables: dict[int, float | None] = field(default_factory=dict)  # by number; None: vacant
+    # per group ("tools", "systems", "variables") file, first and last line
+    sources: dict[str, tuple[str, int, int]] = field(default_factory=dict)
+    left_out: list[tuple[str, int, str]] = field(default_factory=list)  # lines that hold something else
+
+    def note(self, group: str, file: str, line: int) -> None:
+        """A line of a file was read into a group."""
+        first = self.sources[group][1] if group in self.sources and self.sources[group][0] == file else line
+        self.sources[group] = (file, first, line)
+
+
+def is_table(data: bytes) -> bool:
+    """Whether a file is such a table: its first line with words is a G10 or an assignment, or leads to one."""
+    for _, words in _lines(data):
+        if _G10.match(words) or _ASSIGNMENT.fullmatch(words):
+            return True
+        if not _HARMLESS.fullmatch(words):
+            return False
+    return False
+
+
+def read_table(data: bytes, file: str, tables: ControlTables) -> None:
+    """Read a table into those that were read before; a value that is there already is replaced."""
+    for line, words in _lines(data):
+        try:
+            if found := _ASSIGNMENT.fullmatch(words):
+                _variable(tables, int(found[1]), _value(found[2]), file, line)
+            elif _G10.match(words):
+                _take_words(tables, words, file, line)
+            elif not _HARMLESS.fullmatch(words):
+                tables.left_out.append((file, line, words[:60]))
+        except (ValueError, KeyError, SyntaxError, ZeroDivisionError, OverflowError) as bad:
+            said = f'"{words[:60]}": not a line of a table of offsets or variables ({bad})'
+            raise MachineError(file, (Problem("", "", said, line),)) from bad
+
+
+def _lines(data: bytes) -> Iterator[tuple[int, str]]:
+    """Lines with words, and their numbers, up to the second %."""
+    text = data.decode("latin-1").removeprefix("ï»¿")
+    seen = False
+    for number, raw in enumerate(text.split("\n" if "\n" in text else "\r"), start=1):
+        words = raw.strip().rstrip(";").strip()
+        if words.startswith("%"):
+            if seen:
+                return
+            continue
+        if words:
+            seen = True
+            yield number, words
+
+
+def _take_words(tables: ControlTables, words: str, file: str, line: int) -> None:
+    double = _DOUBLE.search(words)
+    bare = _DOUBLE.sub("", words)
+    found = _WORD.findall(bare)
+    if "".join(letter + number for letter, number in found) != re.sub(r"\s+", "", bare):
+        raise ValueError("words are a letter and a number")
+    values = {letter: number for letter, number in found if letter not in "GN"}
+    kind, number = int(values.pop("L", "1")), int(values.pop("P"))
+    if kind == 85:
+        if double is None:
+            raise ValueError("no value of 16 hexadecimal digits in brackets")
+        (value,) = struct.unpack(">d", bytes.fromhex(double[1]))
+        _variable(tables, number, value if math.isfinite(value) else None, file, line)
+    elif kind in (2, 20):
+        name = f"G54.1P{number}" if kind == 20 else "" if number == 0 else _SYSTEMS[number]
+        tables.systems[name] = {axis: _length(values[axis]) for axis in "XYZ" if axis in values}
+        tables.note("systems", file, line)
+    elif kind in (1, 10, 11, 12, 13):
+        tables.kinds.add(kind)
+        tables.tools.setdefault(kind, {})[number] = _length(values["R"])
+        tables.note("tools", file, line)
+    else:
+        tables.left_out.append((file, line, words[:60]))
+
+
+def _length(text: str) -> tuple[float, bool]:
+    """A length, and whether it has a decimal point."""
+    return float(text), "." in text
+
+
+def _variable(tables: ControlTables, number: int, value: float | None, file: str, line: int) -> None:
+    if number in _KEPT:
+        tables.variables[number] = value
+        tables.note("variables", file, line)
+    else:
+        tables.left_out.append((file, line, f"#{number}: not one that the control keeps (#500 to #999)"))
+
+
+def _value(text: str) -> float | None:
+    """The value of an assignment: a number, numbers joined by + - * / in square brackets, or #0, which is vacant."""
+    if re.fullmatch(r"#\s*0", text.strip()):
+        return None
+    if not re.fullmatch(r"[-+*/.\d\[\]\s]{1,200}", text):
+        raise ValueError("its value is no number")
+    return _computed(ast.parse(text.strip().replace("[", "(").replace("]", ")"), mode="eval").body)
+
+
+def _computed(node: ast.expr) -> float:
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+        return float(node.value)
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+        return -_computed(node.operand) if isinstance(node.op, ast.USub) else _computed(node.operand)
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        return float(_OPERATORS[type(node.op)](_computed(node.left), _computed(node.right)))
+    raise ValueError("its value is no number")
+
+
+LONGEST_MS = 10_000.0
+_LARGEST = 1e7
+MM_PER_INCH = 25.4
+
+
+class DumpValues:
+    """Takes values out of a dump."""
+
+    def __init__(self, dump: Dump) -> None:
+        self.dump = dump  # the records
+        self.axes = (1, 2, 3)  # numbers of the axes X, Y, Z in the dump
+        self.problems: list[Problem] = []  # values that cannot be; whoever takes values looks at them at the end
+        self.differing: list[tuple[int, float]] = []
+
+    def scalar(self, number: int, high: float = _LARGEST, unit: str = "", low: float = 0.0) -> float | None:
+        """A parameter without axes; where the dump gives it per axis, the largest of X, Y, Z."""
+        entry = self.dump.get(number)
+        if entry is not None:
+            return self._number(entry, low, high, unit)
+        values = [self._number(each, low, high, unit) for each in self.entries(number)]
+        if values and min(values) != max(values):
+            self.differing.append((number, max(values)))
+        return max(values, default=None)
+
+    def per_axis(self, number: int, high: float = _LARGEST, unit: str = "", low: float = 0.0) -> list[float] | None:
+        """The values of X, Y, Z; one without an axis stands for all three. None where the dump lacks one."""
+        entries = self.entries(number)
+        if len(entries) < 3:
+            one = self.dump.get(number)
+            return [self._number(one, low, high, unit)] * 3 if one else None
+        return [self._number(entry, low, high, unit) for entry in entries]
+
+    def entries(self, number: int) -> list[Entry]:
+        """What the dump has of a parameter for X, Y and Z, in this order."""
+        found = (self.dump.get(number, axis) for axis in self.axes)
+        return [entry for entry in found if entry is not None]
+
+    def bit(self, number: int, bit: int) -> bool | None:
+        """A bit of a parameter, counted from the right; None where the dump has none."""
+        entry = self.dump.get(number) or next(iter(self.entries(number)), None)
+        return None if entry is None else self.bit_of(entry, bit)
+
+    def bit_of(self, entry: Entry, bit: int) -> bool | None:
+        """A bit of a value, counted from the right; None, and a problem, where it is no eight bits."""
+        if len(entry.text) != 8 or set(entry.text) - {"0", "1"}:
+            name = f"parameter {entry.number} {entry.target}".rstrip()
+            self.problems.append(Problem(name, entry.text, "must be eight bits, 0 or 1", entry.line))
+            return None
+        return entry.text[7 - bit] == "1"
+
+    def _number(self, entry: Entry, low: float, high: float, unit: str) -> float:
+        value = float(entry.text) * (MM_PER_INCH if entry.letter == "I" and unit.startswith("mm") else 1.0)
+        if not low <= value <= high:
+            name = f"parameter {entry.number} {entry.target}".rstrip()
+            limit = f"must be {low:g} to {high:g} (unit: {unit})"
+            self.problems.append(Problem(name, entry.text, limit, entry.line))
+        return value
+
 
 _NUMBER = r"[-+]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})"
 _RECORD = re.compile(r"N\s*(\d{1,6})\s*(Q\d+)?\s*(.*)", re.ASCII)
@@ -22,45 +212,28 @@ _VALUES = re.compile(rf"(?:(?:[LAST]\s*\d{{1,4}}\s*)?[PMI]\s*{_NUMBER}\s*)+", re
 
 @dataclass(frozen=True)
 class Entry:
-    """One value of a dump.
+    """One value of a dump."""
 
-    Attributes:
-        number: parameter number.
-        target: "A1", "S2", "L1", "T1", or empty where the value has no axis, spindle or path.
-        letter: "P", or "M" and "I" for values in mm and inch.
-        text: the value as it stands there.
-        line: line number in the dump, from 1.
-    """
-
-    number: int
-    target: str
-    letter: str
-    text: str
-    line: int
+    number: int  # parameter number
+    target: str  # "A1", "S2", "L1", "T1", or empty where the value has no axis, spindle or path
+    letter: str  # "P", or "M" and "I" for values in mm and inch
+    text: str  # the value as it stands there
+    line: int  # line number in the dump, from 1
 
 
 @dataclass
 class Dump:
-    """The records of a dump.
+    """The records of a dump."""
 
-    Attributes:
-        file: its name.
-        entries: first value of each (number, target).
-        with_q: True where records carry Q1 (30i, 0i-D, 0i-F).
-        complete: True where a ``%`` ends it.
-        repeated: (number, line) of records that give a value again, for another path.
-        strange: (line, text) of lines that are no records.
-        records: how many records it has.
-        others: parameters that were not wanted, with the line of the first record of each.
-    """
-
-    file: str
-    entries: dict[tuple[int, str], Entry] = field(default_factory=dict)
-    with_q: bool = False
-    complete: bool = False
+    file: str  # its name
+    entries: dict[tuple[int, str], Entry] = field(default_factory=dict)  # first value of each (number, target)
+    with_q: bool = False  # True where records carry Q1 (30i, 0i-D, 0i-F)
+    complete: bool = False  # True where a ``%`` ends it
+    # (number, line) of records that give a value again, for another path
     repeated: list[tuple[int, int]] = field(default_factory=list)
-    strange: list[tuple[int, str]] = field(default_factory=list)
-    records: int = 0
+    strange: list[tuple[int, str]] = field(default_factory=list)  # (line, text) of lines that are no records
+    records: int = 0  # how many records it has
+    # parameters that were not wanted, with the line of the first record of each
     others: dict[int, int] = field(default_factory=dict)
 
     def get(self, number: int, axis: int | None = None) -> Entry | None:

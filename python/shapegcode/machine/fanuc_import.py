@@ -14,18 +14,13 @@ from typing import Any
 from shapegcode.errors import MachineError, Problem
 from shapegcode.io.data_file import read_file
 from shapegcode.machine import fanuc_motion, fanuc_program
-from shapegcode.machine.fanuc_draft import Draft
-from shapegcode.machine.fanuc_dump import read_dump
-from shapegcode.machine.fanuc_modes import take_modes
-from shapegcode.machine.fanuc_motion import take_motion
-from shapegcode.machine.fanuc_offsets import take_tables
+from shapegcode.machine.fanuc_draft import Draft, take_modes
+from shapegcode.machine.fanuc_dump import ControlTables, is_table, read_dump, read_table
+from shapegcode.machine.fanuc_motion import take_motion, take_tables
 from shapegcode.machine.fanuc_program import take_program
-from shapegcode.machine.fanuc_tables import ControlTables, is_table, read_table
 from shapegcode.machine.machine import Machine
 from shapegcode.machine.result import DEFAULT_WHY, ParameterImport
 from shapegcode.settings.remarks import inherited
-
-__all__ = ["import_parameters"]
 
 _EXPECTED = (20, 1013, 1401, 1420, 1430, 1604, 1610, 1620, 1622, 1660, 1735, 1783, 1820, 1825, 1826, 3401, 3402, 3410)
 _LONGEST_NAME = 60

@@ -8,9 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from shapegcode.machine.fanuc_draft import Draft
-from shapegcode.machine.fanuc_values import MM_PER_INCH
-
-__all__ = ["NUMBERS", "increment_um", "is_inch", "take_program"]
+from shapegcode.machine.fanuc_dump import MM_PER_INCH
 
 _SERIAL = {0: 103, 1: 113, 2: 123, 3: 133}
 """Channel of 0020 -> parameter of its transfer speed; other channels are cards, networks, data servers."""

@@ -41,17 +41,13 @@ class Input(TomlTable):
         default={},
     )
     tool_radius_mm: dict[str, Float] = key(
-        'cutter radius by offset number D, for programs with G41 or G42 that are expanded: { "1" = 5.0 }',
-        unit="mm",
-        default={},
+        'cutter radius by offset number D, for programs with G41 or G42 that are expanded: { "1" = 5.0 }', default={}
     )
-    tool_radius_wear_mm: dict[str, Float] = key("wear of the radius by offset number D", unit="mm", default={})
+    tool_radius_wear_mm: dict[str, Float] = key("wear of the radius by offset number D", default={})
     tool_length_mm: dict[str, Float] = key(
-        "tool length by offset number H; with it the Z travel of a tool length change is known",
-        unit="mm",
-        default={},
+        "tool length by offset number H; with it the Z travel of a tool length change is known", default={}
     )
-    tool_length_wear_mm: dict[str, Float] = key("wear of the length by offset number H", unit="mm", default={})
+    tool_length_wear_mm: dict[str, Float] = key("wear of the length by offset number H", default={})
     compensation: Literal["refuse", "expand", "keep"] = key(
         'what `convert` does with cutter compensation G41/G42. "refuse": says so and stops; "expand": shapes the tool '
         'path of the radius given here: the offset in the control no longer acts; "keep": leaves these moves as they '
@@ -76,7 +72,6 @@ class Input(TomlTable):
     )
     peck_clearance_mm: NonNegative = key(
         "distance to which a peck of G73 and G83 returns before it feeds on; for the clock",
-        unit="mm",
         fanuc="5114, 5115",
         default=0.5,
         assumed=True,

@@ -19,19 +19,14 @@ from pydantic import Field, PrivateAttr, Strict, model_validator
 
 from shapegcode._core import Mode
 from shapegcode.errors import ArgumentError, MachineError, Problem
-from shapegcode.machine.axes import Axes, Axis, AxisMode
-from shapegcode.machine.controller import Controller, PowerOn
-from shapegcode.machine.drive import Drive
-from shapegcode.machine.feed import FeedControl
+from shapegcode.machine.axes import Axes
+from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Times
 from shapegcode.machine.input import Input
 from shapegcode.machine.output import Emission, Price, Shaping, Tolerance, Verdict
-from shapegcode.machine.times import Times
-from shapegcode.settings import change
-from shapegcode.settings.describe import values_of, write_short_toml, write_toml
-from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Text, TomlTable, key, toml
-from shapegcode.settings.load import parsed, read_text, validated
-from shapegcode.settings.problems import MAX_PROBLEMS, KeyProblem, further_problems, line_of
-from shapegcode.settings.reference import documentation
+from shapegcode.settings import edit
+from shapegcode.settings.describe import documentation, values_of, write_short_toml, write_toml
+from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml
+from shapegcode.settings.load import MAX_PROBLEMS, KeyProblem, further_problems, line_of, parsed, read_text, validated
 from shapegcode.settings.remarks import (
     DEFAULT,
     ORIGIN_TEXT,
@@ -46,29 +41,6 @@ from shapegcode.settings.remarks import (
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
 _VARIABLE = re.compile(r"#\d+")
 _USUAL_DIAL_PERCENT = (70.0, 120.0)  # as far as operators turn it without thinking
-
-__all__ = [
-    "Axes",
-    "Axis",
-    "AxisMode",
-    "Controller",
-    "Drive",
-    "Emission",
-    "FeedControl",
-    "Input",
-    "KeyInfo",
-    "KeyValue",
-    "Machine",
-    "PerAxis",
-    "PowerOn",
-    "Price",
-    "Shaping",
-    "Times",
-    "Tolerance",
-    "Verdict",
-    "inherited_text",
-    "key_documentation",
-]
 
 
 class Machine(TomlTable):
@@ -416,7 +388,7 @@ class Machine(TomlTable):
             MachineError: no such key, or a value that a machine file could not have; every problem is listed.
         """
         values = {key: value} if isinstance(key, str) else key
-        changed = change.with_values(self, values, source or self.name, MachineError)
+        changed = edit.with_values(self, values, source or self.name, MachineError)
         below = tuple(f"{name}." for name in values)
         changed._remarks = {
             name: remark for name, remark in self._remarks.items() if name not in values and not name.startswith(below)

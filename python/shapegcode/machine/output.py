@@ -20,12 +20,10 @@ class Emission(TomlTable):
     block_period_s: Annotated[Positive, Field(le=1)] | None = key(
         "duration of a short block: a whole multiple of controller.interpolation_period_s and not below "
         "controller.block_time_s; left out: chosen for the shortest shaper",
-        unit="s",
         default=None,
     )
     prologue: tuple[Text, ...] = key(
-        'lines written before each shaped cut, for example ["G05.1 Q0"] to switch a look-ahead mode off',
-        default=(),
+        'lines written before each shaped cut, for example ["G05.1 Q0"] to switch a look-ahead mode off', default=()
     )
     epilogue: tuple[Text, ...] = key("lines written after each shaped cut", default=())
     override: Literal["ask", "any", "lock"] = key(
@@ -49,12 +47,11 @@ class Emission(TomlTable):
         default=("G53", "#3004=#33"),
     )
     prefill_dwell_s: Annotated[NonNegative, Field(le=60)] = key(
-        "dwell before each shaped cut, in which the block buffer fills; 0: none", unit="s", default=0.0
+        "dwell before each shaped cut, in which the block buffer fills; 0: none", default=0.0
     )
     restart_interval_s: Positive = key(
         "cutting time between restart points of a shaped cut, at most, where its command comes nearly to rest anyway; "
         "a block period or more; longer than the cuts: none",
-        unit="s",
         default=60.0,
     )
     restart_stops: Bool = key(
@@ -81,7 +78,6 @@ class Emission(TomlTable):
     )
     arc_min_chord_mm: NonNegative = key(
         "a piece of an arc with a shorter chord is written as a line: rounding could turn it into a full circle",
-        unit="mm",
         default=0.02,
     )
     merge_tolerance_increments: NonNegative = key(
@@ -132,7 +128,7 @@ class Emission(TomlTable):
 class Shaping(TomlTable):
     """What is shaped, and how."""
 
-    max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", unit="s", default=0.25)
+    max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", default=0.25)
     family: Literal[
         "auto",
         "zv",
@@ -155,8 +151,8 @@ class Shaping(TomlTable):
         "smooth-si",
         "smooth-zvd-ei",
     ] = key(
-        'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative taps, exact '
-        "at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
+        'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative impulses, '
+        "exact at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
         default="auto",
     )
     per_axis: Bool = key(
@@ -170,9 +166,7 @@ class Shaping(TomlTable):
         default=0.05,
     )
     arc_feed_ratio: Annotated[Positive, Field(le=1)] = key(
-        "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction",
-        unit="1",
-        default=1.0,
+        "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction", default=1.0
     )
     contour: Literal["response", "command", "off"] = key(
         "what is brought back to the programmed path behind the shaper, at the highest feed that keeps "
@@ -188,19 +182,16 @@ class Shaping(TomlTable):
     least_gain_um: NonNegative = key(
         "a cut stays unchanged unless shaping lowers residual vibration or the contour error of the machine table by "
         "at least this; 0: everything is shaped",
-        unit="µm",
         default=3.0,
     )
     plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
         "a corner is a forced stop of the shaped command if a side of it leans from the Z axis by no more than "
         "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",
-        unit="degrees",
         default=15.0,
     )
     part_mass_kg: NonNegative | None = key(
         "mass of the part on the table, for modes with a table over mass_kg; left out: not known, and their "
         "nominal frequency holds",
-        unit="kg",
         default=None,
     )
 
@@ -213,16 +204,14 @@ class Tolerance(TomlTable):
 
     contour_um: Positive = key(
         "largest deviation from the programmed path of what shaping.contour names: the response, or the command",
-        unit="µm",
         default=20.0,
     )
     residual_ratio: Annotated[NonNegative, Field(le=1)] = key(
         "residual vibration passes if it is below this share of the original program's, or below residual_floor_um",
-        unit="1",
         default=0.25,
     )
     residual_floor_um: NonNegative = key(
-        "residual vibration below this passes whatever the original's was", unit="µm", default=3.0
+        "residual vibration below this passes whatever the original's was", default=3.0
     )
     residual_floor_increments: NonNegative = key(
         "residual vibration below this passes too: rounding the words alone may leave a lightly damped mode so much",
@@ -233,7 +222,6 @@ class Tolerance(TomlTable):
         "share by which the set-points may run faster along the path than the program says at the same place, counted "
         "over one, four and sixteen shortest blocks less the two increments by which rounding may lengthen a block; "
         "corrections of the contour keep to it, and ask for 0.01 at least",
-        unit="1",
         default=0.05,
     )
 
@@ -242,11 +230,9 @@ class Price(TomlTable):
     """What shaping may cost: a cut that costs more gets the tightest tolerance within the price, or stays as it is."""
 
     program_time_percent: Annotated[Positive, Field(le=1e6)] = key(
-        "largest increase of the program's time", unit="%", default=10.0
+        "largest increase of the program's time", default=10.0
     )
-    cut_time_percent: Annotated[Positive, Field(le=1e6)] = key(
-        "largest increase of the time of one cut", unit="%", default=25.0
-    )
+    cut_time_percent: Annotated[Positive, Field(le=1e6)] = key("largest increase of the time of one cut", default=25.0)
 
 
 ANY_PRICE = {"price.program_time_percent": 1e6, "price.cut_time_percent": 1e6}
@@ -265,7 +251,6 @@ class Verdict(TomlTable):
     override_percent: tuple[_Override, _Override] = key(
         "lowest and highest feed override under which the program will run: every case in between must be good. The "
         "header of a program asks for 100 %, so only that counts unless you state more",
-        unit="%",
         default=(100.0, 100.0),
     )
     mode_uncertainty: Bool = key(
@@ -289,7 +274,7 @@ class Verdict(TomlTable):
         default=False,
     )
     starved_s: Annotated[Positive, Field(le=10)] = key(
-        "how long the axes then wait for the next block", unit="s", default=0.02, assumed=True
+        "how long the axes then wait for the next block", default=0.02, assumed=True
     )
 
     @model_validator(mode="after")

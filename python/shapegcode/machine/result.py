@@ -13,16 +13,6 @@ from shapegcode.results.result import Result, Xyz
 from shapegcode.results.table import Column, Table
 from shapegcode.settings.keys import toml
 
-__all__ = [
-    "DEFAULT_WHY",
-    "AssumedValue",
-    "MissingParameter",
-    "ParameterImport",
-    "ReadParameter",
-    "ReadTable",
-    "Value",
-]
-
 DEFAULT_WHY = "default of the machine file"
 """Why a value is assumed that the dump does not hold and no decision was needed for."""
 _SHOWN = 20

@@ -217,22 +217,15 @@ class WallRoughness:
 
 @dataclass(frozen=True, eq=False)
 class WallProfile:
-    """The walls of a section.
+    """The walls of a section."""
 
-    Attributes:
-        distance_mm: of the stations from the region's start, (n,).
-        left_um: deviation of the left wall from what the programmed path cuts, positive to the left, (n,); NaN where
-            there is no wall.
-        right_um: of the right wall, likewise.
-        point_mm: of the programmed path there, seen from above, (n, 2).
-        normal: unit vectors to the left of the path, (n, 2); zero where it has no horizontal direction.
-    """
-
-    distance_mm: FloatArray
+    distance_mm: FloatArray  # of the stations from the region's start, (n,)
+    # deviation of the left wall from what the programmed path cuts, positive to the left, (n,); NaN where there is no
+    # wall
     left_um: FloatArray
-    right_um: FloatArray
-    point_mm: FloatArray
-    normal: FloatArray
+    right_um: FloatArray  # of the right wall, likewise
+    point_mm: FloatArray  # of the programmed path there, seen from above, (n, 2)
+    normal: FloatArray  # unit vectors to the left of the path, (n, 2); zero where it has no horizontal direction
 
 
 @dataclass(frozen=True, eq=False)

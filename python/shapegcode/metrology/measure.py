@@ -24,7 +24,7 @@ from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program
-from shapegcode.program.pairing import paired_regions
+from shapegcode.program.compensation import paired_regions
 
 FloatArray = npt.NDArray[np.float64]
 _CHUNK_SAMPLES = 65_536

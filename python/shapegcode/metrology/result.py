@@ -2,37 +2,274 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from shapegcode import _core
-from shapegcode.metrology.figures import MeasuredSection, SidedError
-from shapegcode.metrology.tables import section_table, summary_table
+from shapegcode.metrology.figures import FittedCircle, MeasuredArc, MeasuredSection, SidedError, WallDeviation
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.results.figures import Tracks, largest_xyz_um
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result, Xyz
-from shapegcode.results.table import Table
+from shapegcode.results.table import Column, Table
+
+_MOST_SECTIONS = 12
+_SHOWN_UM = 0.005  # less is shown as 0.00
+
+Sections = Sequence[MeasuredSection]
+Values = Callable[[MeasuredSection], Sequence[float | None]]
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One row of a table."""
+
+    name: str  # what is measured
+    values: tuple[str, ...]  # as text, one per program
+    nominal: str = ""  # what it should be; empty where that is nothing but zero
+    limit: str = ""  # what the machine file allows; empty: nothing stated
+    out: tuple[bool, ...] = ()  # for each program, whether it is beyond the limit
+    heading: bool = False  # it begins a section
+
+
+def _program_columns(names: Sequence[str]) -> tuple[Column, ...]:
+    """One per program; the values of more than two wrap, so that they fit beside each other."""
+    return tuple(
+        Column(name, value=partial(_value, rank), style=partial(_style, rank), text=len(names) > 2)
+        for rank, name in enumerate(names)
+    )
+
+
+def _value(rank: int, row: _Row) -> str:
+    return row.values[rank] if row.values else ""
+
+
+def _style(rank: int, row: _Row) -> str:
+    return "bold red" if row.out and row.out[rank] else ""
+
+
+# --- the worst of every figure ----------------------------------------------------------------------------------------
+
+
+def summary_table(
+    title: str, programs: Mapping[str, Sections], whole: Mapping[str, tuple[float, float]], band_um: float
+) -> Table:
+    """The largest of each figure with section and line, one column per program."""
+    rows = [
+        _Row("cutting time s", tuple(f"{time_s:.2f}" for time_s, _ in whole.values())),
+        _Row("contour error µm, corners included", tuple(f"{largest:.2f}" for _, largest in whole.values())),
+    ]
+    for name, values in _figures(band_um):
+        worst = [_worst(sections, values) for sections in programs.values()]
+        if any(worst):
+            rows.append(_Row(name, tuple(cell or "–" for cell in worst)))
+    columns = (Column("largest (section, line)", value="name", text=True), *_program_columns(list(programs)))
+    return Table(title, columns, rows)
+
+
+def _worst(sections: Sections, values: Values) -> str:
+    """The largest value and its place; empty where no section has the figure."""
+    found = [
+        (value, -number, section)
+        for number, section in enumerate(sections, start=1)
+        for value in values(section)
+        if value is not None
+    ]
+    if not found:
+        return ""
+    value, number, section = max(found, key=lambda each: each[:2])
+    text = "not settled" if math.isinf(value) else f"{value:.2f}"
+    return f"{text} ({-number}, {section.place})"
+
+
+def _figures(band_um: float) -> Iterator[tuple[str, Values]]:
+    """Name with unit, and the values of a section of which the largest counts."""
+    yield "contour error of a section µm", lambda s: [s.contour_error_um.response.max]
+    for name, key in (("peak vibration", "peak_vibration_um"), ("residual at the stop", "residual_vibration_um")):
+        for axis in "xyz":
+            yield f"{name} {axis.upper()} µm", partial(_of_axis, key, axis)
+    yield f"settling to {band_um:g} µm, ms", _settling_ms
+    yield "fitted radius off µm", lambda s: [_radius_off(s, "response")]
+    yield (
+        "inside, outside wall radius off µm",
+        lambda s: [_radius_off(s, "inside_wall"), _radius_off(s, "outside_wall")],
+    )
+    yield "orbit error of response %", lambda s: [None if s.arc is None else s.arc.orbit_error_percent.response]
+    yield "cut-width band µm", lambda s: [wall.band for wall in s.wall_deviation_um.both()]
+    yield "width off µm", _width_off_um
+    yield "Ra of a wall µm", partial(_of_walls, "ra_um")
+    yield "Wa of a wall µm", partial(_of_walls, "wa_um")
+
+
+def _of_axis(key: str, axis: str, section: MeasuredSection) -> list[float | None]:
+    found: Xyz[float] | None = getattr(section, key)
+    return [None if found is None else found[axis]]
+
+
+def _of_walls(key: str, section: MeasuredSection) -> list[float | None]:
+    return [None if wall is None else getattr(wall, key) for wall in section.roughness.both()]
+
+
+def _settling_ms(section: MeasuredSection) -> list[float | None]:
+    return [math.inf if value is None else 1e3 * value for value in section.settling_time_s or ()]
+
+
+def _radius_off(section: MeasuredSection, key: str) -> float | None:
+    circle: FittedCircle | None = None if section.arc is None else getattr(section.arc, key)
+    return None if circle is None else abs(circle.radius_deviation_um)
+
+
+def _width_off_um(section: MeasuredSection) -> list[float | None]:
+    width = section.width_mm
+    return [None if value is None else 1e3 * abs(value - width.nominal) for value in (width.min, width.max)]
+
+
+# --- section by section -----------------------------------------------------------------------------------------------
+
+
+def section_table(
+    title: str, programs: Mapping[str, Sections], limit_um: float | None, band_um: float, *, every: bool
+) -> Table:
+    """The figures of each section, one column per program."""
+    count = min(len(sections) for sections in programs.values())
+    worst = [max(each[index].contour_error_um.response.max for each in programs.values()) for index in range(count)]
+    shown = sorted(range(count), key=lambda index: -worst[index])[: None if every else _MOST_SECTIONS]
+    rows: list[_Row] = []
+    for index in sorted(shown):
+        beside = [sections[index] for sections in programs.values()]
+        rows.append(_Row(beside[0].name(index + 1), (), heading=True))
+        rows += _section_rows(beside, limit_um, band_um)
+    columns = (
+        Column("figure", value="name", text=True),
+        Column("nominal", value="nominal"),
+        *_program_columns(list(programs)),
+        Column("limit", value="limit"),
+    )
+    left_out = count - len(shown)
+    caption = f"{left_out} more sections, whose contour error is less: --verbose shows them, --json lists them"
+    return Table(
+        title, columns, rows, caption=caption if left_out else "",
+        sections=[rank for rank, row in enumerate(rows) if row.heading],
+        row_style=lambda row: "bold" if row.heading else "",
+    )  # fmt: skip
+
+
+def _section_rows(sections: Sections, limit_um: float | None, band_um: float) -> Iterator[_Row]:
+    """The rows of one section, as it came out in each program."""
+    yield _Row("length mm, time s", _each(sections, lambda s: f"{s.time_s:.3f}"), f"{sections[0].length_mm:.3f}")
+    yield from _contour_rows(sections, limit_um)
+    arcs = [section.arc for section in sections if section.arc is not None]
+    if arcs:
+        yield from _arc_rows(arcs)
+    yield from _wall_rows(sections)
+    yield from _roughness_rows(sections)
+    yield _Row("peak vibration X / Y / Z µm", _each(sections, lambda s: _axes(s.peak_vibration_um)))
+    if any(section.residual_vibration_um is not None for section in sections):
+        yield _Row("residual at the stop X / Y / Z µm", _each(sections, lambda s: _axes(s.residual_vibration_um)))
+        yield _Row(f"settled to {band_um:g} µm X / Y / Z ms", _each(sections, _settling))
+
+
+def _contour_rows(sections: Sections, limit_um: float | None) -> Iterator[_Row]:
+    response = [section.contour_error_um.response for section in sections]
+    command = [section.contour_error_um.command for section in sections]
+    yield _Row(
+        "contour error µm",
+        tuple(f"{each.max:.2f}" for each in response),
+        "0",
+        "" if limit_um is None else f"{limit_um:g}",
+        tuple(limit_um is not None and each.max > limit_um for each in response),
+    )
+    yield _Row("  left / right µm", tuple(_pair((each.left, each.right), 2) for each in response))
+    if _off_the_level(response):
+        yield _Row("  above / below µm", tuple(_pair((each.above, each.below), 2) for each in response))
+    yield _Row("  RMS µm", tuple(f"{each.rms:.2f}" for each in response))
+    yield _Row("command left / right µm", tuple(_pair((each.left, each.right), 2) for each in command), "0")
+    if _off_the_level(command):
+        yield _Row("command above / below µm", tuple(_pair((each.above, each.below), 2) for each in command), "0")
+
+
+def _off_the_level(errors: Sequence[SidedError]) -> bool:
+    return any(value >= _SHOWN_UM for each in errors for value in (each.above, each.below))
+
+
+def _arc_rows(arcs: Sequence[MeasuredArc]) -> Iterator[_Row]:
+    track = [arc.response for arc in arcs]
+    for name, circles in (
+        ("fitted radius", track),
+        ("inside wall", [arc.inside_wall for arc in arcs]),
+        ("outside wall", [arc.outside_wall for arc in arcs]),
+    ):
+        nominal = next((circle.nominal_radius_mm for circle in circles if circle is not None), None)
+        if nominal is not None:
+            yield _Row(f"{name} mm (µm off)", tuple(map(_radius, circles)), f"{nominal:.3f}")
+    if any(circle is not None for circle in track):
+        form = ("–" if circle is None else f"{circle.form_error_um:.2f}" for circle in track)
+        yield _Row("form error µm", tuple(form), "0")
+        centre = ("–" if circle is None else _pair(circle.centre_offset_um, 1) for circle in track)
+        yield _Row("centre off µm", tuple(centre), "0")
+    orbits = (arc.orbit_error_percent.response for arc in arcs)
+    yield _Row("orbit error of response %", tuple("–" if value is None else f"{value:.4f}" for value in orbits), "0")
+
+
+def _radius(circle: FittedCircle | None) -> str:
+    return "–" if circle is None else f"{circle.fitted_radius_mm:.4f} ({circle.radius_deviation_um:+z.1f})"
+
+
+def _wall_rows(sections: Sections) -> Iterator[_Row]:
+    walls = [section.wall_deviation_um for section in sections]
+    if all(wall.stations == 0 for each in walls for wall in each.both()):
+        return
+    yield _Row("left wall, from / to µm", tuple(_span(each.left) for each in walls), "0")
+    yield _Row("right wall, from / to µm", tuple(_span(each.right) for each in walls), "0")
+    bands = tuple(_pair([wall.band for wall in each.both()], 2) for each in walls)
+    yield _Row("cut-width band left / right µm", bands, "0")
+    widths = [section.width_mm for section in sections]
+    ends = (_pair((width.min, width.max), 4) for width in widths)
+    yield _Row("width least / most mm", tuple(ends), f"{widths[0].nominal:.3f}")
+
+
+def _span(wall: WallDeviation) -> str:
+    return "–" if wall.min is None or wall.max is None else f"{wall.min:+z.2f} … {wall.max:+z.2f}"
+
+
+def _roughness_rows(sections: Sections) -> Iterator[_Row]:
+    if all(wall is None for section in sections for wall in section.roughness.both()):
+        return
+    for name, key in (("Ra", "ra_um"), ("Rz", "rz_um"), ("Wa", "wa_um")):
+        yield _Row(f"{name} left / right µm", tuple(_pair(_of_walls(key, section), 3) for section in sections))
+
+
+def _each(sections: Sections, text: Callable[[MeasuredSection], str]) -> tuple[str, ...]:
+    return tuple(text(section) for section in sections)
+
+
+def _settling(section: MeasuredSection) -> str:
+    if section.settling_time_s is None or section.observed_rest_s is None:
+        return "–"
+    late = f"> {section.observed_rest_s * 1e3:.0f}"
+    return " / ".join(late if value is None else f"{value * 1e3:.0f}" for value in section.settling_time_s)
+
+
+def _axes(values: Xyz[float] | None) -> str:
+    return "–" if values is None else " / ".join(f"{value:.2f}" for value in values)
+
+
+def _pair(values: Sequence[float | None], decimals: int) -> str:
+    return " / ".join("–" if value is None else f"{value:z.{decimals}f}" for value in values)
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredRegion:
-    """One cutting region of a program, measured.
+    """One cutting region of a program, measured."""
 
-    Attributes:
-        lines: of the program whose path it is measured against, first and last, from 1.
-        path: that path.
-        figures: what the core measured.
-        sections: of the path, in order.
-        station_spacing_mm: largest distance between two places at which walls were measured.
-    """
-
-    lines: tuple[int, int]
-    path: _core.Path
-    figures: _core.TrackFigures
-    sections: tuple[MeasuredSection, ...]
-    station_spacing_mm: float
+    lines: tuple[int, int]  # of the program whose path it is measured against, first and last, from 1
+    path: _core.Path  # that path
+    figures: _core.TrackFigures  # what the core measured
+    sections: tuple[MeasuredSection, ...]  # of the path, in order
+    station_spacing_mm: float  # largest distance between two places at which walls were measured
 
 
 @dataclass(frozen=True, eq=False)

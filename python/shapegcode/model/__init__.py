@@ -1,1 +1,1 @@
-"""From the machine to the core: its controller, modes and drives, and programs played on them."""
+"""From the machine to the core: its controller, modes and drives, and programs simulated on them."""

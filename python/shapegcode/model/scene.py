@@ -1,6 +1,6 @@
-"""Programs played for a page: one motion in time beside the other, thinned as it passes by.
+"""Programs simulated for a page: one motion in time beside the other, thinned as it passes by.
 
-Memory does not grow with the length of a program: each piece is thinned as soon as it was played.
+Memory does not grow with the length of a program: each piece is thinned as soon as it was simulated.
 """
 
 from __future__ import annotations
@@ -13,14 +13,22 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import fanuc_model
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import axis_modes
 from shapegcode.model.stream import Chunk, stream
 from shapegcode.program import Program
-from shapegcode.program.pairing import paired_regions
-from shapegcode.results.page.scene import ModeLine, Scene, SceneSpectrum, Variant
-from shapegcode.results.page.thinning import PIXELS_HIGH, PIXELS_WIDE, AccelerationSpectrum, Kept, Thinner
+from shapegcode.program.compensation import paired_regions
+from shapegcode.results.page.scene import (
+    PIXELS_HIGH,
+    PIXELS_WIDE,
+    AccelerationSpectrum,
+    Kept,
+    ModeLine,
+    Scene,
+    SceneSpectrum,
+    Thinner,
+    Variant,
+)
 
 MOST_POINTS = 60_000
 """Samples of a program that a page shows, at most."""
@@ -39,7 +47,7 @@ _FLAT = {
 
 @dataclass(frozen=True)
 class _Nominal:
-    """A cut that is played, and the path that it shall follow."""
+    """A cut that is simulated, and the path that it shall follow."""
 
     first_line: int
     last_line: int
@@ -82,7 +90,7 @@ def scene_of(
     most_points: int = MOST_POINTS,
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Scene:
-    """Play a program, and the one that was made of it, for a page."""
+    """Simulate a program, and the one that was made of it, for a page."""
     programs = [original, *([emitted] if emitted is not None else [])]
     period_s = MachineModel(machine).period_s
     variants, spectra, said = [], [], []

@@ -38,7 +38,7 @@ def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]
         found.append(
             (
                 "edited",
-                f"the text was changed since it was shaped (its header says {stamp.mark}, it comes to {mark}): the "
+                f"the program was changed since it was shaped (its header says {stamp.mark}, it comes to {mark}): the "
                 "verdict in its header does not hold for it; convert the original again",
             )
         )
@@ -52,8 +52,8 @@ def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]
         found.append(
             (
                 "unmarked",
-                "its header says that it is shaped, but no region is marked (SHAPED): played as an ordinary program "
-                "(simulate --shaped plays all of it as shaped blocks)",
+                "its header says that it is shaped, but no cut is marked (SHAPED): simulated as an ordinary program "
+                "(simulate --shaped simulates all of it as shaped blocks)",
             )
         )
     return found
@@ -78,7 +78,7 @@ def _other_period(stamp: Stamp, machine: Machine) -> str:
 
 
 def shaped_note(program: Program) -> str:
-    """How a program is played, in one sentence; empty for one without shaped regions."""
+    """How a program is simulated, in one sentence; empty for one without shaped regions."""
     shaped, whole = program.shaped_regions, len(program.regions)
     if not shaped:
         return ""

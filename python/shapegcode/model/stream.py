@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import fanuc_model
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import Offset
 from shapegcode.program import Program, given_program
 
@@ -32,7 +31,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """A stretch of a played program; one row per interpolation period.
+    """A stretch of a simulated program; one row per interpolation period.
 
     Attributes:
         sample: number of each row since the start of the program, (k,).
@@ -104,7 +103,7 @@ def stream(
     lines: tuple[int, int] | None = None,
     chunk_samples: int = _CHUNK_SAMPLES,
 ) -> Iterator[Chunk]:
-    """Play a whole program and give its motion piece by piece.
+    """Simulate a whole program and give its motion piece by piece.
 
     Regions, other cutting moves, rapids, waits for in-position, dwells, tool changes and M functions follow each other
     as `sg.cycle_time` counts them; behind the end the set-points rest for a quarter of a second. Where coordinates jump
@@ -115,7 +114,7 @@ def stream(
         machine: controller and plant.
         plant: "modal" or "feed-drive".
         shaped: cuts are shaped blocks, see `simulate`.
-        lines: give what happens in these lines alone, first and last, of the expanded text; the program is played from
+        lines: give what happens in these lines alone, first and last, of the expanded program, which is simulated from
             its start in any case.
         chunk_samples: rows of a piece, at most.
 

@@ -1,4 +1,4 @@
-"""What an operator must heed at the control: one sentence for reports and pages, one comment for programs.
+"""What an operator must observe at the control: one sentence for reports and pages, one comment for programs.
 
 Programs that shapegcode emits, its test cuts and its characterization tests say it with the same words.
 """
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Habit:
-    """One thing to heed.
+    """One caution.
 
     Attributes:
         topic: what it is about, in a word or two.

@@ -12,11 +12,15 @@ from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode._core import ProgramError
-from shapegcode.program.memory import require_memory_for_lines
-from shapegcode.program.reading import Reading, is_program_text, program_bytes
+from shapegcode.program.reading import (
+    Reading,
+    is_program_text,
+    program_bytes,
+    require_memory_for_lines,
+    signs_of_turning,
+)
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
-from shapegcode.program.turning import signs_of_turning
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine

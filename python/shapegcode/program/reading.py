@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
+from shapegcode._core import ProgramError
 from shapegcode.io.atomic import named_errors
 from shapegcode.io.data_file import open_file
-from shapegcode.program.memory import require_memory
 from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:
@@ -235,3 +237,102 @@ def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[
         return None
 
     return load
+
+
+_CGROUP = Path("/sys/fs/cgroup")
+_PER_LINE = 130
+"""Bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)."""
+_SMALL_BYTES = 2**20
+MEMORY_NEEDED = "bytes of memory are needed"
+"""What a refusal for want of memory says: a batch that limits it tells it apart by that."""
+
+
+def available_bytes() -> int | None:
+    """Memory that this process may still take: of the machine, of its control group, and of its own limits."""
+    found = [_of_meminfo("MemAvailable"), *_of_groups(), *_of_own_limits()]
+    known = [value for value in found if value is not None]
+    return max(0, min(known)) if known else None
+
+
+def require_memory(source: str, needed: int, what: str) -> None:
+    """Refuse what the memory would not hold."""
+    available = available_bytes()
+    if available is not None and needed > available:
+        raise ProgramError(
+            f"{source}:1:1: {what}: some {needed} {MEMORY_NEEDED} and {available} are available; split the "
+            "program, or take a machine with more memory"
+        )
+
+
+def require_memory_for_lines(text: bytes, source: str, per_line: int = _PER_LINE) -> None:
+    """Refuse a program text whose lines the memory would not hold; one of less than a megabyte is not counted."""
+    if len(text) > _SMALL_BYTES:
+        lines = text.count(b"\n")
+        require_memory(source, lines * per_line, f"{lines} lines are to be read")
+
+
+def _of_meminfo(name: str) -> int | None:
+    return _kilobytes(Path("/proc/meminfo"), name)
+
+
+def _kilobytes(file: Path, name: str) -> int | None:
+    """A line "Name:  123 kB" of a file of /proc, in bytes."""
+    with contextlib.suppress(OSError):
+        for line in file.read_text().splitlines():
+            if line.startswith(f"{name}:"):
+                return int(line.split()[1]) * 1024
+    return None
+
+
+def _of_groups() -> list[int | None]:
+    """What the control group of this process (version 2) leaves."""
+    with contextlib.suppress(OSError, ValueError):
+        own = Path("/proc/self/cgroup").read_text().partition("::")[2].strip().lstrip("/")
+        for folder in {_CGROUP / own, _CGROUP}:
+            limit = folder / "memory.max"
+            if limit.is_file() and (said := limit.read_text().strip()) != "max":
+                return [int(said) - int((folder / "memory.current").read_text())]
+    return []
+
+
+def _of_own_limits() -> list[int | None]:
+    """What `ulimit` leaves of address space and data."""
+    try:
+        import resource
+    except ModuleNotFoundError:  # not on this system
+        return []
+    found: list[int | None] = []
+    for limit, taken in ((resource.RLIMIT_AS, "VmSize"), (resource.RLIMIT_DATA, "VmData")):
+        most = resource.getrlimit(limit)[0]
+        used = _kilobytes(Path("/proc/self/status"), taken)
+        if most != resource.RLIM_INFINITY and used is not None:
+            found.append(most - used)
+    return found
+
+
+_LOOKED_AT_BYTES = 65536
+_COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
+_OF_A_MILL = re.compile(rb"Y\s*[-+.\d#\[]|M0*6(?!\d)")
+_SURE = (
+    (re.compile(rb"G(?:50|0*92)(?=\s*S\s*\d)\s*S\s*\d+"), "spindle speed limit"),
+    (re.compile(rb"G96(?![\d.])(?:\s*S\s*\d+)?"), "constant surface speed"),
+    (re.compile(rb"G7[0-3]\s*(?:P\s*\d+\s*Q\s*\d+|U\s*[\d.]+\s*R\s*[\d.]+|W\s*[\d.]+\s*R\s*[\d.]+)"), "turning cycle"),
+    (re.compile(rb"T\d{4}(?!\d)"), "tool and offset in one word"),
+    (re.compile(rb"(?<![A-Z])[UW]\s*-?\d*\.?\d+"), "incremental diameter or length"),
+)
+_LIKELY = (
+    (re.compile(rb"G97(?![\d.])(?:\s*S\s*\d+)?"), "constant spindle speed"),
+    (re.compile(rb"F0?\.\d+"), "feed per revolution"),
+)
+
+
+def signs_of_turning(text: bytes) -> tuple[int, str] | None:
+    """What shows that a program is one of a lathe; a program with Y words or a tool change M06 is none."""
+    code = _COMMENT.sub(b"", text[:_LOOKED_AT_BYTES].upper())
+    sure = [(found, meaning) for sign, meaning in _SURE if (found := sign.search(code))]
+    likely = [(found, meaning) for sign, meaning in _LIKELY if (found := sign.search(code))]
+    if not sure or len(sure) + len(likely) < 2 or _OF_A_MILL.search(code):
+        return None
+    signs = sorted((*sure, *likely), key=lambda sign: sign[0].start())
+    said = ", ".join(f"{' '.join(found[0].decode('latin-1').split())} ({meaning})" for found, meaning in signs)
+    return code.count(b"\n", 0, signs[0][0].start()) + 1, said

@@ -44,7 +44,7 @@ class Expansion(Result):
     @property
     def answer(self) -> str:
         """What came out, and whether it differs from what went in."""
-        what = "expanded" if self.expanded else "nothing to expand: the text is unchanged"
+        what = "expanded" if self.expanded else "nothing to expand: the program is unchanged"
         return f"{self.program}: {self.lines} lines, {self.size_bytes} bytes, {what}"
 
     @property

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from shapegcode.results.table import Table
 
-__all__ = ["NotKeptError", "Outcome", "Pair", "Plot", "Xyz"]
 
 T = TypeVar("T")
 

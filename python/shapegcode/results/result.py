@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from shapegcode.results.made import Made
+    from shapegcode.results.json import Made
     from shapegcode.results.page.model import Figure, Light, Page, Script, Section
     from shapegcode.results.page.scene import Scene
 

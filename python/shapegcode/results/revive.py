@@ -24,9 +24,10 @@ import numpy as np
 
 from shapegcode._core import ArgumentError
 from shapegcode.io.data_file import DataFile
-from shapegcode.results.made import FORMAT, Made
-from shapegcode.results.outcome import NotKeptError, Outcome
+from shapegcode.results.json import FORMAT, Made
+from shapegcode.results.outcome import Outcome
 from shapegcode.results.result import Result
+from shapegcode.results.values import NotKeptError
 
 
 class NotKept:

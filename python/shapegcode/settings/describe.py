@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, get_origin
 
 from pydantic.fields import FieldInfo
 
 from shapegcode.settings.keys import (
     InlineTable,
+    KeyInfo,
     KeyValue,
     TomlTable,
     facts,
@@ -18,7 +19,7 @@ from shapegcode.settings.keys import (
     table_type,
     toml,
 )  # fmt: skip
-from shapegcode.settings.remarks import origin_lines, origin_of
+from shapegcode.settings.remarks import ORIGIN, ORIGIN_TEXT, origin_lines, origin_of
 
 _LINE_WIDTH = 110
 
@@ -215,3 +216,206 @@ class _ShortWriter(_TomlWriter):
         if value is None:
             return self._remarks.get(key, "").startswith("assumed")
         return name in table.model_fields_set and (told or value != field.get_default(call_default_factory=True))
+
+
+_EXAMPLE = """\
+name = "VMC-3"
+
+[axes.x]
+max_feed_mm_per_min = 12000.0
+rapid_mm_per_min = 24000.0
+max_acceleration_mm_s2 = 3000.0
+
+[[axes.x.modes]]
+frequency_hz = 46.0
+damping_ratio = 0.02
+
+[axes.y]
+max_feed_mm_per_min = 12000.0
+rapid_mm_per_min = 24000.0
+max_acceleration_mm_s2 = 3000.0
+
+[axes.z]
+max_feed_mm_per_min = 12000.0
+rapid_mm_per_min = 18000.0
+max_acceleration_mm_s2 = 3000.0
+rigid = true
+
+[controller]
+dnc_baud = 9600  # a comment is for people
+
+[origin]
+axes.x.max_acceleration_mm_s2 = "assumed: 0.3 g, usual for a machining centre"
+axes.x.modes.1.frequency_hz = "measured: tap test"
+axes.x.modes.1.damping_ratio = "measured: tap test"
+axes.y.max_acceleration_mm_s2 = "assumed: 0.3 g, usual for a machining centre"
+axes.z.max_acceleration_mm_s2 = "assumed: 0.3 g, usual for a machining centre"
+axes.z.rapid_mm_per_min = "parameters: FANUC 1420"
+axes.z.rigid = "stated: nothing of it was seen in the tap test"
+"""
+
+
+def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
+    """The reference of a machine file's keys as Markdown."""
+    builtin = ", ".join(f"`{name}`" for name in builtin_names)
+    lines = [
+        "# The machine file",
+        "",
+        "<!-- Generated: make docs -->",
+        "",
+        "A whole machine file:",
+        "",
+        "```toml",
+        *_EXAMPLE.splitlines(),
+        "```",
+        "",
+        "What is left out has its default. [`shapegcode setup`](../howto/setup.md) writes such a file from answers,",
+        "`shapegcode machine init NAME` from a built-in machine; `--full` gives every key with its meaning.",
+        "`shapegcode machine show FILE` prints every value with its origin, `machine diff A B` in which values two",
+        "machines differ, `machine schema` the JSON Schema of the file, with which editors complete and check it.",
+        "",
+        "The file is TOML. An unknown key, a number that is not finite or a value outside its limits is an error,",
+        "and all errors of a file are listed at once.",
+        "",
+        f"Built-in machines, usable by name in place of a file: {builtin}.",
+        'For one run `--set KEY=VALUE` replaces a value, in Python `machine.with_values("tolerance.contour_um", 5)`;',
+        "both are checked as the file is. Modes count from 1 in every key (`machine show`, `--set`, `with_values`,",
+        "`study`, `optimize`): `axes.x.modes.1.frequency_hz` is the first mode of X, `axes.x.modes.0` an error.",
+        "",
+        "Where a value comes from (its provenance) stands in the table `[origin]`, by its key, or beside it:",
+        '`frequency_hz = { value = 46.2, origin = "measured" }`. The text begins with `measured`, `parameters`',
+        "(of the control), `inherited` (from another machine), `assumed`, `choice` (a property of no machine),",
+        '`default` or `stated`, and a note may follow: `"measured: tap of 3 May"`. A value without an origin is',
+        "what the file states. Comments are for people and never read. Older files have neither form: the first",
+        "words of their comments count (`# measured ...`), with a warning; `shapegcode machine show FILE",
+        "--write-origins` writes the table into the file. `machine show` counts the origins, and a verdict ends",
+        "with those that it depends on and that are unverified.",
+        "",
+        "A default marked **assumed** is not known for real controllers in general: look it up or measure",
+        "it. The FANUC column names the parameter that corresponds to a key; numbers differ between series,",
+        "so check your manual.",
+    ]
+    return "\n".join([*lines, *key_tables(model)]) + "\n"
+
+
+def key_tables(model: type[TomlTable], *, fanuc: bool = True, heading: str = "##") -> list[str]:
+    """The keys of a file as Markdown: a heading and a table for each of its tables, a line each."""
+    lines: list[str] = []
+    columns = ("key", "unit", "default", "FANUC", "meaning") if fanuc else ("key", "unit", "default", "meaning")
+    for table, meaning, infos in _documented(model, ""):
+        lines += ["", f"{heading} {_heading(table)}", ""]
+        if meaning:
+            lines += [f"{meaning[:1].upper()}{meaning[1:]}.", ""]
+        lines += [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
+        for info in infos:
+            name = info.key.removeprefix(f"{table}.")
+            default = info.default if info.default in ("required", "not set") else f"`{info.default}`"
+            cells = {
+                "key": f"`{name}`",
+                "unit": info.unit or "–",
+                "default": default + (" **assumed**" if info.assumed else ""),
+                "FANUC": info.fanuc or "–",
+                "meaning": info.meaning,
+            }
+            lines.append("| " + " | ".join(cells[column].replace("|", "\\|") for column in columns) + " |")
+    return lines
+
+
+def _documented(model: type[TomlTable], prefix: str) -> Iterator[tuple[str, str, list[KeyInfo]]]:
+    """Per table of the file: its name, its meaning, its keys."""
+    keys: list[KeyInfo] = []
+    below: list[tuple[str, str, type[TomlTable]]] = []
+    for name, field in model.model_fields.items():
+        sub, key = table_type(field), f"{prefix}{name}"
+        if sub is None or issubclass(sub, InlineTable):
+            keys.append(key_info(field, key))
+            continue
+        alike = [other for other, inner in model.model_fields.items() if table_type(inner) is sub]
+        if item_type(field):
+            below.append((f"{key}[].", field.description or "", sub))
+        elif len(alike) == 1:
+            below.append((f"{key}.", field.description or "", sub))
+        elif name == alike[0]:
+            # Tables of one type, such as the axes, are described once, by the words of their type.
+            below.append((f"{prefix}<{'|'.join(alike)}>.", (sub.__doc__ or "").rstrip("."), sub))
+    if keys:
+        yield prefix.rstrip("."), "", keys
+    for sub_prefix, meaning, sub in below:
+        for table, text, infos in _documented(sub, sub_prefix):
+            yield table, text or meaning, infos
+
+
+def _heading(table: str) -> str:
+    if not table:
+        return "Top level"
+    if table.endswith("[]"):
+        return f"`[[{table.removesuffix('[]')}]]`"
+    return f"`[{table}]`"
+
+
+def toml_schema(model: type[TomlTable], title: str, *, origins: bool = False) -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a file."""
+    found = model.model_json_schema(mode="validation")
+    for table in (found, *found.get("$defs", {}).values()):
+        for entry in table.get("properties", {}).values():
+            _describe(entry)
+    if origins:
+        _allow_origins(model, found, found.get("$defs", {}))
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found | {"title": title}
+
+
+def _allow_origins(model: type[TomlTable], found: dict[str, Any], defs: dict[str, Any]) -> None:
+    """A table of origins, and beside each value its own; such a value is only checked when the file is read."""
+    defs["Origin"] = {"type": "string", "pattern": ORIGIN_TEXT, "description": "where the value comes from"}
+    stated = {"$ref": "#/$defs/Origin"}
+    defs["Origins"] = {"type": "object", "additionalProperties": {"anyOf": [stated, {"$ref": "#/$defs/Origins"}]}}
+    both = {"value": {}, ORIGIN: stated}
+    defs["WithOrigin"] = {"type": "object", "properties": both, "required": [*both], "additionalProperties": False}
+    beside = {"$ref": "#/$defs/WithOrigin"}
+    tables = {model: found}
+    while tables:
+        table, entry = tables.popitem()
+        for name, field in table.model_fields.items():
+            below = table_type(field)
+            if below is not None and not issubclass(below, InlineTable):
+                tables[below] = defs[below.__name__]
+                continue
+            value = entry["properties"][name]
+            if beside not in value.get("anyOf", ()):
+                said = {key: value.pop(key) for key in ("description", "default") if key in value}
+                entry["properties"][name] = {"anyOf": [*value.get("anyOf", [value]), beside]} | said
+    found["properties"][ORIGIN] = {"$ref": "#/$defs/Origins", "description": "where values come from, by key"}
+
+
+def keys_schema(model: type[TomlTable], value: dict[str, Any], kind: str, defs: dict[str, Any]) -> dict[str, Any]:
+    """JSON Schema of a table that says something of some keys of a file, by their dotted names or as tables."""
+    name = f"{kind}.{model.__name__}"
+    if name not in defs:
+        defs[name] = {}
+        properties: dict[str, Any] = {}
+        for key, field in model.model_fields.items():
+            found = value
+            below = table_type(field)
+            if below is not None:
+                table = keys_schema(below, value, kind, defs)
+                table = _table({"^[1-9][0-9]*$": table}) if item_type(field) else table
+                found = {"anyOf": [value, table]}
+            elif get_origin(field.annotation) in (dict, Mapping):
+                found = {"anyOf": [value, _table({".": value})]}
+            properties[key] = found | facts(field) | {"description": field.description or ""}
+            _describe(properties[key])
+        defs[name] = _table({r"\.": value}) | {"properties": properties}
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _table(patterns: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "object", "patternProperties": patterns, "additionalProperties": False, "minProperties": 1}
+
+
+def _describe(entry: dict[str, Any]) -> None:
+    unit, fanuc, assumed = (entry.pop(name, "") for name in ("unit", "fanuc", "assumed"))
+    said = entry.get("description", "")
+    said += f" [{unit}]" if unit and unit != "1" else ""
+    said += f" (FANUC parameter {fanuc})" if fanuc else ""
+    entry["description"] = said + (" The default is assumed." if assumed else "")
+    entry.pop("title", None)

@@ -23,8 +23,18 @@ Bool = Annotated[bool, Strict()]
 Text = Annotated[str, Strict()]
 
 
+_UNITS = {
+    "": "",
+    "_mm_per_min": "mm/min", "_mm_per_s": "mm/s", "_mm_s2": "mm/s²", "_mm_s3": "mm/s³", "_per_s": "1/s", "_s": "s",
+    "_mm": "mm", "_um": "µm", "_inch": "inch", "_hz": "Hz", "_kg": "kg", "_n": "N", "_nm": "N m", "_w": "W",
+    "_n_per_um": "N/µm", "_n_per_mm": "N/mm", "_n_per_mm2": "N/mm²", "_gpa": "GPa", "_deg": "degrees",
+    "_percent": "%", "_ratio": "1", "_exponent": "1", "_bytes": "bytes", "_kb": "kB", "_baud": "baud",
+}  # fmt: skip
+"""Unit of a key by the end of its name; the longest that fits."""
+
+
 def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: bool = False, **field: Any) -> Any:
-    """A pydantic field with the four facts that the documentation of a key needs.
+    """A pydantic field with what the documentation of a key needs; *unit* only where its name does not end in it.
 
     Left out of *field*, ``default`` makes the key mandatory.
     """
@@ -36,6 +46,14 @@ class TomlTable(BaseModel):
     """Base of every table of the file: unknown keys are errors and values never change after loading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Note the units that the names of the keys say."""
+        for name, field in cls.model_fields.items():
+            noted = field.json_schema_extra
+            if isinstance(noted, dict) and noted.get("unit") == "":
+                noted["unit"] = _UNITS[max((end for end in _UNITS if name.endswith(end)), key=len, default="")]
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse it with what to do instead."""
@@ -104,24 +122,16 @@ AxisRatios = Annotated[RatioPerAxis, BeforeValidator(_spread, json_schema_input_
 
 @dataclass(frozen=True)
 class KeyInfo:
-    """One key of the machine file with what the documentation says of it.
+    """One key of the machine file with what the documentation says of it."""
 
-    Attributes:
-        key: dotted name; ``axes.x.modes.1.frequency_hz`` for values, ``axes.<x|y|z>`` and ``modes[]`` in the
-            documentation of the format.
-        unit: unit, "1" for a ratio, empty where there is none.
-        default: default as written in TOML, or "required", or "not set".
-        meaning: what it is.
-        fanuc: numbers of the FANUC parameters that correspond to it, or empty.
-        assumed: True where the default is an assumption and not a known value.
-    """
-
+    # dotted name; ``axes.x.modes.1.frequency_hz`` for values, ``axes.<x|y|z>`` and ``modes[]`` in the documentation of
+    # the format
     key: str
-    unit: str
-    default: str
-    meaning: str
-    fanuc: str
-    assumed: bool
+    unit: str  # unit, "1" for a ratio, empty where there is none
+    default: str  # default as written in TOML, or "required", or "not set"
+    meaning: str  # what it is
+    fanuc: str  # numbers of the FANUC parameters that correspond to it, or empty
+    assumed: bool  # True where the default is an assumption and not a known value
 
 
 @dataclass(frozen=True)

@@ -20,24 +20,6 @@ from typing import Any, Literal
 import tomlkit
 from tomlkit.items import AoT, InlineTable, Table
 
-__all__ = [
-    "DEFAULT",
-    "MEASURED",
-    "ORIGIN",
-    "ORIGIN_TEXT",
-    "Origin",
-    "inherited",
-    "open_brackets",
-    "origin_lines",
-    "origin_of",
-    "remark_of",
-    "remarks_in_comments",
-    "remarks_of",
-    "take_origins",
-    "with_origin_table",
-    "with_remarks",
-]
-
 Origin = Literal["measured", "dump", "inherited", "assumed", "choice", "file", "default"]
 """Of a value: measured on this machine; read from the control's dump; taken over from another machine; assumed; a
 choice, no property of a machine; stated in the file without a word of where it comes from; left out of the file."""

@@ -22,10 +22,7 @@ from pydantic import Field, Strict, field_validator, model_validator
 from shapegcode.errors import FileError, Problem
 from shapegcode.io.data_file import DataFile
 from shapegcode.settings.keys import InlineTable, Positive, PositiveAxisValues, Text, TomlTable, key, toml
-from shapegcode.settings.load import parsed, read_text, validated
-from shapegcode.settings.problems import KeyProblem, line_of
-
-__all__ = ["EXPLAINED", "Answers", "AnswersError", "ModesAnswer", "is_mode", "mode_of", "read_answers"]
+from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
 
 Delivery = Literal["memory", "dnc", "data server"]
 LookAhead = Literal["none", "G05.1", "G08"]
@@ -74,25 +71,17 @@ class Answers(TomlTable):
     name: Text = key("What do you call the machine?", default="unnamed")
     control: Literal["fanuc", "other"] | None = key("Which control does it have?", default=None)
     dump: Text | None = key("Is there a parameter file of the control?", default=None)
-    rapid_mm_per_min: PositiveAxisValues | None = key("How fast are the rapids (G00)?", unit="mm/min", default=None)
-    max_feed_mm_per_min: PositiveAxisValues | None = key(
-        "What is the largest cutting feed?", unit="mm/min", default=None
-    )
-    max_acceleration_mm_s2: PositiveAxisValues | None = key(
-        "How fast may an axis accelerate in a cut?", unit="mm/s²", default=None
-    )
-    least_increment_mm: Annotated[Positive, Field(le=0.1)] | None = key(
-        "What is the least increment?", unit="mm", default=None
-    )
+    rapid_mm_per_min: PositiveAxisValues | None = key("How fast are the rapids (G00)?", default=None)
+    max_feed_mm_per_min: PositiveAxisValues | None = key("What is the largest cutting feed?", default=None)
+    max_acceleration_mm_s2: PositiveAxisValues | None = key("How fast may an axis accelerate in a cut?", default=None)
+    least_increment_mm: Annotated[Positive, Field(le=0.1)] | None = key("What is the least increment?", default=None)
     delivery: Delivery | None = key("How does a program get to the machine?", default=None)
     dnc_baud: Annotated[int, Strict(), Field(ge=110, le=10_000_000)] | None = key(
-        "At which speed does the line feed it?", unit="baud", default=None
+        "At which speed does the line feed it?", default=None
     )
-    program_memory_kb: Annotated[Positive, Field(le=1e9)] | None = key(
-        "How large is the program memory?", unit="kB", default=None
-    )
+    program_memory_kb: Annotated[Positive, Field(le=1e9)] | None = key("How large is the program memory?", default=None)
     look_ahead: LookAhead | None = key("By which code does a look-ahead mode go on?", default=None)
-    contour_um: Positive | None = key("How far may the contour leave the path?", unit="µm", default=None)
+    contour_um: Positive | None = key("How far may the contour leave the path?", default=None)
     modes: ModesAnswer = key("What is known of its vibration?", default={})
 
     @field_validator("name")

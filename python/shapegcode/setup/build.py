@@ -16,8 +16,6 @@ from shapegcode.machine.result import ParameterImport
 from shapegcode.setup.answers import EXPLAINED, Answers, is_mode, mode_of
 from shapegcode.setup.result import MachineSetup, OpenQuestion
 
-__all__ = ["dump_lacks_rapids", "dump_problem", "set_up", "tap_problem"]
-
 _ANSWERED = "answered"
 _ASSUMED_RAPID_MM_PER_MIN = 24_000.0
 _ASSUMED_ACCELERATION_MM_S2 = 3000.0

@@ -9,8 +9,6 @@ from shapegcode.results.json import hidden
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-__all__ = ["MachineSetup", "OpenQuestion"]
-
 
 @dataclass(frozen=True)
 class OpenQuestion:

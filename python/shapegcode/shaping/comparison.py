@@ -14,9 +14,18 @@ import numpy as np
 
 from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper
 from shapegcode.machine import Machine
-from shapegcode.shaping.bands import ModeBand, machine_bands, mode_band, ms, spoken
-from shapegcode.shaping.block_period import candidate_periods, check_block_period
-from shapegcode.shaping.designs import Design, DesignOptions, evaluate, parse_taps
+from shapegcode.shaping.bands import (
+    Design,
+    DesignOptions,
+    ModeBand,
+    evaluate,
+    machine_bands,
+    mode_band,
+    ms,
+    parse_taps,
+    spoken,
+)
+from shapegcode.shaping.grid import candidate_periods, check_block_period
 from shapegcode.shaping.ranking import OBJECTIVES, is_within, pareto_front, reason_for, recommend
 from shapegcode.shaping.registry import FAMILIES, Family, design, family_named
 from shapegcode.shaping.result import Recommendation, Refusal
@@ -26,7 +35,7 @@ _SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of 
 _ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
 _OWN_TAPS = "taps"  # the family of taps that the user gives
 _MOST_PERIODS = 5000  # of the longest shaper: finer grids are as good as continuous times
-_NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of swings per period
+_NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of cycles per period
 
 
 def choose_shaper(
@@ -63,7 +72,7 @@ def choose_shaper(
         vibration_limit: largest worst residual ratio of the design to take; None: the machine's
             `shaping.vibration_limit`, without a machine 0.05.
         objective: "shortest", "contour" (least contour cost) or "robust" (least worst residual).
-        allow_negative: whether a design with negative taps may be taken.
+        allow_negative: whether a design with negative impulses may be taken.
         taps: a shaper of the user's own, compared with the others: as text ("0:.5,10.9ms:.5") or as it is.
         on_progress: called with the share of the work done, 0 to 1.
 
@@ -222,7 +231,7 @@ def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:
         if swings > 0.5 and abs(cmath.exp(band.mode.pole * period_s) - 1.0) < _NEAR_ONE:
             return (
                 f"the mode at {band.mode.frequency_hz:g} Hz cannot be cancelled on a grid of {ms(period_s)}: its "
-                f"{swings:.4g} swings per period look like standing still there; take another period"
+                f"{swings:.4g} cycles per period look like standing still there; take another period"
             )
     return ""
 
@@ -242,7 +251,7 @@ def _least_worst(
     options: DesignOptions,
     found: Sequence[Design],
 ) -> list[Design]:
-    """What leaves least within the longest duration, on each grid; none if a design without negative taps is good."""
+    """What leaves least within the longest duration, on each grid; none if one without negative impulses is good."""
     wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
     if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):
         return []

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from shapegcode._core import DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
 from shapegcode.shaping.bands import check_modes_and_times, mode_names, ms, whole_periods
-from shapegcode.shaping.linear_program import LinearProgram, non_negative_least_squares
+from shapegcode.shaping.cutting_planes import LinearProgram, non_negative_least_squares
 
 FloatArray = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ _SAME_DURATION = 0.02  # designs whose durations differ by less are equal, relat
 
 
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
-    """Shortest shaper with non-negative taps on a grid that cancels every mode exactly there.
+    """Shortest shaper with non-negative impulses on a grid that cancels every mode exactly there.
 
     The number of periods is the smallest for which the conditions (sum 1, both parts of each mode's sum zero)
     have a non-negative solution. Among the solutions of that duration the one with the least second central

@@ -27,8 +27,8 @@ from shapegcode._core import (
     worst_residual,
 )
 from shapegcode.shaping.bands import check_times, ms, whole_periods
+from shapegcode.shaping.cutting_planes import LinearProgram
 from shapegcode.shaping.grid_designs import halved
-from shapegcode.shaping.linear_program import LinearProgram
 
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _HINT_PERIODS = 400  # longest grid that a refusal searches, periods
@@ -51,7 +51,7 @@ _SAME_CENTRE = 1e-6  # of the duration
 def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> Shaper:
     """Shortest shaper with taps at multiples of a period that meets the conditions.
 
-    Among the shapers of the shortest duration, one without negative taps has the least second central moment that
+    Among the shapers of the shortest duration, one without negative impulses has the least second central moment that
     was found (the contour cost; a local minimum from three starts), one with them the least sum of magnitudes.
 
     Source: this project.

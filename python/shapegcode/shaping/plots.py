@@ -14,8 +14,7 @@ from shapegcode import _core
 from shapegcode._core import MinimalBranches, Mode, Shaper, minimal_branches
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
-from shapegcode.shaping.bands import ModeBand, mode_band
-from shapegcode.shaping.designs import Design
+from shapegcode.shaping.bands import Design, ModeBand, mode_band
 from shapegcode.shaping.result import Recommendation, times_name
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ def plots_of(result: Recommendation) -> dict[str, Plot]:
 def selected(result: Recommendation, count: int = _CURVES) -> list[Design]:
     """The designs worth a curve: what is recommended, then one of each family on the Pareto front, from short to long.
 
-    Where there is room, one of each other family. Designs with negative taps are left out where they may not be
+    Where there is room, one of each other family. Designs with negative impulses are left out where they may not be
     recommended and there are others.
     """
     places = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))

@@ -12,8 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shapegcode._core import ArgumentError
-from shapegcode.shaping.bands import ModeBand, ms, spoken
-from shapegcode.shaping.designs import Design
+from shapegcode.shaping.bands import Design, ModeBand, ms, spoken
 from shapegcode.shaping.registry import FAMILIES
 
 NO_RESIDUAL = 1e-9
@@ -86,7 +85,7 @@ def recommend(
 ) -> int:
     """Index of the design to take.
 
-    Of the designs without negative taps (of all with `allow_negative`, or where every design has some) those whose
+    Of the designs without negative impulses (of all with `allow_negative`, or where every design has some) those whose
     worst residual is at most the limit compete for the objective, and of these, if there are any, those that cancel the
     modes that state no band; if there is none within the limit, the one that leaves least is taken. Of equally short
     ones on grids, to 2 %, the one with the longest period is taken, because it writes the fewest blocks; of equal ones
@@ -151,8 +150,8 @@ def reason_for(
         others = [each for each in designs if each.negative and is_within(each, limit)]
         if others and not allow_negative:
             other = min(others, key=_shortest)
-            text += f"; with negative taps {other.family} ({ms(other.duration_s)}) would leave less"
-    return text + ("; every design has negative taps" if only_negative else "")
+            text += f"; with negative impulses {other.family} ({ms(other.duration_s)}) would leave less"
+    return text + ("; every design has negative impulses" if only_negative else "")
 
 
 def _percent(ratio: float) -> str:

@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
-from shapegcode.shaping.bands import NARROW_PERCENT, ModeBand, ms
-from shapegcode.shaping.designs import Design, DesignOptions, evaluate
+from shapegcode.shaping.bands import NARROW_PERCENT, Design, DesignOptions, ModeBand, evaluate, ms
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.robust import minimax_robust
 from shapegcode.shaping.solvers import (
@@ -115,21 +114,22 @@ FAMILIES: tuple[Family, ...] = (
         "any modes; shorter than ZV, sum |a| 3 for one mode; excites faster modes", True, True, negative,
     ),
     Family(
-        "simultaneous", "shortest without negative taps, all modes at once", "this project",
+        "simultaneous", "shortest without negative impulses, all modes at once", "this project",
         "any modes at continuous times; on a grid it is the family non-negative", True, False, simultaneous,
     ),
     Family(
         "minimal", "one tap more than modes",
         "Park, Hong and Danielson 2009 (paper 002), eq. 4-17; searches of this project",
         "one to six modes, damped or not, at continuous times (on a grid the polynomial stands for it); exact at the "
-        "nominal frequencies only; taps may be negative", True, False, solve_minimal,
+        "nominal frequencies only; impulses may be negative", True, False, solve_minimal,
     ),
     Family(
         "polynomial", "shortest exact shaper of a grid", "this project",
-        "any modes on any grid on which none aliases to zero; taps may be negative and large", False, True, _polynomial,
+        "any modes on any grid on which none aliases to zero; impulses may be negative and large",
+        False, True, _polynomial,
     ),
     Family(
-        "non-negative", "shortest shaper of a grid without negative taps", "this project",
+        "non-negative", "shortest shaper of a grid without negative impulses", "this project",
         "any modes on a grid on which one exists within the longest duration", False, True, _shortest_non_negative,
     ),
     Family(
@@ -137,13 +137,13 @@ FAMILIES: tuple[Family, ...] = (
         "modes with a band; one without is cancelled exactly; no tap is negative", False, True, _robust,
     ),
     Family(
-        "mirrored", "the same read backwards: a contour comes out alike either way", "this project",
+        "mirrored", "the same read backwards: a contour comes out alike in both directions", "this project",
         "modes with a band or without one, which is cancelled exactly; no tap is negative; longer than robust", False,
         True, _mirrored,
     ),
     Family(
         "smooth-zv", "polynomial kernel with a zero at the mode (Kalico's smooth_zv)", _KALICO,
-        "any modes, best on a grid of four periods in a swing or more; its samples are the taps, none is negative; "
+        "any modes, best on a grid of four periods in a cycle or more; its samples are the impulses, none is negative; "
         "exact at the nominal frequencies", False, True, smooth("smooth-zv", (1.0,), 0.8025),
     ),
     Family(
@@ -167,7 +167,7 @@ FAMILIES: tuple[Family, ...] = (
         _KALICO, _SMOOTH, False, True, smooth("smooth-zvd-ei", (1.0, 1.0, 1.6875), 1.475),
     ),
     Family(
-        "taps", "taps as given", "the user",
+        "taps", "impulses as given", "the user",
         "judged as they are; on a grid only if their times lie on it", True, True, user_taps,
     ),
 )  # fmt: skip

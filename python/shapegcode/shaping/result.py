@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
-from shapegcode.shaping.bands import ModeBand, spoken
-from shapegcode.shaping.designs import Design
+from shapegcode.shaping.bands import Design, ModeBand, spoken
 from shapegcode.shaping.ranking import NO_RESIDUAL, is_within, recommend
 from shapegcode.shaping.registry import FAMILIES
 
@@ -44,7 +43,7 @@ class Recommendation(Result):
         reason: why it is that one, in a sentence.
         refused: families without a design.
         objective: what is least in the design to take: "shortest", "contour" or "robust".
-        allow_negative: whether a design with negative taps may be taken.
+        allow_negative: whether a design with negative impulses may be taken.
         vibration_limit: largest worst residual ratio of the design to take.
         max_duration_s: longest shaper that was looked for, s.
         max_abs_sum: largest sum of the taps' magnitudes.
@@ -115,13 +114,13 @@ class Recommendation(Result):
         place = self.recommended_on_grid
         if place is None:
             return (
-                "blocks of a program need taps on a grid: compare some with --block-period 5ms, or name the machine "
-                "with -m"
+                "blocks of a program need impulses on a grid: compare some with --block-period 5ms, or name the "
+                "machine with -m"
             )
         best = self.designs[place]
         options = f"--shaper {best.family} --block-period {(best.period_s or 0.0) * 1e3:.6g}ms -o shaped.nc"
         if best.family == "taps":
-            return "taps of your own cannot be written by convert: take a family, or use the Python interface"
+            return "impulses of your own cannot be written by convert: take a family, or use the Python interface"
         if self.machine is None:
             return (
                 f"put the modes into a machine file (shapegcode machine init -o mine.toml), then "
@@ -208,7 +207,7 @@ class Recommendation(Result):
             Column("σ²", "ms²", lambda each: f"{each.variance_s2 * 1e6:.4g}"),
             Column("arc", "µm", lambda each: f"{each.radial_error_um(speed_mm_per_s, radius_mm):.4g}"),
             Column("Σ|a|", value=lambda each: f"{each.abs_sum:.3g}"),
-            Column("taps < 0", value=lambda each: sum(tap < 0.0 for tap in each.amplitudes) or None),
+            Column("a < 0", value=lambda each: sum(tap < 0.0 for tap in each.amplitudes) or None),
             Column("Pareto", value=lambda each: "yes" if each.pareto else None, text=True),
         )
         left_out = len(self.designs) - len(rows)

@@ -53,7 +53,7 @@ _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 FloatArray = NDArray[np.float64]
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's dust
 _GROWTH = 1.4  # of the number of periods while it is searched
-_WHOLE = 1e-3  # swings per period from a whole number
+_WHOLE = 1e-3  # cycles per period from a whole number
 _LAST_TAP = 1e-3
 """Where the best use of the last periods of a damped mode is to wait, a tap this large marks their end."""
 _SAME_VARIANCE = 5e-3  # relative
@@ -106,7 +106,7 @@ def minimax_robust(
 
     The number of periods is the smallest for which the least worst residual is below the limit (to 0.1 %). Among the
     non-negative designs of that duration the one with the least second central moment, the contour cost, is taken
-    (to 0.5 %); with negative taps, the one with the least sum of magnitudes.
+    (to 0.5 %); with negative impulses, the one with the least sum of magnitudes.
 
     Source: this project.
     """
@@ -197,7 +197,7 @@ class Task:
         """The task, its values checked."""
         check_modes_and_times(bands, period_s=period_s)
         if not (math.isfinite(max_abs_sum) and max_abs_sum >= 1.0):
-            raise ArgumentError(f"max_abs_sum is {max_abs_sum}: it must be finite and at least 1, the sum of the taps")
+            raise ArgumentError(f"max_abs_sum is {max_abs_sum}: must be finite and at least 1, the sum of the impulses")
         bands = tuple(bands)
         wide = [band for band in bands if band.uncertainty]
         largest = None if non_negative else max_abs_sum
@@ -354,7 +354,7 @@ def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesi
 
 def no_exact(task: Task, duration_s: float) -> str:
     """Why the modes without a band have no design of a duration, for a message."""
-    taps = "non-negative taps" if task.max_abs_sum is None else f"taps with sum|a| up to {task.max_abs_sum:g}"
+    taps = "non-negative impulses" if task.max_abs_sum is None else f"impulses with sum|a| up to {task.max_abs_sum:g}"
     if task.mirrored:
         taps = f"mirrored {taps}"
     return f"{taps} up to {ms(duration_s)} on a {ms(task.period_s)} grid do not cancel {mode_names(task.exact)} exactly"
@@ -374,7 +374,7 @@ def refusal(task: Task, limit: float, max_duration_s: float) -> str:
 def unreachable(task: Task) -> str:
     """What no non-negative shaper of this grid can reduce, for a message; empty if there is nothing.
 
-    At a frequency that swings a whole number of times per period every tap adds to the others: what a shaper seems
+    At a frequency with a whole number of cycles per period every tap adds to the others: what a shaper seems
     to take away is only what dies out while it lasts.
     """
     if task.max_abs_sum is not None:
@@ -384,9 +384,9 @@ def unreachable(task: Task) -> str:
         low, high = (band.mode.frequency_hz * (1.0 + side * band.uncertainty) * turns_per_hz for side in (-1.0, 1.0))
         turns = max(1, math.ceil(low - _WHOLE))
         if turns <= high + _WHOLE:
-            often = "once" if turns == 1 else f"{turns} times"
+            cycles = "one cycle" if turns == 1 else f"{turns} cycles"
             return (
-                f"{band} Hz swings {often} per period of {ms(task.period_s)} at {turns / turns_per_hz:.5g} Hz, "
-                "where all taps add up (z close to +1)"
+                f"{band} Hz completes {cycles} per period of {ms(task.period_s)} at {turns / turns_per_hz:.5g} Hz, "
+                "where all impulses add up (z close to +1)"
             )
     return ""

@@ -27,8 +27,7 @@ from shapegcode._core import (
     negative_zv,
     repeated_zv,
 )
-from shapegcode.shaping.bands import ModeBand, mode_names, ms
-from shapegcode.shaping.designs import DesignOptions, on_grid
+from shapegcode.shaping.bands import DesignOptions, ModeBand, mode_names, ms, on_grid
 from shapegcode.shaping.grid_designs import halved
 from shapegcode.shaping.grid_search import RESIDUAL_LIMIT, Conditions, ResidualLimit, Zero, shortest_on_grid
 
@@ -86,7 +85,7 @@ def _defined(
 
 
 def repeated(name: str, zeros: int) -> Solve:
-    """ZV, ZVD, ZVDD ...: that many zeros at each mode; on a grid the shortest non-negative taps that have them."""
+    """ZV, ZVD, ZVDD ...: that many zeros at each mode; on a grid the shortest non-negative impulses that have them."""
     return _defined(
         name,
         lambda mode, _options: repeated_zv(mode, zeros),
@@ -114,7 +113,7 @@ modified = _defined(
     lambda mode, _options: mzv(mode),
     lambda mode, _options: Conditions(zeros=(Zero(mode), Zero(mzv_second_zero(mode)))),
 )
-"""MZV; on a grid the shortest non-negative taps with its two zeros."""
+"""MZV; on a grid the shortest non-negative impulses with its two zeros."""
 
 negative = _defined(
     "negative ZV",
@@ -130,7 +129,7 @@ def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bo
 
 
 def specified(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
-    """SI: the shortest non-negative taps that leave at most the vibration limit over every band."""
+    """SI: the shortest non-negative impulses that leave at most the vibration limit over every band."""
     conditions = Conditions(limits=tuple(_limit(band, options.vibration_limit) for band in bands))
     period_s = options.period_s
     if period_s is None:
@@ -146,24 +145,24 @@ def _limit(band: ModeBand, limit: float) -> ResidualLimit:
 
 
 def simultaneous(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
-    """Shortest non-negative taps at continuous times that cancel all modes at once."""
+    """Shortest non-negative impulses at continuous times that cancel all modes at once."""
     return [simultaneous_zv([band.mode for band in bands], options.max_duration_s)]
 
 
 def user_taps(_bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     """The taps that were given, on the grid if there is one."""
     if options.taps is None:
-        raise ArgumentError("the family taps judges taps that are given: none are")
+        raise ArgumentError("the family taps judges impulses that are given: none are")
     return [options.taps if options.period_s is None else on_grid(options.taps, options.period_s)]
 
 
 def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
-    """Shortest shaper with non-negative taps at continuous times that cancels every mode.
+    """Shortest shaper with non-negative impulses at continuous times that cancels every mode.
 
     Source: this project (numerical optimum over all modes at once).
     """
     fastest_hz = max(mode.frequency_hz for mode in modes)
-    title = f"simultaneous shaper without negative taps for {mode_names(modes)}"
+    title = f"simultaneous shaper without negative impulses for {mode_names(modes)}"
     conditions = Conditions(zeros=tuple(Zero(mode) for mode in modes))
     for per_period in _PER_PERIOD:
         step_s = 1.0 / (per_period * fastest_hz)
@@ -300,7 +299,7 @@ def _other_period(highest_hz: float, period_s: float) -> str:
 
 
 def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
-    """Minimal shapers of the bands' nominal modes: those without negative taps first, each part by duration.
+    """Minimal shapers of the bands' nominal modes: those without negative impulses first, each part by duration.
 
     Searched up to the duration of the convolved ZV, and, only if there is none, up to twice that; never beyond
     `options.max_duration_s` or 100 periods of the fastest mode.

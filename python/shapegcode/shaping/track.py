@@ -202,7 +202,7 @@ def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_
 
 
 def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[float, float]:
-    """Least and largest mean delay of non-negative taps, in periods."""
+    """Least and largest mean delay of non-negative impulses, in periods."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
     vertex = Vertices(matrix, right)

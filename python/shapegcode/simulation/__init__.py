@@ -1,1 +1,1 @@
-"""A program played on the machine: figures and motion."""
+"""A program simulated on the machine: figures and motion."""

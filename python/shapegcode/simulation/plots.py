@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.results import plot
-from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
+from shapegcode.results.path_plots import RECORD_SAMPLES, PlayedRegion, motion_pictures
 from shapegcode.results.result import Plot
 from shapegcode.simulation.result import Motion, Simulation
 
@@ -56,7 +56,7 @@ def plot_motion(motion: Motion, ax: Axes | None = None) -> Axes:
     each stretch of time, so that no peak is lost.
 
     Args:
-        motion: what was played.
+        motion: what was simulated.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -90,7 +90,7 @@ def plot_motion(motion: Motion, ax: Axes | None = None) -> Axes:
 def _band(panel: Axes, times: FloatArray, low: FloatArray, high: FloatArray, colour: str, name: str) -> None:
     """A curve, or the band that it fills where a stretch of time holds several samples.
 
-    A band that is wide against the picture holds many swings: it is light, so that it does not pass for a solid.
+    A band that is wide against the picture holds many cycles: it is light, so that it does not pass for a solid.
     """
     width = high - low
     tall = float(high.max() - low.min())

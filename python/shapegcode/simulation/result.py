@@ -32,7 +32,7 @@ class RegionRun:
 
     Attributes:
         lines: first and last of the program, from 1.
-        shaped: played as shaped blocks.
+        shaped: simulated as shaped blocks.
         was_rapid: shaped blocks in place of a rapid.
         time_s: until the set-points rest.
         residual_vibration_um: largest |response - command| of each axis once the set-points rest.
@@ -40,7 +40,7 @@ class RegionRun:
         period_s: time between two samples.
         path: what it is measured against.
         figures: what the core measured, with the samples that were recorded.
-        replay: plays it again and keeps as many samples as one says.
+        replay: simulates it again and keeps as many samples as one says.
     """
 
     lines: tuple[int, int]
@@ -150,7 +150,7 @@ class Simulation(Result):
         program: name of the program.
         machine: name of the machine.
         plant: "modal" or "feed-drive".
-        shaped: regions of it were played block by block at their feed, as shapegcode writes them.
+        shaped: regions of it were simulated block by block at their feed, as shapegcode writes them.
         measured_against: the program whose path the contour error is measured against; its own name for its own path.
         cycle_time_s: whole program: regions, rapids with in-position wait, dwells, drilling cycles.
         cutting_time_s: the regions alone, until the set-points rest.
@@ -168,7 +168,7 @@ class Simulation(Result):
             `convert` judges what it writes.
         motion: the whole program in time; None: not asked for.
         warnings: of the program and of the machine.
-        played: the program, to play it again for a page.
+        played: the program, to simulate it again for a page.
     """
 
     program: str

@@ -12,20 +12,19 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import fanuc_model
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import Offset, machine_warnings, region_range_warnings
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
-from shapegcode.program.pairing import paired_regions
+from shapegcode.program.compensation import paired_regions
 from shapegcode.results.figures import ContourError, Tracks, largest_xyz_um
 from shapegcode.results.result import Xyz
 from shapegcode.simulation.files import csv_file, npz_file
 from shapegcode.simulation.motion import MotionRecorder
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
-from shapegcode.verdict.program import judge_program
+from shapegcode.verdict.judge import judge_program
 
 _RULES = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 # How long behind a stop its settling time is looked for. A drive is integrated all that time.
@@ -42,7 +41,7 @@ def simulate(
     record_samples: int = 200_000,
     on_progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Simulation:
-    """Play the cutting regions of a program through the controller's model and the plant, each from rest to rest.
+    """Simulate the cutting regions of a program through the controller's model and the plant, each from rest to rest.
 
     `play_motion` and `stream` play the whole program in one.
 
@@ -51,7 +50,7 @@ def simulate(
         machine: controller and plant.
         plant: "modal" for the modes behind an ideal servo, "feed-drive" for `axes.*.drive`; what is said of vibration
             then holds the lag of the servo loop.
-        shaped: whether cuts are shaped blocks: played at their feed, without look-ahead, behind the control's own
+        shaped: whether cuts are shaped blocks: simulated at their feed, without look-ahead, behind the control's own
             filter (`controller.shaped_time_constant_s`), in the worse of both rules of block timing. None: those
             regions of which the program says so, as one that shapegcode wrote does.
         against: the original of a shaped program: the contour error is measured against its path, and the whole program
@@ -152,7 +151,7 @@ def play_motion(
     every: int = 1,
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Motion:
-    """Play a whole program in time; keep the largest values and the curves of its motion, and write it to files.
+    """Simulate a whole program in time; keep the largest values and the curves of its motion, and write it to files.
 
     Memory does not grow with the length of the program.
 

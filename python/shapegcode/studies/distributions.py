@@ -18,13 +18,10 @@ Unit = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Distribution:
-    """What a value is drawn from.
+    """What a value is drawn from."""
 
-    Attributes:
-        known: the program is converted for each value; False: it is converted for the value of the machine file, and
-            only the machine that plays it has the other one; None: False where a machine may differ from its file.
-    """
-
+    # the program is converted for each value; False: it is converted for the value of the machine file, and only
+    # the machine that plays it has the other one; None: False where a machine may differ from its file
     known: bool | None = None
 
     def at(self, shares: Unit) -> list[object]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapegcode.batching.cluster import Cluster, cluster_executor
+from shapegcode.batching.process import Cluster, cluster_executor
 from shapegcode.errors import ArgumentError, DesignError, MachineError
 from shapegcode.machine import Machine
 from shapegcode.program import Program

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine import Machine
-from shapegcode.settings.change import missing_row
+from shapegcode.settings.edit import missing_row
 from shapegcode.studies.distributions import Distribution, Listed, listed
 
 Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import fanuc_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program

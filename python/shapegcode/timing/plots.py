@@ -14,8 +14,6 @@ from shapegcode.timing.result import LABELS, PARTS, CycleTime, tool_name
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_time", "plots_of"]
-
 _COLOUR = dict(
     zip(
         ("acceleration_s", "cutting_s", "dwell_s", "in_position_s", "rapid_s", "tool_change_s", "function_s"),

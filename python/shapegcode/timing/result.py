@@ -14,8 +14,6 @@ from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table, share_percent
 
-__all__ = ["AGREEMENT_PERCENT", "LABELS", "PARTS", "BlockTime", "CycleTime", "RegionTime", "TimeParts", "ToolTime"]
-
 AGREEMENT_PERCENT = 0.5
 """Closed form and full interpolation agree if they differ by no more than this."""
 

@@ -1,4 +1,4 @@
-"""The parts of a conversion's result: what was played, per case and per region, beside its limits."""
+"""The parts of a conversion's result: what was simulated, per case and per region, beside its limits."""
 
 from __future__ import annotations
 

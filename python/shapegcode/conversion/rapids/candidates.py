@@ -61,7 +61,7 @@ class Rapid:
 
     @property
     def travel_mm(self) -> Vector:
-        """Signed way of each axis, (3,)."""
+        """Signed travel of each axis, (3,)."""
         return np.asarray(self.end_mm - self.start_mm)
 
 
@@ -172,7 +172,7 @@ class _Reader:
         return Rapid(line, start_mm, end_mm, region, "", number + "".join(_COMMENT.findall(source)))
 
     def _unmeasured(self, line: int) -> Rapid | None:
-        """A rapid whose way is not known: it counts, but takes no time."""
+        """A rapid whose travel is not known: it counts, but takes no time."""
         after = self._states[line]
         if after.motion != 0 or after.cycle != 80 or self._start_known(line):
             return None
@@ -204,7 +204,7 @@ class _Reader:
         return ""
 
     def _feed_mm_per_s(self, travel_mm: Vector, units: int) -> float:
-        """Largest cutting feed along a way, a whole F word: of each axis for itself, of the fastest tangentially."""
+        """Largest cutting feed along a travel, a whole F word: of each axis for itself, of the fastest tangentially."""
         share = np.abs(travel_mm) / np.linalg.norm(travel_mm)
         moved = share > 0.0
         along = float((self._largest_mm_per_s[moved] / share[moved]).min())
@@ -226,7 +226,7 @@ def _words(source: str) -> list[tuple[str, str]] | None:
 
 
 def _may_be_rapid(text: bytes) -> bool:
-    """Whether a block has axis words and no code that gives them another meaning than a way."""
+    """Whether a block has axis words and no code that gives them another meaning than travel."""
     block = _COMMENT.sub("", text.decode("latin-1")).upper()
     if not any(letter in block for letter in "XYZ"):
         return False

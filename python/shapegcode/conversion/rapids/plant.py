@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.rapids.candidates import Gap, Rapid
-from shapegcode.conversion.region_text import EmittedRegion
+from shapegcode.conversion.write import EmittedRegion
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import NO_OFFSET
 from shapegcode.verdict.figures import RegionVerdict

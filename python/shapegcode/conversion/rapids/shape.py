@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from bisect import bisect
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
@@ -20,67 +20,17 @@ from shapegcode import _core
 from shapegcode.conversion.budget import Budget, measure_load
 from shapegcode.conversion.rapids.candidates import NO_CUT, find_gaps
 from shapegcode.conversion.rapids.plant import NO_GAIN, Choice, OpenGap, RapidPlant
+from shapegcode.conversion.tables import RapidMove, RapidsOutcome
 from shapegcode.conversion.whole_text import read_back
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.program.stamp import RAPID_MARK
-from shapegcode.results.result import Pair, Xyz
+from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge
-
-
-@dataclass(frozen=True)
-class RapidMove:
-    """A rapid that is a shaped cutting move now.
-
-    Attributes:
-        lines: of the original, first and last.
-        emitted_lines: of the emitted program.
-        time_s: until the set-points rest.
-        in_position_s: wait for in-position behind them.
-        settling_s: from the end of the set-points until the table stays within the band.
-        residual_vibration_um: largest |table - command| while the set-points rest.
-        residual_limit_um: what the emitted one is judged by.
-        misses: tolerances that it leaves; always empty: such a rapid keeps its text.
-    """
-
-    lines: tuple[int, int]
-    emitted_lines: tuple[int, int]
-    time_s: Pair[float]
-    in_position_s: Pair[float]
-    settling_s: Pair[float]
-    residual_vibration_um: Pair[Xyz[float]]
-    residual_limit_um: Xyz[float]
-    misses: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class RapidsOutcome:
-    """The rapids of a program: how many are shaped moves now, why the others stay, and what that saves.
-
-    Attributes:
-        found: rapids in the program.
-        shaped: of them, shaped moves now.
-        kept: how many stay, by reason.
-        time_saved_s: by which the table is ready for the next cuts sooner, in all.
-        settle_band_um: half the width of the band in which vibration counts as having decayed.
-        blocks: shaped blocks that replace them.
-        slowed_blocks: of these, such as step an axis by more than the corner limit of the look-ahead.
-        moves: those that are shaped.
-    """
-
-    found: int
-    shaped: int
-    kept: Mapping[str, int]
-    time_saved_s: float
-    settle_band_um: float
-    blocks: int
-    slowed_blocks: int
-    moves: tuple[RapidMove, ...]
-
 
 NOTHING_SHAPED = "no cut of the program is shaped"
 OUT_OF_TOLERANCE = "misses its tolerance as shaped blocks"
@@ -212,7 +162,7 @@ class _RapidShaper:
         return bool(budget.too_fast(measure_load(choice.region, choice.shaped, self.grid, bits)))
 
     def _judge(self, choices: Sequence[Choice]) -> None:
-        """Play every replacement as the text has it."""
+        """Simulate every replacement as the text has it."""
         spliced = splice(self.emitted.core.text, self.placed, choices)
         emitted = read_back([spliced.text], spliced.everything, self.machine)
         stops_s = _STOP_S + self.machine.emission.prefill_dwell_s
@@ -281,7 +231,7 @@ def _warnings(outcome: RapidsOutcome, machine: Machine) -> list[str]:
     if machine.controller.rapid_path == "non_linear":
         warnings.append(
             "shaped rapids are straight lines; the rapids that they replace were not (controller.rapid_path = "
-            '"non_linear"): check that the straight way is free'
+            '"non_linear"): check that the straight path is free'
         )
     if outcome.slowed_blocks and not machine.emission.leaves_look_ahead:
         warnings.append(

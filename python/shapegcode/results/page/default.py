@@ -10,9 +10,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from shapegcode.results.json import plain
-from shapegcode.results.made import Made, this_version
-from shapegcode.results.outcome import NotKeptError, Outcome
+from shapegcode.results.json import Made, plain, this_version
+from shapegcode.results.outcome import Outcome
 from shapegcode.results.page.model import (
     Figure,
     Figures,
@@ -28,6 +27,7 @@ from shapegcode.results.page.model import (
 )
 from shapegcode.results.page.scene import Scene
 from shapegcode.results.table import Column, Table
+from shapegcode.results.values import NotKeptError
 
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _NO_WORD = re.compile(r"^-|[A-Z0-9./=]")

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shapegcode import _core
+
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -82,23 +84,15 @@ class SceneSpectrum:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a page shows of motion.
+    """What a page shows of motion."""
 
-    Attributes:
-        period_s: interpolation period.
-        variants: programs, the original first.
-        thinned: how far the thinning may be seen, in a sentence.
-        spectra: of axes that move.
-        modes: of the machine.
-        link_lines: lines of the emitted text and the lines of the original that they stand for: rows of first and last
-            emitted, first and last original.
-    """
-
-    period_s: float
-    variants: tuple[Variant, ...]
-    thinned: str
-    spectra: tuple[SceneSpectrum, ...] = ()
-    modes: tuple[ModeLine, ...] = ()
+    period_s: float  # interpolation period
+    variants: tuple[Variant, ...]  # programs, the original first
+    thinned: str  # how far the thinning may be seen, in a sentence
+    spectra: tuple[SceneSpectrum, ...] = ()  # of axes that move
+    modes: tuple[ModeLine, ...] = ()  # of the machine
+    # lines of the emitted text and the lines of the original that they stand for: rows of first and last emitted, first
+    # and last original
     link_lines: tuple[tuple[int, int, int, int], ...] = field(default=())
 
 
@@ -154,3 +148,174 @@ def packed(scene: Scene) -> tuple[dict[str, Any], str]:
         "link_lines": scene.link_lines,
     }
     return head, base64.b64encode(gzip.compress(bytes(body), 9, mtime=0)).decode()
+
+
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+PIXELS_WIDE, PIXELS_HIGH = 1600, 200
+"""Of the screen for which is thinned: path and time across, a curve from its least to its largest value."""
+
+_HALF_PIXEL = 0.5
+_STEP = 0.5  # of the tolerance, for each of two passes
+_COARSER = 1.5
+_PATH_LAST = 20.0
+_SHARE_OF_STARTS = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What is left."""
+
+    sample: IntArray  # which samples, (n,)
+    labels: IntArray  # what was said of each, (n, labels)
+    command_mm: FloatArray  # (n, 3)
+    deviation_um: FloatArray  # (n, 3)
+    curves: Mapping[str, FloatArray]  # by name, each (n,)
+    path_pixels: float  # how far the path may be off
+    pixels: float  # how far a curve may be off
+
+
+class Thinner:
+    """Takes samples piece by piece and keeps at most so many."""
+
+    def __init__(self, scales: Mapping[str, float], most: int) -> None:
+        """Keep at most so many samples."""
+        self._scales = scales
+        self._most = most
+        self._names: list[str] = []
+        self._pieces: list[tuple[IntArray, IntArray, FloatArray, BoolArray]] = []
+        self._low: FloatArray | None = None
+        self._high: FloatArray | None = None
+        # What is thinned again is off by the sum of what each pass allows.
+        self._spent = _STEP
+        self._path_spent = _path_factor(_STEP)
+        self.samples = 0
+
+    def add(
+        self,
+        sample: IntArray,
+        labels: IntArray,
+        command_mm: FloatArray,
+        deviation_um: FloatArray,
+        curves: Mapping[str, FloatArray],
+        starts: npt.NDArray[np.intp],
+    ) -> None:
+        """Further samples."""
+        self._names = list(curves)
+        values = np.column_stack([command_mm, deviation_um, *curves.values()])
+        low, high = values.min(axis=0), values.max(axis=0)
+        self._low = low if self._low is None else np.minimum(self._low, low)
+        self._high = high if self._high is None else np.maximum(self._high, high)
+        started = np.zeros(len(sample), dtype=bool)
+        started[starts] = True
+        # By the ranges so far, which only grow: finer than at the end.
+        rows = self._chosen(sample, values, started, _STEP)
+        self._pieces.append((sample[rows], labels[rows], values[rows], started[rows]))
+        self.samples += len(sample)
+        if sum(len(piece[0]) for piece in self._pieces) > 8 * self._most:
+            thinned, factor = self._thinned(_STEP, most=4 * self._most)
+            self._pieces = [thinned]
+            self._spent += factor
+            self._path_spent += _path_factor(factor)
+
+    def _tolerances(self, factor: float) -> FloatArray:
+        assert self._low is not None
+        assert self._high is not None
+        path = np.full(3, self._scales["path"])
+        span = np.maximum(self._high - self._low, 1e-12)
+        floors = np.array([self._scales.get(name, 0.0) for name in self._names])
+        curves = np.maximum(span[6:], floors) * _HALF_PIXEL / PIXELS_HIGH
+        # The three components of the deviation together are as fine as its magnitude.
+        deviation = np.full(3, max(float(span[3:6].max()), self._scales["deviation"])) * _HALF_PIXEL / PIXELS_HIGH
+        # The path is drawn large: it gives way only where its points alone are too many.
+        path *= _path_factor(factor)
+        tolerances: FloatArray = np.concatenate([path, deviation * factor, curves * factor])
+        return tolerances
+
+    def _chosen(
+        self,
+        sample: IntArray,
+        values: FloatArray,
+        started: npt.NDArray[np.bool_],
+        factor: float,
+        *,
+        starts: bool = True,
+    ) -> npt.NDArray[np.intp]:
+        rows = _core.thin_curves(sample.astype(np.float64), np.asfortranarray(values), self._tolerances(factor))
+        keep = np.zeros(len(sample), dtype=bool)
+        keep[rows] = True
+        keep[values[:, 6:].argmax(axis=0)] = True
+        if starts:
+            keep |= started
+        return np.flatnonzero(keep)
+
+    def _thinned(self, factor: float, most: int) -> tuple[tuple[IntArray, IntArray, FloatArray, BoolArray], float]:
+        sample, labels, values, started = (np.concatenate(parts) for parts in zip(*self._pieces, strict=True))
+        starts = int(started.sum()) <= _SHARE_OF_STARTS * most
+        rows = self._chosen(sample, values, started, factor, starts=starts)
+        while len(rows) > most:
+            factor *= _COARSER
+            rows = self._chosen(sample, values, started, factor, starts=starts)
+        return (sample[rows], labels[rows], values[rows], started[rows]), factor
+
+    def result(self) -> Kept:
+        """What is left."""
+        if not self._pieces:
+            raise ValueError("no sample: nothing to show")
+        (sample, labels, values, _), factor = self._thinned(_STEP, most=self._most)
+        curves = {name: values[:, 6 + rank] for rank, name in enumerate(self._names)}
+        path_pixels = (self._path_spent + _path_factor(factor)) * _HALF_PIXEL
+        pixels = (self._spent + factor) * _HALF_PIXEL
+        return Kept(sample, labels, values[:, :3], values[:, 3:6], curves, path_pixels, pixels)
+
+
+def _path_factor(factor: float) -> float:
+    """By what the path's tolerance grows where that of the curves grows by a factor."""
+    return max(factor / _PATH_LAST, min(factor, _STEP))
+
+
+_SEGMENT_S = 2.0  # so the lines lie half a hertz apart
+_STILL = 1e-9
+
+
+class AccelerationSpectrum:
+    """Welch's mean of the spectra of windows that overlap by half (P. D. Welch 1967), window of Hann."""
+
+    def __init__(self, period_s: float) -> None:
+        """Of samples that are one period apart."""
+        self._period_s = period_s
+        self._length = max(2 * round(0.5 * _SEGMENT_S / period_s), 8)
+        self._window = np.hanning(self._length + 1)[:-1]
+        self._power = np.zeros((self._length // 2 + 1, 3))
+        self._windows = 0
+        self._rest: FloatArray = np.zeros((0, 3))
+
+    def add(self, acceleration: FloatArray) -> None:
+        """Further samples, (k, 3), m/s²."""
+        waiting = np.concatenate([self._rest, acceleration])
+        half = self._length // 2
+        begin = 0
+        while begin + self._length <= len(waiting):
+            self._count(waiting[begin : begin + self._length])
+            begin += half
+        self._rest = waiting[begin:]
+
+    def _count(self, part: FloatArray) -> None:
+        self._power += np.abs(np.fft.rfft(part * self._window[:, None], axis=0)) ** 2
+        self._windows += 1
+
+    def lines(self, variant: str, *, most_hz: float) -> list[SceneSpectrum]:
+        """The spectral density of each axis that moves."""
+        if len(self._rest) and not self._windows:
+            # A motion shorter than one window: with rest behind it.
+            self._count(np.concatenate([self._rest, np.zeros((self._length - len(self._rest), 3))]))
+        frequency: FloatArray = np.fft.rfftfreq(self._length, self._period_s).astype(np.float64)
+        wanted = (frequency > 0.0) & (frequency <= most_hz)
+        scale = 2.0 * self._period_s / float((self._window**2).sum()) / max(self._windows, 1)
+        density: FloatArray = np.sqrt(self._power * scale)
+        return [
+            SceneSpectrum("xyz"[axis], variant, frequency[wanted], density[wanted, axis])
+            for axis in range(3)
+            if density[:, axis].max() > _STILL
+        ]

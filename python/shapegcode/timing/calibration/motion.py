@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import fanuc_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.timing.calibration.observed import ObservedRun, TimedProgram, seen_arc_acceleration
 
 FloatArray = npt.NDArray[np.float64]

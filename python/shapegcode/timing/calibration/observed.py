@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.io.run_log import RunLog, Signal
+from shapegcode.io.run_tracks import RunLog, Signal
 from shapegcode.io.units import find_unit
 from shapegcode.machine import Machine
-from shapegcode.model.controller import fanuc_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program
 from shapegcode.timing.calibration.runs_file import RunEntry
 

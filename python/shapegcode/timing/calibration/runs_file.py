@@ -18,10 +18,10 @@ from pydantic import Field, Strict, model_validator
 from shapegcode.errors import Problem, RecordError, RunsFileError
 from shapegcode.io.data_file import open_file
 from shapegcode.io.run_items import ItemTable, stated_feed_unit
-from shapegcode.io.run_log import LogFormat, RunLog, read_run_logs
+from shapegcode.io.run_log import LogFormat, read_run_logs
+from shapegcode.io.run_tracks import RunLog
 from shapegcode.settings.keys import Positive, Text, TomlTable, key, toml
-from shapegcode.settings.load import parsed, read_text, validated
-from shapegcode.settings.problems import KeyProblem, line_of
+from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
 
 Use = Literal["fit", "test"]
 _HEAD_BYTES = 4096
@@ -126,9 +126,9 @@ class _RunsRow(TomlTable):
     items: dict[Text, Text] | None = key("names of the items in the logs by what they are", default=None)
     format: LogFormat | None = key("of the logs; left out: by their content", default=None)
     override_percent: _Percent | None = key(
-        "override of the feed that the operator had set, where the log does not say", unit="%", default=None
+        "override of the feed that the operator had set, where the log does not say", default=None
     )
-    rapid_override_percent: _Percent | None = key("the same of rapids", unit="%", default=None)
+    rapid_override_percent: _Percent | None = key("the same of rapids", default=None)
     logged_as: _Path | None = key(
         "name of the program in the logs; left out: that of its file, or its O number", default=None
     )
