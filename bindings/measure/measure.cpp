@@ -170,14 +170,14 @@ void register_figures(py::module_& module) {
       .def_readonly("left_roughness", &SectionFigures::left_roughness, "Of the left wall, or None if too short.")
       .def_readonly("right_roughness", &SectionFigures::right_roughness, "Of the right wall, or None if too short.");
 
-  py::class_<RunFigures, std::shared_ptr<RunFigures>>(module, "RunFigures", "Figures of a whole run.")
-      .def_readonly("sections", &RunFigures::sections, "In the order of the path.")
-      .def_readonly("duration_s", &RunFigures::duration_s, "Until the command rests for the last time, s.")
-      .def_readonly("rest", &RunFigures::rest, "The stop at the end.")
-      .def_readonly("command", &RunFigures::command, "Deviation from the path; missed corners count.")
-      .def_readonly("response", &RunFigures::response, "Deviation from the path; missed corners count.")
-      .def_readonly("command_sides", &RunFigures::command_sides, "By sides, without missed corners.")
-      .def_readonly("response_sides", &RunFigures::response_sides, "By sides, without missed corners.");
+  py::class_<TrackFigures, std::shared_ptr<TrackFigures>>(module, "TrackFigures", "Figures of all samples measured.")
+      .def_readonly("sections", &TrackFigures::sections, "In the order of the path.")
+      .def_readonly("duration_s", &TrackFigures::duration_s, "Until the command rests for the last time, s.")
+      .def_readonly("rest", &TrackFigures::rest, "The stop at the end.")
+      .def_readonly("command", &TrackFigures::command, "Deviation from the path; missed corners count.")
+      .def_readonly("response", &TrackFigures::response, "Deviation from the path; missed corners count.")
+      .def_readonly("command_sides", &TrackFigures::command_sides, "By sides, without missed corners.")
+      .def_readonly("response_sides", &TrackFigures::response_sides, "By sides, without missed corners.");
 }
 
 void register_options(py::module_& module) {
@@ -222,7 +222,7 @@ void register_section_metrology(py::module_& module) {
           "finish",
           [](const SectionMetrology& self) {
             const py::gil_scoped_release release;
-            return std::make_shared<RunFigures>(self.finish());
+            return std::make_shared<TrackFigures>(self.finish());
           },
           "Everything measured so far. Raises NumericError if a circle fit does not converge.")
       .def(

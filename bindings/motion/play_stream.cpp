@@ -73,7 +73,7 @@ void register_played_stream(py::module_& module) {
           py::arg("rest_s") = 0.0, "Blocks at their feed.")
       .def_static(
           "of_program",
-          [](const std::shared_ptr<Program>& program, const ControllerModel& model, const PlaybackOptions& options,
+          [](const std::shared_ptr<Program>& program, const FanucModel& model, const PlaybackOptions& options,
              const std::vector<Vector3>& region_offsets_mm,
              double rest_s) { return PlayedStream(program, model, options, region_offsets_mm, rest_s); },
           py::arg("program").none(false), py::arg("model"), py::arg("options"),

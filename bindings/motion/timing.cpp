@@ -7,8 +7,8 @@
 
 #include "arrays.hpp"
 #include "register.hpp"
-#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/plant/servo_lag.hpp"
 #include "shapegcode/timing.hpp"
 
@@ -92,58 +92,57 @@ void define_model(py::module_& module) {
       .value("all", ShapedRegions::all)
       .value("none", ShapedRegions::none);
 
-  py::class_<ControllerModel>(module, "ControllerModel",
-                              "What decides how long a program takes, and what acceleration does to the path.")
+  py::class_<FanucModel>(module, "FanucModel",
+                         "What decides how long a program takes, and what acceleration does to the path.")
       .def(py::init<>())
-      .def_readwrite("period_s", &ControllerModel::period_s, "Interpolation period, s.")
-      .def_readwrite("block_end", &ControllerModel::block_end, "When a block's successor starts.")
-      .def_readwrite("motion", &ControllerModel::motion, "Where a cutting move is accelerated.")
-      .def_readwrite("filter_shape", &ControllerModel::filter_shape, "After interpolation: linear or exponential.")
-      .def_readwrite("time_constant_s", &ControllerModel::time_constant_s, "After interpolation, s (1622).")
-      .def_readwrite("bell_time_s", &ControllerModel::bell_time_s,
+      .def_readwrite("period_s", &FanucModel::period_s, "Interpolation period, s.")
+      .def_readwrite("block_end", &FanucModel::block_end, "When a block's successor starts.")
+      .def_readwrite("motion", &FanucModel::motion, "Where a cutting move is accelerated.")
+      .def_readwrite("filter_shape", &FanucModel::filter_shape, "After interpolation: linear or exponential.")
+      .def_readwrite("time_constant_s", &FanucModel::time_constant_s, "After interpolation, s (1622).")
+      .def_readwrite("bell_time_s", &FanucModel::bell_time_s,
                      "After interpolation, linear: second moving average, s; 0: none.")
-      .def_readwrite("exponential_rest", &ControllerModel::exponential_rest,
+      .def_readwrite("exponential_rest", &FanucModel::exponential_rest,
                      "Share of the exponential's weights that is cut off at its end.")
-      .def_readwrite("limits", &ControllerModel::limits, "Look-ahead; the axes' feed limits hold always.")
-      .def_readwrite("look_ahead_filter_time_constant_s", &ControllerModel::look_ahead_filter_time_constant_s,
+      .def_readwrite("limits", &FanucModel::limits, "Look-ahead; the axes' feed limits hold always.")
+      .def_readwrite("look_ahead_filter_time_constant_s", &FanucModel::look_ahead_filter_time_constant_s,
                      "Moving average behind look-ahead, s (1769); 0: none.")
-      .def_readwrite("rapid_rate_mm_per_s", &ControllerModel::rapid_rate_mm_per_s, "Per axis, shape (3,) (1420).")
-      .def_readwrite("rapid_time_constant_s", &ControllerModel::rapid_time_constant_s,
+      .def_readwrite("rapid_rate_mm_per_s", &FanucModel::rapid_rate_mm_per_s, "Per axis, shape (3,) (1420).")
+      .def_readwrite("rapid_time_constant_s", &FanucModel::rapid_time_constant_s,
                      "From rest to the rate, per axis, s, shape (3,) (1620).")
-      .def_readwrite("rapid_bell_time_s", &ControllerModel::rapid_bell_time_s, "s (1621); 0: none.")
-      .def_readwrite("rapid_path", &ControllerModel::rapid_path, "Straight or every axis for itself.")
-      .def_readwrite("in_position", &ControllerModel::in_position, "Measured or from the servo lag.")
-      .def_readwrite("in_position_s", &ControllerModel::in_position_s, "Measured wait, per axis, s, shape (3,).")
-      .def_readwrite("position_gain_per_s", &ControllerModel::position_gain_per_s, "Per axis, 1/s, shape (3,) (1825).")
-      .def_readwrite("feed_forward_ratio", &ControllerModel::feed_forward_ratio,
-                     "Per axis, 0 ... 1, shape (3,) (2092).")
-      .def_readwrite("in_position_width_mm", &ControllerModel::in_position_width_mm, "Per axis, mm, shape (3,) (1826).")
-      .def_readwrite("shaped_regions", &ControllerModel::shaped_regions, "What is played as shaped blocks.")
-      .def_readwrite("shaped_filter_shape", &ControllerModel::shaped_filter_shape, "Behind shaped blocks.")
-      .def_readwrite("shaped_time_constant_s", &ControllerModel::shaped_time_constant_s,
+      .def_readwrite("rapid_bell_time_s", &FanucModel::rapid_bell_time_s, "s (1621); 0: none.")
+      .def_readwrite("rapid_path", &FanucModel::rapid_path, "Straight or every axis for itself.")
+      .def_readwrite("in_position", &FanucModel::in_position, "Measured or from the servo lag.")
+      .def_readwrite("in_position_s", &FanucModel::in_position_s, "Measured wait, per axis, s, shape (3,).")
+      .def_readwrite("position_gain_per_s", &FanucModel::position_gain_per_s, "Per axis, 1/s, shape (3,) (1825).")
+      .def_readwrite("feed_forward_ratio", &FanucModel::feed_forward_ratio, "Per axis, 0 ... 1, shape (3,) (2092).")
+      .def_readwrite("in_position_width_mm", &FanucModel::in_position_width_mm, "Per axis, mm, shape (3,) (1826).")
+      .def_readwrite("shaped_regions", &FanucModel::shaped_regions, "What is played as shaped blocks.")
+      .def_readwrite("shaped_filter_shape", &FanucModel::shaped_filter_shape, "Behind shaped blocks.")
+      .def_readwrite("shaped_time_constant_s", &FanucModel::shaped_time_constant_s,
                      "Behind shaped blocks, s; 0: no filter.")
-      .def_readwrite("shaped_bell_time_s", &ControllerModel::shaped_bell_time_s,
+      .def_readwrite("shaped_bell_time_s", &FanucModel::shaped_bell_time_s,
                      "Behind shaped blocks, linear: second moving average, s; 0: none.")
-      .def_readwrite("shaped_block_end", &ControllerModel::shaped_block_end,
+      .def_readwrite("shaped_block_end", &FanucModel::shaped_block_end,
                      "When a shaped block's successor starts; ceil is the slower rule.")
-      .def_readwrite("feed_override", &ControllerModel::feed_override, "Scales every programmed feed.")
-      .def_readwrite("rapid_override", &ControllerModel::rapid_override,
+      .def_readwrite("feed_override", &FanucModel::feed_override, "Scales every programmed feed.")
+      .def_readwrite("rapid_override", &FanucModel::rapid_override,
                      "Scales the rapid rates; the acceleration of a rapid stays.")
-      .def_readwrite("program_start_s", &ControllerModel::program_start_s, "From the start key to the first block, s.")
-      .def_readwrite("last_tool_in_spindle", &ControllerModel::last_tool_in_spindle,
+      .def_readwrite("program_start_s", &FanucModel::program_start_s, "From the start key to the first block, s.")
+      .def_readwrite("last_tool_in_spindle", &FanucModel::last_tool_in_spindle,
                      "At the start, from the run before: an M06 that calls it changes nothing.")
-      .def_readwrite("tool_change_s", &ControllerModel::tool_change_s, "M06, s.")
-      .def_readwrite("m_function_s", &ControllerModel::m_function_s, "Every M code without a time of its own, s.")
-      .def_readwrite("m_code_s", &ControllerModel::m_code_s, "M codes with a time of their own: code -> s.")
-      .def_readwrite("unknown_move_s", &ControllerModel::unknown_move_s,
+      .def_readwrite("tool_change_s", &FanucModel::tool_change_s, "M06, s.")
+      .def_readwrite("m_function_s", &FanucModel::m_function_s, "Every M code without a time of its own, s.")
+      .def_readwrite("m_code_s", &FanucModel::m_code_s, "M codes with a time of their own: code -> s.")
+      .def_readwrite("unknown_move_s", &FanucModel::unknown_move_s,
                      "Per axis: a rapid of whose way the program does not tell start or end, s, shape (3,).")
       .def_property(
-          "spindle_start_s", [](const ControllerModel& self) { return spindle_rows(self.spindle_start_s); },
-          [](ControllerModel& self, const SpindleRows& rows) { self.spindle_start_s = spindle_times(rows); },
+          "spindle_start_s", [](const FanucModel& self) { return spindle_rows(self.spindle_start_s); },
+          [](FanucModel& self, const SpindleRows& rows) { self.spindle_start_s = spindle_times(rows); },
           "(speed in 1/min, s) in which the spindle comes from rest to it.")
       .def_property(
-          "spindle_stop_s", [](const ControllerModel& self) { return spindle_rows(self.spindle_stop_s); },
-          [](ControllerModel& self, const SpindleRows& rows) { self.spindle_stop_s = spindle_times(rows); },
+          "spindle_stop_s", [](const FanucModel& self) { return spindle_rows(self.spindle_stop_s); },
+          [](FanucModel& self, const SpindleRows& rows) { self.spindle_stop_s = spindle_times(rows); },
           "(speed in 1/min, s) in which the spindle comes from it to rest.");
 
   module.def("for_shaped_blocks", &for_shaped_blocks, py::arg("model"),
@@ -152,7 +151,7 @@ void define_model(py::module_& module) {
              "Filters behind interpolation in order, none, one or two.");
   module.def(
       "block_overlap_time_s",
-      [](const VectorArray& lengths_mm, const VectorArray& feeds_mm_per_s, const ControllerModel& model) {
+      [](const VectorArray& lengths_mm, const VectorArray& feeds_mm_per_s, const FanucModel& model) {
         const auto lengths = values(lengths_mm);
         const auto feeds = values(feeds_mm_per_s);
         const py::gil_scoped_release release;
@@ -163,7 +162,7 @@ void define_model(py::module_& module) {
       "004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.");
   module.def(
       "rapid_time_s",
-      [](const Vector3& travel_mm, const ControllerModel& model) {
+      [](const Vector3& travel_mm, const FanucModel& model) {
         check(model);
         return rapid_time_s(travel_mm, model);
       },
@@ -172,7 +171,7 @@ void define_model(py::module_& module) {
       "signed way of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.");
   module.def(
       "in_position_wait_s",
-      [](const Vector3& travel_mm, const ControllerModel& model) {
+      [](const Vector3& travel_mm, const FanucModel& model) {
         check(model);
         return in_position_wait_s(travel_mm, model);
       },
@@ -180,7 +179,7 @@ void define_model(py::module_& module) {
       "Wait for in-position behind a rapid, s. Raises ArgumentError on a model that no controller can have.");
   module.def(
       "in_position_wait_behind_s",
-      [](const Vector3& error_mm, const std::array<bool, axis_count>& moved, const ControllerModel& model) {
+      [](const Vector3& error_mm, const std::array<bool, axis_count>& moved, const FanucModel& model) {
         check(model);
         return in_position_wait_s(error_mm, moved, model);
       },
@@ -189,7 +188,7 @@ void define_model(py::module_& module) {
       "moved, (3,). Raises ArgumentError on a model that no controller can have.");
   module.def(
       "rapid_samples",
-      [](const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model) {
+      [](const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model) {
         Samples samples;
         {
           const py::gil_scoped_release release;
@@ -219,7 +218,7 @@ void define_simulation(py::module_& module) {
                     "Programmed radius minus radius of the axes behind the servo loop, mm.");
   module.def(
       "simulate_circle",
-      [](double radius_mm, double feed_mm_per_s, const ControllerModel& model) {
+      [](double radius_mm, double feed_mm_per_s, const FanucModel& model) {
         const py::gil_scoped_release release;
         return simulate_circle(radius_mm, feed_mm_per_s, model);
       },
@@ -280,7 +279,7 @@ void register_timing(py::module_& module) {
 
   module.def(
       "time_program",
-      [](const std::shared_ptr<Program>& program, const ControllerModel& model, bool per_block) {
+      [](const std::shared_ptr<Program>& program, const FanucModel& model, bool per_block) {
         const py::gil_scoped_release release;
         return std::make_shared<CycleTime>(time_program(*program, model, per_block));
       },
@@ -289,7 +288,7 @@ void register_timing(py::module_& module) {
       "look-ahead. Raises ArgumentError on a model that no controller can have.");
   module.def(
       "interpolate_program",
-      [](const std::shared_ptr<Program>& program, const ControllerModel& model) {
+      [](const std::shared_ptr<Program>& program, const FanucModel& model) {
         const py::gil_scoped_release release;
         return std::make_shared<InterpolatedTime>(interpolate_program(*program, model));
       },

@@ -59,7 +59,7 @@ void register_shaped_command(py::module_& module) {
 
   py::class_<ShapedCommand, std::shared_ptr<ShapedCommand>>(module, "ShapedCommand",
                                                             "A shaped command on the block grid.")
-      .def_readonly("first_period", &ShapedCommand::first_period, "Periods of the region before this piece.")
+      .def_readonly("first_period", &ShapedCommand::first_period, "Periods of the region before this part.")
       .def_property_readonly(
           "grid_mm", [](const std::shared_ptr<ShapedCommand>& self) { return view(self->grid_mm, py::cast(self)); },
           "(n+1, 3) positions at k*T_B, mm, read-only view.")
@@ -69,7 +69,7 @@ void register_shaped_command(py::module_& module) {
       .def_property_readonly(
           "arc_normal", [](const ShapedCommand& self) { return self.arc_normal; },
           "Per period the axis across an arc's plane, or -1.")
-      .def_readonly("run_ends", &ShapedCommand::run_ends, "Periods of this piece at which the command is at rest.")
+      .def_readonly("run_ends", &ShapedCommand::run_ends, "Periods of this part at which the command is at rest.")
       .def_readonly("segment_periods", &ShapedCommand::segment_periods,
                     "Per marked segment the period of the region in which its begin is reached.");
 
@@ -85,7 +85,7 @@ void register_shaped_command(py::module_& module) {
       "periods. Raises ArgumentError if the block period is no multiple of the interpolation period.");
 
   py::class_<RegionShaper>(module, "RegionShaper",
-                           R"(A region's shaped command in pieces, so that memory does not grow with the region.
+                           R"(A region's shaped command in parts, so that memory does not grow with the region.
 
 Args:
     path: The programmed path.
@@ -104,23 +104,23 @@ Raises:
           "next",
           [](RegionShaper& self, std::uint32_t periods) -> std::optional<std::shared_ptr<ShapedCommand>> {
             const py::gil_scoped_release release;
-            auto piece = std::make_shared<ShapedCommand>();
-            if (!self.next(*piece, periods)) {
+            auto part = std::make_shared<ShapedCommand>();
+            if (!self.next(*part, periods)) {
               return std::nullopt;
             }
-            return piece;
+            return part;
           },
-          py::arg("periods"), "Next piece of at most so many periods, or None behind the last.")
+          py::arg("periods"), "Next part of at most so many periods, or None behind the last.")
       .def("begin_early", &RegionShaper::begin_early,
-           R"(To be called before the first piece: do not wait for the search for the feed.
+           R"(To be called before the first part: do not wait for the search for the feed.
 
-Where the region is one run, its pieces are given out while they are measured, as if the first plan kept the tolerance.
+Where the region is one run, its parts are given out while they are measured, as if the first plan kept the tolerance.
 Where that turns out to be wrong, next() gives None and is_withdrawn holds: all that was given out is void.)")
       .def("begin_anew", &RegionShaper::begin_anew,
            R"(Give the region out from its begin again, with the feed that the search finds.
 
 Returns:
-    False, and nothing is done, if no piece was given out early.)")
+    False, and nothing is done, if no part was given out early.)")
       .def_property_readonly("is_withdrawn", &RegionShaper::is_withdrawn, "Whether what was given out is void.")
       .def_property_readonly("largest_deviation_mm", &RegionShaper::largest_deviation_mm,
                              "Largest deviation of what shall follow the path, as far as given out, mm.")

@@ -97,15 +97,15 @@ struct shapegcode_hal {
     }
     const auto count = static_cast<std::size_t>(joints);
     filter.step({in, count}, {out, count}, settings.fade_s > 0.0 ? settings.fade_s / settings.period_s : 0.0);
-    const Stage& stage = filter.active();
-    const Fir& fir = stage.stream.fir();
+    const OfferedFilter& active = filter.active();
+    const Fir& fir = active.stream.fir();
     const bool impossible = refused.load(std::memory_order_acquire) == wishes.number();
     status.possible = impossible ? 0 : 1;
     const bool designed = settled.load(std::memory_order_acquire) == wishes.number();
-    const bool at_work = designed && stage.wish == newest_stage.load(std::memory_order_relaxed);
+    const bool at_work = designed && active.wish == newest_offer.load(std::memory_order_relaxed);
     status.waiting = at_work || impossible ? 0 : 1;
-    if (stage.wish != described) {
-      described = stage.wish;
+    if (active.wish != described) {
+      described = active.wish;
       delay_samples = fir.mean_samples();
     }
     status.delay_s = delay_samples * settings.period_s;
@@ -141,8 +141,8 @@ struct shapegcode_hal {
       Fir fir = design(wish_of(words), std::bit_cast<double>(words[2]));
       if (fir.taps() != newest.taps() || fir.delays() != newest.delays()) {
         newest = fir;
-        newest_stage.store(number, std::memory_order_relaxed);
-        filter.offer(std::make_unique<Stage>(std::move(fir), joints, number));
+        newest_offer.store(number, std::memory_order_relaxed);
+        filter.offer(std::make_unique<OfferedFilter>(std::move(fir), joints, number));
       }
       settled.store(number, std::memory_order_release);
     } catch (const std::exception& error) {
@@ -158,8 +158,8 @@ struct shapegcode_hal {
   Words last{};
   std::uint64_t described = 0;
   double delay_samples = 0.0;
-  Fir newest{{0}, {1.0}};                       // of the stage offered last; the other thread's own
-  std::atomic<std::uint64_t> newest_stage = 0;  // its wish
+  Fir newest{{0}, {1.0}};                       // of the filter offered last; the other thread's own
+  std::atomic<std::uint64_t> newest_offer = 0;  // its wish
   std::atomic<std::uint64_t> settled = 0;       // wish that it fulfils: a later one may ask for the same
   std::atomic<std::uint64_t> refused = 0;
   std::jthread designer;  // the last: it uses all of the above

@@ -6,7 +6,7 @@
 
 namespace shapegcode::linuxcnc {
 
-static_assert(std::atomic<Stage*>::is_always_lock_free);
+static_assert(std::atomic<OfferedFilter*>::is_always_lock_free);
 
 namespace {
 
@@ -16,7 +16,7 @@ double smooth_step(double x) noexcept { return x * x * x * (10.0 + x * (6.0 * x 
 }  // namespace
 
 SwitchingFilter::SwitchingFilter(int n_joints)
-    : active_(std::make_unique<Stage>(Fir({0}, {1.0}), n_joints, 0)),
+    : active_(std::make_unique<OfferedFilter>(Fir({0}, {1.0}), n_joints, 0)),
       last_(static_cast<std::size_t>(n_joints), 0.0),
       blended_(static_cast<std::size_t>(n_joints), 0.0) {}
 
@@ -38,7 +38,7 @@ void SwitchingFilter::step(std::span<const double> in, std::span<double> out, do
 }
 
 void SwitchingFilter::take_offer(std::span<const double> in) noexcept {
-  // The place for what is done with is emptied by the other thread; without it there is nowhere to put this stage.
+  // The place for what is done with is emptied by the other thread; without it there is nowhere to put this filter.
   if (retired_.load(std::memory_order_relaxed) != nullptr) return;
   next_.reset(offered_.exchange(nullptr, std::memory_order_acq_rel));
   if (!next_) return;
@@ -64,8 +64,8 @@ void SwitchingFilter::blend_in(std::span<const double> in, std::span<double> out
   active_ = std::move(next_);
 }
 
-void SwitchingFilter::offer(std::unique_ptr<Stage> stage) noexcept {
-  delete offered_.exchange(stage.release(), std::memory_order_acq_rel);
+void SwitchingFilter::offer(std::unique_ptr<OfferedFilter> filter) noexcept {
+  delete offered_.exchange(filter.release(), std::memory_order_acq_rel);
 }
 
 void SwitchingFilter::clean_up() noexcept { delete retired_.exchange(nullptr, std::memory_order_acq_rel); }

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_planned', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_planned', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -3136,7 +3136,7 @@ class ShapedCommand:
     @property
     def first_period(self) -> int:
         """
-        Periods of the region before this piece.
+        Periods of the region before this part.
         """
     @property
     def grid_mm(self) -> numpy.ndarray:
@@ -3151,7 +3151,7 @@ class ShapedCommand:
     @property
     def run_ends(self) -> list[int]:
         """
-        Periods of this piece at which the command is at rest.
+        Periods of this part at which the command is at rest.
         """
     @property
     def segment_periods(self) -> list[int]:
@@ -3160,7 +3160,7 @@ class ShapedCommand:
         """
 class RegionShaper:
     """
-    A region's shaped command in pieces, so that memory does not grow with the region.
+    A region's shaped command in parts, so that memory does not grow with the region.
     
     Args:
         path: The programmed path.
@@ -3180,18 +3180,18 @@ class RegionShaper:
         Give the region out from its begin again, with the feed that the search finds.
         
         Returns:
-            False, and nothing is done, if no piece was given out early.
+            False, and nothing is done, if no part was given out early.
         """
     def begin_early(self) -> None:
         """
-        To be called before the first piece: do not wait for the search for the feed.
+        To be called before the first part: do not wait for the search for the feed.
         
-        Where the region is one run, its pieces are given out while they are measured, as if the first plan kept the tolerance.
+        Where the region is one run, its parts are given out while they are measured, as if the first plan kept the tolerance.
         Where that turns out to be wrong, next() gives None and is_withdrawn holds: all that was given out is void.
         """
     def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
         """
-        Next piece of at most so many periods, or None behind the last.
+        Next part of at most so many periods, or None behind the last.
         """
     @property
     def is_slowed(self) -> bool:
@@ -4207,9 +4207,9 @@ class SectionFigures:
         """
         Left less right wall, with the tool's diameter.
         """
-class RunFigures:
+class TrackFigures:
     """
-    Figures of a whole run.
+    Figures of all samples measured.
     """
     @property
     def command(self) -> DeviationStats:
@@ -4320,7 +4320,7 @@ class SectionMetrology:
         """
         The next samples of both, (n, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
         """
-    def finish(self) -> RunFigures:
+    def finish(self) -> TrackFigures:
         """
         Everything measured so far. Raises NumericError if a circle fit does not converge.
         """
@@ -4583,7 +4583,7 @@ class ShapedRegions:
     @property
     def value(self) -> int:
         ...
-class ControllerModel:
+class FanucModel:
     """
     What decides how long a program takes, and what acceleration does to the path.
     """
@@ -5187,7 +5187,7 @@ class PlayedStream:
         A path under a speed profile; behind its end the set-points rest for rest_s.
         """
     @staticmethod
-    def of_program(program: ProgramText, model: ControllerModel, options: PlaybackOptions, region_offsets_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]] = [], rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+    def of_program(program: ProgramText, model: FanucModel, options: PlaybackOptions, region_offsets_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]] = [], rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
         """
         A whole program on one time axis. region_offsets_mm: from the positions of each region to the machine's, for modes that vary with them. Raises ArgumentError on a model that no controller can have.
         """
@@ -6225,7 +6225,7 @@ class ProgramComparison:
         """
         Largest distance of the paths of a cut that both have, seen from either, mm.
         """
-def acceleration_filters(model: ControllerModel) -> list[Fir]:
+def acceleration_filters(model: FanucModel) -> list[Fir]:
     """
     Filters behind interpolation in order, none, one or two.
     """
@@ -6267,7 +6267,7 @@ def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.A
     
     Source: K. Steiglitz, L. McBride 1965; paper 003, eq. 1.
     """
-def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], model: ControllerModel) -> float:
+def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], model: FanucModel) -> float:
     """
     Time of a run of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
     """
@@ -6464,7 +6464,7 @@ def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.Arr
     
     Source: L. Ljung, System Identification, ch. 7; G. Golub, V. Pereyra 2003.
     """
-def for_shaped_blocks(model: ControllerModel) -> ControllerModel:
+def for_shaped_blocks(model: FanucModel) -> FanucModel:
     """
     The same controller while shaped blocks run: block by block at their feed, without look-ahead.
     """
@@ -6492,11 +6492,11 @@ def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.Supp
     
     Source: this project.
     """
-def in_position_wait_behind_s(error_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], moved: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"], model: ControllerModel) -> float:
+def in_position_wait_behind_s(error_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], moved: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"], model: FanucModel) -> float:
     """
     The same behind any command, s. `error_mm`: what the servo loop lags at its end, (3,); `moved`: the axes that moved, (3,). Raises ArgumentError on a model that no controller can have.
     """
-def in_position_wait_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> float:
+def in_position_wait_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> float:
     """
     Wait for in-position behind a rapid, s. Raises ArgumentError on a model that no controller can have.
     """
@@ -6538,7 +6538,7 @@ def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloa
     """
     All set-points of a path, (n_samples, 3), mm, read-only. Raises ArgumentError on a period <= 0.
     """
-def interpolate_program(program: ProgramText, model: ControllerModel) -> InterpolatedTime:
+def interpolate_program(program: ProgramText, model: FanucModel) -> InterpolatedTime:
     """
     The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
     """
@@ -6835,11 +6835,11 @@ def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing
     
     Source: this project (orthogonal least squares; S. Chen, S. Billings, W. Luo 1989).
     """
-def rapid_samples(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> numpy.ndarray:
+def rapid_samples(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> numpy.ndarray:
     """
     Set-points of a rapid, one per period, (n, 3), mm, read-only. Raises ArgumentError on an unusable model.
     """
-def rapid_time_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> float:
+def rapid_time_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> float:
     """
     Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: signed way of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.
     """
@@ -6892,7 +6892,7 @@ def shape_path(path: Path, shaper: Fir, marked_segments: collections.abc.Sequenc
     """
     Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block periods. Raises ArgumentError if the block period is no multiple of the interpolation period.
     """
-def simulate_circle(radius_mm: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, model: ControllerModel) -> CircleFigures:
+def simulate_circle(radius_mm: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, model: FanucModel) -> CircleFigures:
     """
     Run circles in XY at a constant feed and measure the mean radius over whole turns. Raises ArgumentError on a radius or feed <= 0.
     """
@@ -6935,7 +6935,7 @@ def thin_curves(times: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "
     Raises:
         ArgumentError: Another shape, times that do not rise, a tolerance that is not above 0, or a value that is not finite.
     """
-def time_program(program: ProgramText, model: ControllerModel, per_block: bool = False) -> CycleTime:
+def time_program(program: ProgramText, model: FanucModel, per_block: bool = False) -> CycleTime:
     """
     Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on a model that no controller can have.
     """

@@ -27,7 +27,7 @@ from table import Row, Sample, comparison_table, markdown
 import shapegcode as sg
 from shapegcode import _core
 from shapegcode.conversion.write import RegionWriter
-from shapegcode.model.machine_model import MachineModel, controller_model
+from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.shaping.grid import choose_grid
 
 _MEGA = 1e6
@@ -136,7 +136,7 @@ def _timing_rows(program: Path, repetitions: int) -> list[Row]:
     read = sg.Program.read(program, machine).core
     rows = []
     for motion in (_core.MotionKind.after_interpolation, _core.MotionKind.look_ahead):
-        model = controller_model(machine)
+        model = fanuc_model(machine)
         model.motion = motion
         closed, full = [], []
         for _ in range(repetitions):

@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/filter.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/plant/modal.hpp"

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/filter.hpp"
 #include "shapegcode/measure/contour.hpp"
 #include "shapegcode/motion.hpp"
@@ -100,7 +100,7 @@ int main() {
   });
 
   linuxcnc::SwitchingFilter switching(3);
-  switching.offer(std::make_unique<linuxcnc::Stage>(Fir({0, 3, 7}, {0.5, 0.2, 0.3}), 3, 1));
+  switching.offer(std::make_unique<linuxcnc::OfferedFilter>(Fir({0, 3, 7}, {0.5, 0.2, 0.3}), 3, 1));
   expect_none("SwitchingFilter::step", [&] {
     for (int i = 0; i < 5000; ++i) {
       position = Vector3(1.0 + i, 2.0, 3.0 - 0.5 * i);
@@ -111,7 +111,7 @@ int main() {
     return 5000L;
   });
 
-  ControllerModel controller;
+  FanucModel controller;
   controller.rapid_bell_time_s = 0.03;
   RapidPlayer rapid({0.0, 0.0, 0.0}, {300.0, -20.0, 5.0}, controller);
   expect_none("RapidPlayer::step", [&] {

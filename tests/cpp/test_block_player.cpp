@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "stepped_into.hpp"
 
 using shapegcode::BlockEnd;

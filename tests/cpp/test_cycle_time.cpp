@@ -25,8 +25,8 @@ Program program(const std::string& body) {
   return read_program("%\nO1\n" + body + "\nM30\n%\n", options);
 }
 
-ControllerModel variant(int k) {
-  ControllerModel model;
+FanucModel variant(int k) {
+  FanucModel model;
   model.motion = k % 2 == 0 ? MotionKind::after_interpolation : MotionKind::look_ahead;
   model.in_position = k % 3 == 0 ? InPosition::servo_lag : InPosition::measured;
   model.in_position_s = {0.025, 0.025, 0.12};
@@ -50,7 +50,7 @@ TEST_CASE("cycle time: closed form and full interpolation of programs agree") {
     for (int k = 0; k < 6; ++k) {
       CAPTURE(name);
       CAPTURE(k);
-      const ControllerModel model = variant(k);
+      const FanucModel model = variant(k);
       const CycleTime closed = time_program(read, model, true);
       CHECK(closed.parts.total_s() == doctest::Approx(interpolate_program(read, model).total_s).epsilon(0.005));
       double sum = 0.0;
@@ -67,7 +67,7 @@ TEST_CASE("cycle time: an exact stop waits for the servo loop, in arcs and lines
   const Program read =
       program("G90 G94 G61\nG00 X0. Y0. Z0.\nG01 X30. F6000.\nG03 X30. Y20. R10.\nG01 X29.5\nX5. Y3. Z-7.");
   for (const MotionKind motion : {MotionKind::after_interpolation, MotionKind::look_ahead}) {
-    ControllerModel model;
+    FanucModel model;
     model.motion = motion;
     model.in_position = InPosition::servo_lag;
     model.in_position_width_mm = Vector3::Constant(0.005);
@@ -85,17 +85,17 @@ TEST_CASE("cycle time: an exact stop waits for the servo loop, in arcs and lines
 }
 
 TEST_CASE("cycle time: without steps, without blocks") {
-  const CycleTime closed = time_program(Program(), ControllerModel(), true);
+  const CycleTime closed = time_program(Program(), FanucModel(), true);
   CHECK(closed.parts.total_s() == 0.0);
   CHECK(closed.tools.empty());
   CHECK(closed.blocks.empty());
-  CHECK(interpolate_program(Program(), ControllerModel()).total_s == 0.0);
+  CHECK(interpolate_program(Program(), FanucModel()).total_s == 0.0);
 }
 
 TEST_CASE("circle: refuses what is no circle") {
-  CHECK_THROWS_AS((void)simulate_circle(0.0, 10.0, ControllerModel()), Error);
-  CHECK_THROWS_AS((void)simulate_circle(10.0, -1.0, ControllerModel()), Error);
-  CHECK_THROWS_AS((void)simulate_circle(1e6, 1e-6, ControllerModel()), Error);
+  CHECK_THROWS_AS((void)simulate_circle(0.0, 10.0, FanucModel()), Error);
+  CHECK_THROWS_AS((void)simulate_circle(10.0, -1.0, FanucModel()), Error);
+  CHECK_THROWS_AS((void)simulate_circle(1e6, 1e-6, FanucModel()), Error);
 }
 
 TEST_CASE("cycle time: M codes, the spindle that starts and stops while the axes move, ways that are not known") {
@@ -103,7 +103,7 @@ TEST_CASE("cycle time: M codes, the spindle that starts and stops while the axes
   const Program read = read_program(
       "%\nO1\nG21 G90 G94\nT1 M6\nG0 X0. Y0. S6000 M3\nG4 P500\nZ5. M8\nG1 Z0. F600.\nM5\nG91 G28 Z0. M9\nM30\n%\n",
       options);
-  ControllerModel model;
+  FanucModel model;
   model.tool_change_s = 6.0;
   model.m_function_s = 0.1;
   model.m_code_s = {{8, 0.4}};

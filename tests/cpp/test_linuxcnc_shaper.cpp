@@ -24,7 +24,7 @@ using shapegcode::Mode;
 using shapegcode::residual_ratio;
 using shapegcode::Shaper;
 using shapegcode::linuxcnc::design;
-using shapegcode::linuxcnc::Stage;
+using shapegcode::linuxcnc::OfferedFilter;
 using shapegcode::linuxcnc::SwitchingFilter;
 using shapegcode::linuxcnc::vibration_limit;
 using shapegcode::linuxcnc::Wish;
@@ -119,7 +119,7 @@ TEST_CASE("linuxcnc filter: without a fade it waits for rest, with one it is exa
   for (const double fade : {0.0, 20.0}) {
     CAPTURE(fade);
     SwitchingFilter filter(1);
-    filter.offer(std::make_unique<Stage>(Fir(delays, {0.25, 0.75}), 1, 1));
+    filter.offer(std::make_unique<OfferedFilter>(Fir(delays, {0.25, 0.75}), 1, 1));
     int switched = 0;
     double last = 0.0;
     for (int sample = 0; sample < 400; ++sample) {
@@ -140,11 +140,12 @@ TEST_CASE("linuxcnc filter: without a fade it waits for rest, with one it is exa
 
 TEST_CASE("linuxcnc filter: of several offers the last one counts, and one that is taken is finished first") {
   SwitchingFilter filter(2);
-  for (const std::uint64_t wish : {1U, 2U}) filter.offer(std::make_unique<Stage>(Fir({0, 5}, {0.5, 0.5}), 2, wish));
+  for (const std::uint64_t wish : {1U, 2U})
+    filter.offer(std::make_unique<OfferedFilter>(Fir({0, 5}, {0.5, 0.5}), 2, wish));
   std::array<double, 2> values{3.0, 4.0};
   for (int sample = 0; sample < 20; ++sample) filter.step(values, values, 0.0);
   CHECK(filter.active().wish == 2);
-  filter.offer(std::make_unique<Stage>(Fir({0}, {1.0}), 2, 3));
+  filter.offer(std::make_unique<OfferedFilter>(Fir({0}, {1.0}), 2, 3));
   for (int sample = 0; sample < 20; ++sample) filter.step(values, values, 0.0);
   CHECK(filter.active().wish == 2);  // the place for what is done with is still taken
   filter.clean_up();

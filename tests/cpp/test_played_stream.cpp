@@ -96,8 +96,8 @@ std::shared_ptr<const Program> program(const std::string& body) {
   return std::make_shared<const Program>(read_program("%\nO1\n" + body + "\nM30\n%\n", options));
 }
 
-ControllerModel waiting_controller(MotionKind motion) {
-  ControllerModel model;
+FanucModel waiting_controller(MotionKind motion) {
+  FanucModel model;
   model.motion = motion;
   model.in_position_s = {0.025, 0.025, 0.12};
   model.limits.corner_speed_difference_mm_per_s = Vector3::Constant(8.0);
@@ -160,7 +160,7 @@ TEST_CASE("played stream: a program takes its cycle time, without a jump, and th
   const auto text = program(whole_program);
   for (const MotionKind motion : {MotionKind::look_ahead, MotionKind::after_interpolation}) {
     CAPTURE(static_cast<int>(motion));
-    const ControllerModel model = waiting_controller(motion);
+    const FanucModel model = waiting_controller(motion);
     PlaybackOptions options = vertical_machine();
     const Played played = drained(PlayedStream(text, model, options), 1000);
     const double closed_s = time_program(*text, model).parts.total_s();
@@ -193,7 +193,7 @@ TEST_CASE("played stream: a program takes its cycle time, without a jump, and th
 
 TEST_CASE("played stream: waits that are no whole periods add up") {
   const auto text = program("G90 G94\nG00 X0. Y0. Z0.\nG04 X.0015\nG04 X.0025\nG04 X.0007\nG04 X.0007\nG04 X.0006");
-  const ControllerModel model;
+  const FanucModel model;
   const Played played = drained(PlayedStream(text, model, vertical_machine()), 10);
   CHECK(played.line.size() == 1 + 6);
   const auto of_line = [&](std::uint32_t line) { return std::count(played.line.begin(), played.line.end(), line); };
@@ -208,7 +208,7 @@ TEST_CASE("played stream: where the coordinates jump, the command jumps and the 
   reader.work_offsets_mm = {{0, 0, 0}, {100, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
   const auto text = std::make_shared<const Program>(
       read_program("%\nO1\nG90 G94 G54\nG00 X0. Y0. Z0.\nG01 X30. F6000.\nG92 X0.\nG01 X-20.\nM30\n%\n", reader));
-  ControllerModel model;
+  FanucModel model;
   PlaybackOptions options = vertical_machine();
   const Played jumping = drained(PlayedStream(text, model, options), 100);
   const auto straight = program("G90 G94 G54\nG00 X0. Y0. Z0.\nG01 X30. F6000.\nM08\nG01 X10.");
@@ -232,7 +232,7 @@ TEST_CASE("played stream: modes that vary with position see the machine's coordi
   // The second region lies 100 mm further in the machine, where the table of X says 40 Hz.
   const auto text = program("G90 G94\nG00 X0. Y0. Z0.\nG01 X30. F6000.\nG00 X0.\nG01 X20.");
   REQUIRE(text->regions.size() == 2);
-  const ControllerModel model;
+  const FanucModel model;
   PlaybackOptions varying = vertical_machine();
   varying.mode_tables[0] = {ModeTable{0, {60.0, 80.0}, {46.0, 40.0}, {}}};
   PlaybackOptions stiff = vertical_machine();
@@ -257,7 +257,7 @@ TEST_CASE("played stream: modes that vary with position see the machine's coordi
 
 TEST_CASE("played stream: feed drives get the set-points of their axes; their motion and forces are given") {
   const auto text = program("G90 G94\nG00 X0. Y0. Z0.\nG01 X3. Y1. Z.5 F3000.\nG04 P20\nG00 X0.");
-  const ControllerModel model;
+  const FanucModel model;
   PlaybackOptions options = vertical_machine();
   options.drives = three_drives();
   PlayedStream stream(text, model, options);
@@ -330,7 +330,7 @@ TEST_CASE("csv rows: numbers read back as they were") {
 
 TEST_CASE("played stream: what cannot be is refused") {
   const auto text = program(whole_program);
-  const ControllerModel model;
+  const FanucModel model;
   PlaybackOptions options = vertical_machine();
   CHECK_THROWS_AS(PlayedStream(text, model, options, {Vector3::Zero()}), Error);
   CHECK_THROWS_AS(PlayedStream(text, model, options, {}, -1.0), Error);

@@ -5,8 +5,8 @@
 #include <random>
 #include <span>
 
-#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/motion.hpp"
 #include "stepped_into.hpp"
 
@@ -14,8 +14,8 @@ using namespace shapegcode;
 
 namespace {
 
-ControllerModel paper_machine() {
-  ControllerModel model;
+FanucModel paper_machine() {
+  FanucModel model;
   model.rapid_rate_mm_per_s = Vector3::Constant(10000.0 / 60.0);
   model.rapid_time_constant_s = Vector3::Constant(0.15);
   model.in_position_s = {0.025, 0.025, 0.12};
@@ -25,7 +25,7 @@ ControllerModel paper_machine() {
 }  // namespace
 
 TEST_CASE("rapid: paper 004, eq. 6, 11 and 13 on numbers worked out by hand") {
-  ControllerModel model = paper_machine();
+  FanucModel model = paper_machine();
   // 100 mm at 166.67 mm/s: 600 ms, and the time constant.
   CHECK(rapid_time_s({100.0, 0.0, 0.0}, model) == doctest::Approx(0.750));
   CHECK(rapid_time_s({100.1, 0.0, 0.0}, model) == doctest::Approx(0.751));  // 600.6 ms -> 601 ms
@@ -40,7 +40,7 @@ TEST_CASE("rapid: paper 004, eq. 6, 11 and 13 on numbers worked out by hand") {
 }
 
 TEST_CASE("rapid: per axis rates and time constants, straight and each axis for itself") {
-  ControllerModel model = paper_machine();
+  FanucModel model = paper_machine();
   model.rapid_rate_mm_per_s = {400.0, 300.0, 100.0};
   model.rapid_time_constant_s = {0.1, 0.2, 0.05};
   // X 1 s, Y 0.5 s, Z 0.9 s at their rates. Straight: X sets the rate; the acceleration is Y's or Z's, scaled: X may
@@ -56,7 +56,7 @@ TEST_CASE("rapid: per axis rates and time constants, straight and each axis for 
 }
 
 TEST_CASE("rapid: the override scales the rate and keeps the acceleration") {
-  ControllerModel model = paper_machine();
+  FanucModel model = paper_machine();
   model.rapid_override = 0.5;
   CHECK(rapid_time_s({100.0, 0.0, 0.0}, model) == doctest::Approx(1.2 + 0.075));
   CHECK(rapid_time_s({5.0, 0.0, 0.0}, model) == doctest::Approx(2.0 * 0.068));  // sqrt(5 / 1111.1) = 67.08 ms
@@ -67,7 +67,7 @@ TEST_CASE(
   std::mt19937 generator(7);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   for (int i = 0; i < 20000; ++i) {
-    ControllerModel model;
+    FanucModel model;
     model.period_s = i % 3 == 0 ? 0.004 : 0.001;
     const double rate = 50.0 + 500.0 * unit(generator);
     model.rapid_rate_mm_per_s = {rate, rate * (0.3 + unit(generator)), rate * (0.3 + unit(generator))};
@@ -94,7 +94,7 @@ TEST_CASE(
 }
 
 TEST_CASE("rapid: refuses what cannot be counted or given") {
-  ControllerModel model = paper_machine();
+  FanucModel model = paper_machine();
   model.rapid_rate_mm_per_s = Vector3::Constant(1e-9);
   CHECK_THROWS_AS((void)rapid_time_s({100.0, 0.0, 0.0}, model), Error);
   CHECK_THROWS_AS(RapidPlayer(Vector3::Zero(), {100.0, 0.0, 0.0}, model), Error);
@@ -104,7 +104,7 @@ TEST_CASE("rapid: refuses what cannot be counted or given") {
 }
 
 TEST_CASE("rapid: set-points end in the end, and go on giving it") {
-  const ControllerModel model = paper_machine();
+  const FanucModel model = paper_machine();
   RapidPlayer player({0.0, 0.0, 0.0}, {0.1, -3.0, 7.0}, model);
   Vector3 position;
   int count = 0;

@@ -14,9 +14,9 @@ using shapegcode::make_arc;
 using shapegcode::make_line;
 using shapegcode::MetrologyOptions;
 using shapegcode::Path;
-using shapegcode::RunFigures;
 using shapegcode::SectionFigures;
 using shapegcode::SectionMetrology;
+using shapegcode::TrackFigures;
 using shapegcode::Vector3;
 
 namespace {
@@ -54,7 +54,7 @@ TEST_CASE("section metrology: a constant offset on line, arc, line") {
   const double offset = 0.02;
   run(
       metrology, path, 0.05, 30, [&](double) { return offset; }, [&](int) { return Vector3(-offset, 0, 0); });
-  const RunFigures figures = metrology.finish();
+  const TrackFigures figures = metrology.finish();
   REQUIRE(figures.sections.size() == 3);
   CHECK(figures.response.max_abs_mm == doctest::Approx(offset));
   for (const SectionFigures& section : figures.sections) {
@@ -113,13 +113,13 @@ TEST_CASE("section metrology: which stop belongs to which section, and what is n
     for (const double swing : {0.0, 0.001, 0.002, 0.001, 0.0}) metrology.step({10, 10, 0}, {10, 10 + swing, 0});
     return metrology.finish();
   };
-  const RunFigures stopped = measured(40);
+  const TrackFigures stopped = measured(40);
   REQUIRE(stopped.sections[0].rest.has_value());
   CHECK(stopped.sections[0].rest->residual_mm[0] == doctest::Approx(0.004));
   CHECK(stopped.sections[0].peak_mm[0] < 1e-12);
   CHECK(stopped.sections[1].rest->residual_mm[1] == doctest::Approx(0.002));
   CHECK(stopped.rest.residual_mm[1] == doctest::Approx(0.002));
-  const RunFigures hesitated = measured(10);
+  const TrackFigures hesitated = measured(10);
   CHECK_FALSE(hesitated.sections[0].rest.has_value());
   CHECK(hesitated.sections[0].peak_mm[0] == doctest::Approx(0.004));
 }
@@ -130,7 +130,7 @@ TEST_CASE("section metrology: only the sections that are asked for; the whole is
   SectionMetrology metrology(path, {all[2]}, {});
   run(
       metrology, path, 0.05, 0, [](double s) { return s < 20.0 ? 0.03 : 0.01; }, still);
-  const RunFigures figures = metrology.finish();
+  const TrackFigures figures = metrology.finish();
   REQUIRE(figures.sections.size() == 1);
   CHECK(figures.sections[0].response.max_abs_mm == doctest::Approx(0.01));
   CHECK(figures.response.max_abs_mm == doctest::Approx(0.03));

@@ -30,7 +30,7 @@ from shapegcode.characterization.air_tests import (
 from shapegcode.characterization.programs import program_text, read_sheet
 from shapegcode.characterization.result import ControllerFact
 from shapegcode.io.servo_log import parse_units, read_log
-from shapegcode.model.machine_model import controller_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.results.json import schema
 
 MACHINE = sg.Machine.load("vx500")
@@ -136,7 +136,7 @@ def test_expected_times_are_those_of_an_independent_controller(block_end: str, o
 
 @pytest.mark.parametrize("length", [1.0, 7.3, 20.0, 95.0])
 def test_rapids_and_runs_agree_with_the_core(length: float) -> None:
-    timing, model = ControllerTiming.of(MACHINE), controller_model(MACHINE)
+    timing, model = ControllerTiming.of(MACHINE), fanuc_model(MACHINE)
     part = Part("rapid", "X", 1, length, MACHINE.axes.x.rapid_mm_per_min)
     moving = part_time_s(part, timing) - timing.in_position_s["X"]
     assert moving == pytest.approx(sg._core.rapid_time_s([length, 0.0, 0.0], model), abs=1e-9)

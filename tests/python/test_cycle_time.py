@@ -17,15 +17,15 @@ from scipy import signal
 import shapegcode as sg
 from acceptance import PROGRAMS, SAMPLE_KEYS, machine_with
 from shapegcode import _core
-from shapegcode.model.machine_model import controller_model
+from shapegcode.model.machine_model import fanuc_model
 
 SAMPLES = sorted(path for path in PROGRAMS.iterdir() if path.suffix.upper() == ".NC")
 Vector = npt.NDArray[np.float64]
 
 
-def model(**values: object) -> _core.ControllerModel:
+def model(**values: object) -> _core.FanucModel:
     """A controller with acceleration after interpolation, 1 ms; keyword arguments override."""
-    made = _core.ControllerModel()
+    made = _core.FanucModel()
     made.motion = _core.MotionKind.after_interpolation
     for name, value in values.items():
         setattr(made, name, value)
@@ -56,7 +56,7 @@ def increments(lengths: Vector, feeds: Vector, period_s: float, block_end: _core
 
 
 @st.composite
-def sequences(draw: st.DrawFn) -> tuple[_core.ControllerModel, list[Vector], list[tuple[Vector, Vector]]]:
+def sequences(draw: st.DrawFn) -> tuple[_core.FanucModel, list[Vector], list[tuple[Vector, Vector]]]:
     """A controller, its filters' kernels, and ten sequences of normal, short or mixed blocks."""
     period = draw(st.sampled_from([0.001, 0.002, 0.004]))
     length = draw(st.integers(2, 60))
@@ -89,7 +89,7 @@ def sequences(draw: st.DrawFn) -> tuple[_core.ControllerModel, list[Vector], lis
     return made, kernels, found
 
 
-def check_block_overlap(case: tuple[_core.ControllerModel, list[Vector], list[tuple[Vector, Vector]]]) -> None:
+def check_block_overlap(case: tuple[_core.FanucModel, list[Vector], list[tuple[Vector, Vector]]]) -> None:
     """The closed form is the time until the convolved increments end, to one period."""
     made, kernels, found = case
     for lengths, feeds in found:
@@ -105,7 +105,7 @@ def check_block_overlap(case: tuple[_core.ControllerModel, list[Vector], list[tu
 @settings(max_examples=200, deadline=None)
 @given(sequences())
 def test_block_overlap_is_the_moving_average(
-    case: tuple[_core.ControllerModel, list[Vector], list[tuple[Vector, Vector]]],
+    case: tuple[_core.FanucModel, list[Vector], list[tuple[Vector, Vector]]],
 ) -> None:
     check_block_overlap(case)
 
@@ -114,7 +114,7 @@ def test_block_overlap_is_the_moving_average(
 @settings(max_examples=1000, deadline=None)
 @given(sequences())
 def test_block_overlap_of_10000_sequences_is_the_moving_average(
-    case: tuple[_core.ControllerModel, list[Vector], list[tuple[Vector, Vector]]],
+    case: tuple[_core.FanucModel, list[Vector], list[tuple[Vector, Vector]]],
 ) -> None:
     check_block_overlap(case)
 
@@ -280,9 +280,9 @@ def test_exponential_filter_is_the_recursive_one(constant: float) -> None:
 # --- Programs ---------------------------------------------------------------------------------------------------------
 
 
-def varied(name: str, **values: object) -> Callable[[sg.Machine], _core.ControllerModel]:
-    def make(of: sg.Machine) -> _core.ControllerModel:
-        made = controller_model(of)
+def varied(name: str, **values: object) -> Callable[[sg.Machine], _core.FanucModel]:
+    def make(of: sg.Machine) -> _core.FanucModel:
+        made = fanuc_model(of)
         for key, value in values.items():
             setattr(made, key, value)
         return made
@@ -312,9 +312,7 @@ def program(path: Path) -> tuple[sg.Program, sg.Machine]:
 
 @pytest.mark.parametrize("variant", VARIANTS, ids=lambda variant: variant.__name__)
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.name)
-def test_closed_form_is_the_full_interpolation(
-    path: Path, variant: Callable[[sg.Machine], _core.ControllerModel]
-) -> None:
+def test_closed_form_is_the_full_interpolation(path: Path, variant: Callable[[sg.Machine], _core.FanucModel]) -> None:
     source, of = program(path)
     made = variant(of)
     closed = _core.time_program(source.core, made, per_block=True)
@@ -454,7 +452,7 @@ def test_machine_file_reaches_the_model() -> None:
         "controller.position_gain_per_s": 42.0, "controller.feed_forward_ratio": 0.9, "times.tool_change_s": 6.0,
         "times.m_function_s": 0.4,
     }  # fmt: skip
-    made = controller_model(machine_with(keys), feed_override=0.8, rapid_override=0.25)
+    made = fanuc_model(machine_with(keys), feed_override=0.8, rapid_override=0.25)
     assert (made.motion, made.filter_shape) == (AFTER, _core.FilterShape.exponential)
     assert (made.rapid_path, made.in_position) == (_core.RapidPath.non_linear, LAG)
     assert made.block_end == _core.BlockEnd.carry

@@ -49,8 +49,8 @@ NOT_FROM = {
 # Public headers whose folder of sources has another name; one that is named like a folder, or lies in it, is its own.
 HEADER_FOLDERS = {
     "columns.hpp": "path",
-    "control.hpp": "motion",
     "error.hpp": "base",
+    "fanuc_model.hpp": "motion",
     "minimal_shapers.hpp": "shaper",
     "mode.hpp": "base",
     "play_stream.hpp": "play",
@@ -113,6 +113,26 @@ def test_only_the_ode_solver_knows_sundials() -> None:
         if "/" in name and name.split("/")[0] in heads
     }
     assert users == {"cpp/src/plant/feed_drive/ode.cpp"}
+
+
+def cmake_list(name: str) -> list[str]:
+    found = re.search(rf"^set\({name}\s+([^)]*)\)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    assert found is not None
+    return found[1].split()
+
+
+def test_what_a_control_embeds_knows_nothing_of_the_rest() -> None:
+    """The library shapegcode_rt: its folders include each other, the standard library and Eigen alone."""
+    folders, headers = cmake_list("rt_folders"), cmake_list("rt_headers")
+    files = [file for file in cpp_files("include", "src") if own_folder(file) in folders and file.name not in UMBRELLAS]
+    assert sorted(headers) == sorted(file.name for file in files if file.is_relative_to(CPP / "include"))
+    offenders = [
+        f"{file.relative_to(ROOT)} includes {name}"
+        for file in files
+        for bracket, name in includes(file)
+        if (included_folder(name) not in folders if bracket == '"' else "/" in name and not name.startswith("Eigen/"))
+    ]
+    assert offenders == []
 
 
 def test_cpp_folders_use_only_whom_they_may() -> None:

@@ -63,7 +63,7 @@ def found(arc: _core.ArcFigures | None) -> _core.ArcFigures:
 
 def fed(
     command: FloatArray, response: FloatArray, path: _core.Path, chunk: int, **options: float
-) -> tuple[_core.RunFigures, _core.SectionMetrology]:
+) -> tuple[_core.TrackFigures, _core.SectionMetrology]:
     chosen = _core.MetrologyOptions()
     for name, value in options.items():
         setattr(chosen, name, value)

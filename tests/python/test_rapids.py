@@ -18,7 +18,7 @@ from shapegcode.cli import main
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.convert import Conversion, convert
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import controller_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program
 
 Vector = npt.NDArray[np.float64]
@@ -424,7 +424,7 @@ def check_straight(conversion: Conversion) -> None:
 
 
 def test_the_wait_behind_a_command_is_the_one_of_the_servo_lag() -> None:
-    model = controller_model(Machine.load("vx500"))
+    model = fanuc_model(Machine.load("vx500"))
     model.in_position = InPosition.servo_lag
     # e exp(-K t) = w: K = 30 1/s, w = 20 um of vx500.
     wait_s = in_position_wait_behind_s([0.4, 5.0, 0.0], [True, False, True], model)

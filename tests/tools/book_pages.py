@@ -146,7 +146,8 @@ def _cpp() -> dict[str, str]:
         found[f"reference/cpp/{stem}.md"] = body
         rows.append(stem)
     head = "# The C++ headers, and the one for C\n\nThe library is `shapegcode::core`, found with\n"
-    head += "`find_package(shapegcode)`; programs that embed it stand under [Embed it in a\n"
+    head += "`find_package(shapegcode)`; what a control embeds is `shapegcode::rt`, its component `rt`.\n"
+    head += "Programs that embed it stand under [Embed it in a\n"
     head += "controller](../../tutorials/embed.md).\n"
     found["reference/cpp/index.md"] = head + "\n```{toctree}\n" + "\n".join(rows) + "\n```\n"
     return found

@@ -107,11 +107,11 @@ struct ShapingOptions {
 
 /// A region's command, shaped and on the block grid, ready for fit_blocks.
 struct ShapedCommand {
-  std::uint32_t first_period = 0;       ///< periods of the region before this piece
+  std::uint32_t first_period = 0;       ///< periods of the region before this part
   Eigen::MatrixXd grid_mm;              ///< (n+1, 3) at k*T_B
   Eigen::MatrixXd middle_mm;            ///< (n, 3) half a period later
   std::vector<std::int8_t> arc_normal;  ///< (n) see fit_blocks
-  std::vector<std::uint32_t> run_ends;  ///< periods, of this piece, at which the command is at rest
+  std::vector<std::uint32_t> run_ends;  ///< periods, of this part, at which the command is at rest
   std::vector<std::uint32_t>
       segment_periods;  ///< per marked segment: period of the region in which its begin is reached
 };
@@ -123,7 +123,7 @@ struct PlannedTolerance {
 };
 
 /// Splits the path at forced stops, plans each run from rest to rest, samples it at half the block period, shapes it
-/// with `shaper` (taps in whole block periods, common to all axes) and puts the runs behind one another. Pieces of a
+/// with `shaper` (taps in whole block periods, common to all axes) and puts the runs behind one another. Parts of a
 /// bounded number of periods, so that memory does not grow with the region.
 class RegionShaper {
  public:
@@ -135,16 +135,16 @@ class RegionShaper {
   RegionShaper& operator=(RegionShaper&&) noexcept;
   ~RegionShaper();
 
-  /// Next piece of at most `periods` periods; false once the region was given out, and `piece` is then left alone.
-  /// `piece.segment_periods` then holds all marks of the runs that were begun.
-  [[nodiscard]] bool next(ShapedCommand& piece, std::uint32_t periods);
-  /// To be called before the first piece: pieces are then given out while the search for the feed still measures them,
+  /// Next part of at most `periods` periods; false once the region was given out, and `part` is then left alone.
+  /// `part.segment_periods` then holds all marks of the runs that were begun.
+  [[nodiscard]] bool next(ShapedCommand& part, std::uint32_t periods);
+  /// To be called before the first part: parts are then given out while the search for the feed still measures them,
   /// where the region is one run, as if its first plan kept the tolerance. Where that turns out to be wrong, next()
   /// gives false and is_withdrawn() holds: all that was given out is void.
   void begin_early() noexcept;
   [[nodiscard]] bool is_withdrawn() const noexcept;
   /// Gives the region out from its begin again, with the feed that the search then finds; false, and nothing done, if
-  /// no piece was given out early.
+  /// no part was given out early.
   bool begin_anew();
   /// Largest deviation in mm of what the target says shall follow the path, as far as the runs given out tell.
   [[nodiscard]] double largest_deviation_mm() const noexcept;
@@ -172,7 +172,7 @@ class RegionShaper {
                                                             const ShapingOptions& options,
                                                             std::span<const double> tolerances_mm);
 
-/// The whole region in one piece; see RegionShaper.
+/// The whole region in one part; see RegionShaper.
 [[nodiscard]] ShapedCommand shape_path(const std::shared_ptr<const Path>& path, const Fir& shaper,
                                        std::span<const std::uint32_t> marked_segments, const ShapingOptions& options);
 

@@ -92,7 +92,7 @@ class Path {
   [[nodiscard]] std::uint32_t line(std::size_t i) const noexcept;
   [[nodiscard]] bool is_arc(std::size_t i) const noexcept;
   /// Whether it is a line that ends where the next one starts.
-  [[nodiscard]] bool is_plain(std::size_t i) const noexcept { return data_->places[i].kept == 0; }
+  [[nodiscard]] bool is_plain(std::size_t i) const noexcept { return data_->sources[i].kept == 0; }
 
   /// Whether the motion is the same: geometry, feeds and stops, whatever lines they come from.
   [[nodiscard]] bool moves_as(const Path& other) const noexcept;
@@ -112,16 +112,16 @@ class Path {
     Vector3 start_mm;    // of a segment; the last one is the path's end
     double distance_mm;  // from the path's start
   };
-  struct Place {
+  struct Source {
     std::uint32_t line;  // of the source, less the index of the segment
     std::uint32_t kept;  // 1 + index into `kept`; 0: a plain line
 
-    friend bool operator==(const Place&, const Place&) = default;
+    friend bool operator==(const Source&, const Source&) = default;
   };
   struct Data {
     Column<Node> nodes;
     SteadyColumn<double> feeds;
-    SteadyColumn<Place> places;
+    SteadyColumn<Source> sources;
     std::vector<Segment> kept;
   };
 
@@ -211,25 +211,25 @@ class Segments {
 inline Segments Path::segments() const noexcept { return *this; }
 
 inline Segment Path::operator[](std::size_t i) const noexcept {
-  const Place place = data_->places[i];
-  if (place.kept != 0) return data_->kept[place.kept - 1];
+  const Source source = data_->sources[i];
+  if (source.kept != 0) return data_->kept[source.kept - 1];
   Segment segment = make_line(start_mm(i), start_mm(i + 1), data_->feeds[i]);
-  segment.line = place.line + static_cast<std::uint32_t>(i);
+  segment.line = source.line + static_cast<std::uint32_t>(i);
   return segment;
 }
 
 inline const Vector3& Path::end_mm(std::size_t i) const noexcept {
-  const Place place = data_->places[i];
-  return place.kept == 0 ? start_mm(i + 1) : data_->kept[place.kept - 1].end_mm;
+  const Source source = data_->sources[i];
+  return source.kept == 0 ? start_mm(i + 1) : data_->kept[source.kept - 1].end_mm;
 }
 
 inline std::uint32_t Path::line(std::size_t i) const noexcept {
-  return data_->places[i].line + static_cast<std::uint32_t>(i);
+  return data_->sources[i].line + static_cast<std::uint32_t>(i);
 }
 
 inline bool Path::is_arc(std::size_t i) const noexcept {
-  const Place place = data_->places[i];
-  return place.kept != 0 && data_->kept[place.kept - 1].kind == SegmentKind::arc;
+  const Source source = data_->sources[i];
+  return source.kept != 0 && data_->kept[source.kept - 1].kind == SegmentKind::arc;
 }
 
 }  // namespace shapegcode

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/filter.hpp"
 #include "shapegcode/measure/contour.hpp"
 #include "shapegcode/motion.hpp"

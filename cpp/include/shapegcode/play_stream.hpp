@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/play.hpp"
 #include "shapegcode/program.hpp"
 #include "shapegcode/timing.hpp"
@@ -51,7 +51,7 @@ class PlayedStream {
   /// without motion (work offset, tool length, an axis whose position was not known), the command jumps and the plant
   /// with it. `region_offsets_mm`: from the positions of each region to the machine's, for modes that vary with them;
   /// none: zero. Throws Error(argument) also on a model that `check` refuses, or offsets that are not one per region.
-  PlayedStream(std::shared_ptr<const Program> program, const ControllerModel& model, const PlaybackOptions& options,
+  PlayedStream(std::shared_ptr<const Program> program, const FanucModel& model, const PlaybackOptions& options,
                std::vector<Vector3> region_offsets_mm = {}, double rest_s = 0.0);
   ~PlayedStream();
   PlayedStream(PlayedStream&&) noexcept;

@@ -5,7 +5,7 @@
 //     #include "shapegcode/shapegcode.hpp"
 //
 //     const shapegcode::Program program = shapegcode::read_program("G21 G90 G00 X0 Y0\nG01 X40. F6000\nM30\n");
-//     shapegcode::ControllerModel control;  // a FANUC without look-ahead, in its usual setting
+//     shapegcode::FanucModel control;  // a FANUC without look-ahead, in its usual setting
 //     control.motion = shapegcode::MotionKind::after_interpolation;
 //     const double total_s = shapegcode::time_program(program, control).parts.total_s();
 //
@@ -14,9 +14,9 @@
 #include "shapegcode/columns.hpp"
 #include "shapegcode/command.hpp"
 #include "shapegcode/compare.hpp"
-#include "shapegcode/control.hpp"
 #include "shapegcode/controller.hpp"
 #include "shapegcode/error.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/filter.hpp"
 #include "shapegcode/identify/arma.hpp"
 #include "shapegcode/identify/equivalent_mass.hpp"

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/program.hpp"
 
 namespace shapegcode {
@@ -73,7 +73,7 @@ struct CycleTime {
 /// that follow each other without anything between are one run. Waits for in-position come behind rapids and behind
 /// runs that end with an exact stop (G09, G61). Moves of an axis whose position is not known count what is known of
 /// them. Throws Error(argument) on a model that `check` refuses.
-[[nodiscard]] CycleTime time_program(const Program& program, const ControllerModel& model, bool per_block = false);
+[[nodiscard]] CycleTime time_program(const Program& program, const FanucModel& model, bool per_block = false);
 
 /// The same question answered by giving every set-point.
 struct InterpolatedTime {
@@ -91,7 +91,7 @@ struct InterpolatedTime {
 /// Full interpolation of a program, sample by sample: blocks through the acceleration filters, or look-ahead profiles,
 /// until the set-points rest; rapids; the servo loop until the axes are in position. Shares no closed form with
 /// `time_program`. Throws Error(argument) on a model that `check` refuses.
-[[nodiscard]] InterpolatedTime interpolate_program(const Program& program, const ControllerModel& model);
+[[nodiscard]] InterpolatedTime interpolate_program(const Program& program, const FanucModel& model);
 
 /// What acceleration after interpolation and servo lag make of a circle.
 struct CircleFigures {
@@ -102,6 +102,6 @@ struct CircleFigures {
 /// Runs circles in XY at a constant feed until the transient is gone and measures the mean radius over whole turns. To
 /// second order the result is (sum of the filters' variances + (1 - a^2) / K^2) v^2 / (2 r): the radial error formulas
 /// of the controller manual (fanuc.md B1). Throws Error(argument) on a radius or feed <= 0.
-[[nodiscard]] CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const ControllerModel& model);
+[[nodiscard]] CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const FanucModel& model);
 
 }  // namespace shapegcode

@@ -145,7 +145,7 @@ struct RefedRegion {
 /// The region's lines with the feeds of `stretches`; comments, numbers, spaces and everything else stay as they are.
 /// F stands where the feed changes and where it stood; where asked for, a last line with F alone gives the modal feed
 /// back that the original leaves behind. Where a stretch ends within a divisible block, the block is divided: the first
-/// piece keeps the words of the original, ends lie on the least increment (so they are off the path by half of it at
+/// part keeps the words of the original, ends lie on the least increment (so they are off the path by half of it at
 /// most). Throws Error(argument) if the stretches do not cover the path.
 [[nodiscard]] RefedRegion write_feeds(const Program& program, const Region& region,
                                       std::span<const FeedStretch> stretches, const FeedWriterOptions& options);

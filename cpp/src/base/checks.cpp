@@ -2,23 +2,20 @@
 
 #include <cmath>
 
-#include <fmt/format.h>
-
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
 
 namespace shapegcode {
 
 void require(bool holds, std::string_view name, double value, std::string_view unit, std::string_view range) {
   if (holds) return;
-  throw Error(ErrorKind::argument,
-              fmt::format("{} is {}{}{}, must be {}", name, value, unit.empty() ? "" : " ", unit, range));
+  detail::refuse("{} is {}{}{}, must be {}", name, value, unit.empty() ? "" : " ", unit, range);
 }
 
 void require_within(double value, double lowest, double highest, std::string_view name, std::string_view unit) {
   if (std::isfinite(value) && value >= lowest && value <= highest) return;
-  require(
-      false, name, value, unit,
-      highest < unbounded ? fmt::format("within {} ... {}", lowest, highest) : fmt::format("finite and >= {}", lowest));
+  require(false, name, value, unit,
+          highest < unbounded ? detail::message("within {} ... {}", lowest, highest)
+                              : detail::message("finite and >= {}", lowest));
 }
 
 void require_not_below_zero(double value, std::string_view name, std::string_view unit) {
@@ -33,9 +30,8 @@ void require_period(double period_s, std::string_view name) { require_above_zero
 
 std::int64_t require_count(double count, double most, std::string_view what, std::string_view things) {
   if (!(count >= 0.0 && count <= most)) {
-    throw Error(ErrorKind::argument,
-                fmt::format("{} takes {} {}, at most {:.10g} are possible", what,
-                            std::isfinite(count) ? fmt::format("{:.10g}", count) : "far too many", things, most));
+    detail::refuse("{} takes {} {}, at most {:.10g} are possible", what,
+                   std::isfinite(count) ? detail::message("{:.10g}", count) : "far too many", things, most);
   }
   return static_cast<std::int64_t>(count);
 }

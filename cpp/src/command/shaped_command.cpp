@@ -36,30 +36,29 @@ void put_part(const SpeedCaps& part, std::size_t first, SpeedCaps& caps) {
   std::ranges::copy(part.at_junction, caps.at_junction.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
-// The rows of a piece; a piece without periods has the one row on which it rests.
-void put(const std::vector<Vector3>& grid, const std::vector<Vector3>& middle, const Vector3& at,
-         ShapedCommand& piece) {
-  piece.grid_mm.resize(static_cast<Eigen::Index>(std::max<std::size_t>(grid.size(), 1)), axis_count);
-  piece.middle_mm.resize(static_cast<Eigen::Index>(middle.size()), axis_count);
-  piece.grid_mm.row(0) = at;
+// The rows of a part; a part without periods has the one row on which it rests.
+void put(const std::vector<Vector3>& grid, const std::vector<Vector3>& middle, const Vector3& at, ShapedCommand& part) {
+  part.grid_mm.resize(static_cast<Eigen::Index>(std::max<std::size_t>(grid.size(), 1)), axis_count);
+  part.middle_mm.resize(static_cast<Eigen::Index>(middle.size()), axis_count);
+  part.grid_mm.row(0) = at;
   for (std::size_t i = 0; i < grid.size(); ++i) {
-    piece.grid_mm.row(static_cast<Eigen::Index>(i)) = grid[i];
+    part.grid_mm.row(static_cast<Eigen::Index>(i)) = grid[i];
   }
   for (std::size_t i = 0; i < middle.size(); ++i) {
-    piece.middle_mm.row(static_cast<Eigen::Index>(i)) = middle[i];
+    part.middle_mm.row(static_cast<Eigen::Index>(i)) = middle[i];
   }
 }
 
 // A planned run given out row by row: as it was kept when it was planned, or shaped anew, or while it is measured.
-class Run {
+class ShapedRun {
  public:
   // The first round of a search, which stays the caller's.
-  explicit Run(FeedSearch& search) : search_(&search) {
+  explicit ShapedRun(FeedSearch& search) : search_(&search) {
     search.begin_round();
     plan_ = search.plan();
   }
   // `filter` stays the caller's.
-  Run(PlannedRun plan, const RunFilter& filter, const RunLimits& limits, std::size_t steps_per_half)
+  ShapedRun(PlannedRun plan, const RunFilter& filter, const RunLimits& limits, std::size_t steps_per_half)
       : plan_(std::move(plan)) {
     if (plan_.rows.positions.size() == 0) {
       own_ = std::make_unique<RunShaper>(plan_.path, plan_.profile, filter, limits, steps_per_half);
@@ -106,7 +105,7 @@ struct RegionShaper::State {
   State(std::shared_ptr<const Path> path, const Fir& shaper, std::span<const std::uint32_t> marked_segments,
         ShapingOptions options);
 
-  [[nodiscard]] bool next(ShapedCommand& piece, std::uint32_t periods);
+  [[nodiscard]] bool next(ShapedCommand& part, std::uint32_t periods);
   [[nodiscard]] bool begin_run();
   [[nodiscard]] std::unique_ptr<FeedSearch> search_of(const std::shared_ptr<const Path>& part) const;
   [[nodiscard]] PlannedRun plan_run();
@@ -115,7 +114,7 @@ struct RegionShaper::State {
   void note_marks(const PlannedRun& run);
   [[nodiscard]] double share() const noexcept;
 
-  struct Piece {
+  struct SegmentRange {
     std::size_t first, last;  // segments
   };
 
@@ -123,13 +122,13 @@ struct RegionShaper::State {
   ShapingOptions options_;
   RunFilter filter_;
   std::vector<std::uint32_t> marks_;
-  std::vector<Piece> pieces_;  // still to be run, the next one last
+  std::vector<SegmentRange> ranges_;  // still to be run, the next one last
   std::size_t steps_per_half_ = 1;
   std::uint32_t rest_periods_ = 0;
 
-  Piece now_{0, 0};
+  SegmentRange now_{0, 0};
   std::unique_ptr<FeedSearch> search_;  // of a run that is given out early, or was; refers to the filter above
-  std::unique_ptr<Run> run_;            // likewise
+  std::unique_ptr<ShapedRun> run_;      // likewise
   SpeedCaps* start_caps_ = nullptr;     // of a plan without rows: where the search starts and what it comes to
   bool early_ = false;
   bool withdrawn_ = false;
@@ -182,22 +181,22 @@ RegionShaper::State::State(std::shared_ptr<const Path> path, const Fir& shaper,
   borders.push_back(path_->size());
   std::size_t first = 0;
   for (const std::size_t border : borders) {
-    pieces_.push_back({first, border});
+    ranges_.push_back({first, border});
     first = border;
   }
-  std::ranges::reverse(pieces_);
+  std::ranges::reverse(ranges_);
 }
 
 // Plans the next run and starts it; false if there is none.
 bool RegionShaper::State::begin_run() {
-  if (pieces_.empty()) {
+  if (ranges_.empty()) {
     return false;
   }
   if (early_) {
-    now_ = pieces_.back();
-    pieces_.pop_back();
+    now_ = ranges_.back();
+    ranges_.pop_back();
     search_ = search_of(sub_path(path_, now_.first, now_.last));
-    run_ = std::make_unique<Run>(*search_);
+    run_ = std::make_unique<ShapedRun>(*search_);
     given_ = 0;
     withdrawn_ = !run_->next(at_);
     note_marks(run_->plan());
@@ -205,7 +204,7 @@ bool RegionShaper::State::begin_run() {
   }
   PlannedRun plan = plan_run();
   largest_deviation_mm_ = std::max(largest_deviation_mm_, plan.largest_deviation_mm);
-  run_ = std::make_unique<Run>(std::move(plan), filter_, run_limits(options_.limits), steps_per_half_);
+  run_ = std::make_unique<ShapedRun>(std::move(plan), filter_, run_limits(options_.limits), steps_per_half_);
   given_ = 0;
   run_->next(at_);
   note_marks(run_->plan());
@@ -217,11 +216,11 @@ std::unique_ptr<FeedSearch> RegionShaper::State::search_of(const std::shared_ptr
                                       options_.tolerance.contour_tolerance_mm, options_.least_feed_mm_per_s);
 }
 
-// The next run; where it must be split at corners, the rest stays among the pieces.
+// The next run; where it must be split at corners, the rest stays among the ranges.
 PlannedRun RegionShaper::State::plan_run() {
   for (;;) {
-    now_ = pieces_.back();
-    pieces_.pop_back();
+    now_ = ranges_.back();
+    ranges_.pop_back();
     const auto part = sub_path(path_, now_.first, now_.last);
     if (options_.target == ContourTarget::none) {
       is_slowed_ = true;  // nobody asks by how much
@@ -245,10 +244,10 @@ PlannedRun RegionShaper::State::plan_run() {
     stops_ += static_cast<std::uint32_t>(plan.stops.size());
     std::size_t last = now_.last;
     for (std::size_t i = plan.stops.size(); i-- > 0;) {
-      pieces_.push_back({now_.first + plan.stops[i], last});
+      ranges_.push_back({now_.first + plan.stops[i], last});
       last = now_.first + plan.stops[i];
     }
-    pieces_.push_back({now_.first, last});
+    ranges_.push_back({now_.first, last});
   }
 }
 
@@ -257,11 +256,11 @@ PlannedTolerance RegionShaper::State::plan_only(SpeedCaps& caps) {
   start_caps_ = &caps;
   std::size_t periods = 0;
   PlannedTolerance planned;
-  while (!pieces_.empty()) {
+  while (!ranges_.empty()) {
     const PlannedRun plan = plan_run();
     planned.deviation_mm = std::max(planned.deviation_mm, plan.largest_deviation_mm);
     periods += RunShaper(plan.path, plan.profile, filter_, run_limits(options_.limits), steps_per_half_).periods();
-    if (!pieces_.empty()) periods += rest_periods_;
+    if (!ranges_.empty()) periods += rest_periods_;
   }
   planned.duration_s = static_cast<double>(periods) * options_.block_period_s;
   return planned;
@@ -269,7 +268,7 @@ PlannedTolerance RegionShaper::State::plan_only(SpeedCaps& caps) {
 
 void RegionShaper::State::begin_anew() {
   run_.reset();
-  pieces_ = {{0, path_->size()}};
+  ranges_ = {{0, path_->size()}};
   early_ = withdrawn_ = is_slowed_ = false;
   given_ = resting_ = period_ = stops_ = 0;
   largest_deviation_mm_ = 0.0;
@@ -295,7 +294,7 @@ double RegionShaper::State::share() const noexcept {
   return segments / std::max(1.0, static_cast<double>(path_->size()));
 }
 
-bool RegionShaper::State::next(ShapedCommand& piece, std::uint32_t periods) {
+bool RegionShaper::State::next(ShapedCommand& part, std::uint32_t periods) {
   const std::uint32_t first = period_;
   std::vector<Vector3> grid;
   std::vector<Vector3> middle;
@@ -336,24 +335,24 @@ bool RegionShaper::State::next(ShapedCommand& piece, std::uint32_t periods) {
     if (given_ == run_->periods() && !withdrawn_) {
       if (early_) largest_deviation_mm_ = search_->largest_deviation_mm();
       run_.reset();
-      resting_ = pieces_.empty() ? 0 : rest_periods_;
+      resting_ = ranges_.empty() ? 0 : rest_periods_;
       if (resting_ == 0) {
         run_ends.push_back(period_ - first);
       }
     }
   }
-  const bool over = !run_ && resting_ == 0 && pieces_.empty();
+  const bool over = !run_ && resting_ == 0 && ranges_.empty();
   if (over) {
     segment_periods_.resize(marks_.size(), period_);
   }
   if (grid.empty() && (first > 0 || !over)) {
     return false;
   }
-  put(grid, middle, at_, piece);
-  piece.first_period = first;
-  piece.arc_normal = std::move(normals);
-  piece.run_ends = std::move(run_ends);
-  piece.segment_periods = segment_periods_;
+  put(grid, middle, at_, part);
+  part.first_period = first;
+  part.arc_normal = std::move(normals);
+  part.run_ends = std::move(run_ends);
+  part.segment_periods = segment_periods_;
   return true;
 }
 
@@ -365,10 +364,10 @@ RegionShaper::RegionShaper(RegionShaper&&) noexcept = default;
 RegionShaper& RegionShaper::operator=(RegionShaper&&) noexcept = default;
 RegionShaper::~RegionShaper() = default;
 
-bool RegionShaper::next(ShapedCommand& piece, std::uint32_t periods) { return state_->next(piece, periods); }
+bool RegionShaper::next(ShapedCommand& part, std::uint32_t periods) { return state_->next(part, periods); }
 
 void RegionShaper::begin_early() noexcept {
-  state_->early_ = state_->pieces_.size() == 1 && state_->options_.target != ContourTarget::none;
+  state_->early_ = state_->ranges_.size() == 1 && state_->options_.target != ContourTarget::none;
 }
 
 bool RegionShaper::is_withdrawn() const noexcept { return state_->withdrawn_; }

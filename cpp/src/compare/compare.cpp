@@ -29,8 +29,8 @@ constexpr std::size_t most_pairs = 4'000'000;  // looked at for what stands else
 
 std::size_t of_kind(ComparedKind kind) noexcept { return static_cast<std::size_t>(kind); }
 
-std::string place_text(const Vector3& place) {
-  return fmt::format("X{:.3f} Y{:.3f} Z{:.3f}", place[0] + 0.0, place[1] + 0.0, place[2] + 0.0);
+std::string position_text(const Vector3& position) {
+  return fmt::format("X{:.3f} Y{:.3f} Z{:.3f}", position[0] + 0.0, position[1] + 0.0, position[2] + 0.0);
 }
 
 // What two functions give, each on a core of its own where that is worth it.
@@ -42,7 +42,7 @@ auto both(const One& one, const Other& other, std::size_t moves) {
 }
 
 // Where something stands in the source.
-struct Place {
+struct SourceLine {
   std::uint32_t line = 0;
   std::string file;
 };
@@ -57,9 +57,9 @@ class Comparer {
     const bool inch = events_[0].units == 20 || events_[1].units == 20;
     const bool other_units = events_[0].units != events_[1].units;
     // An axis that a block does not name stays where a cut has left it: rounded.
-    same_place_mm_ = 0.6 * least_increment(options.reader, 21) +
-                     (inch ? 0.5 * mm_per_inch * least_increment(options.reader, 20) : 0.0) +
-                     (other_units ? 1e-3 : 0.0);
+    same_position_mm_ = 0.6 * least_increment(options.reader, 21) +
+                        (inch ? 0.5 * mm_per_inch * least_increment(options.reader, 20) : 0.0) +
+                        (other_units ? 1e-3 : 0.0);
   }
 
   ProgramComparison compare() {
@@ -112,10 +112,10 @@ class Comparer {
     if (!shaped && (a.known & named) != (b.known & named)) {
       return false;
     }
-    const double limit = shaped ? same_end_mm : same_place_mm_;
-    for (std::size_t i = 0; i < a.place_mm.size(); ++i) {
+    const double limit = shaped ? same_end_mm : same_position_mm_;
+    for (std::size_t i = 0; i < a.position_mm.size(); ++i) {
       const bool counts = (((a.known & b.known & (shaped ? 7 : named)) >> i) & 1) != 0;
-      if (counts && std::abs(a.place_mm[i] - b.place_mm[i]) > limit) {
+      if (counts && std::abs(a.position_mm[i] - b.position_mm[i]) > limit) {
         return false;
       }
     }
@@ -230,14 +230,14 @@ class Comparer {
     const auto missing = std::find(partners_[goes_on].begin() + static_cast<std::ptrdiff_t>(from[goes_on]),
                                    partners_[goes_on].end(), nobody);
     const Event& event = all(goes_on)[static_cast<std::size_t>(missing - partners_[goes_on].begin())];
-    std::array<Place, 2> places;
+    std::array<SourceLine, 2> lines;
     std::array<std::string, 2> texts;
-    places[goes_on] = source(goes_on, event);
-    places[ends] = source(ends, events_[ends].last_line);
+    lines[goes_on] = source(goes_on, event);
+    lines[ends] = source(ends, events_[ends].last_line);
     texts[goes_on] = fmt::format("{}{}", describe(goes_on, event),
                                  lone[goes_on] > 1 ? fmt::format(", and {} more", lone[goes_on] - 1) : "");
-    texts[ends] = fmt::format("ends early at line {}", places[ends].line);
-    add(ComparedKind::end, places[0], places[1], texts[0], texts[1]);
+    texts[ends] = fmt::format("ends early at line {}", lines[ends].line);
+    add(ComparedKind::end, lines[0], lines[1], texts[0], texts[1]);
     return true;
   }
 
@@ -265,8 +265,8 @@ class Comparer {
   bool compare_cuts(const Event& a, const Event& b) {
     const Cut& ours = cut(0, a);
     const Cut& theirs = cut(1, b);
-    const Place from = source(0, a);
-    const Place to = source(1, b);
+    const SourceLine from = source(0, a);
+    const SourceLine to = source(1, b);
     compare_modes(ours, theirs, from, to);
     if (ours.moves != theirs.moves) {
       add(ComparedKind::blocks, from, to, fmt::format("{} blocks", ours.moves), fmt::format("{} blocks", theirs.moves));
@@ -303,7 +303,7 @@ class Comparer {
         fmt::format("path within {:.3g} um", distance * 1e3), distance);
   }
 
-  void compare_modes(const Cut& ours, const Cut& theirs, const Place& from, const Place& to) {
+  void compare_modes(const Cut& ours, const Cut& theirs, const SourceLine& from, const SourceLine& to) {
     if (ours.exact_stops != theirs.exact_stops) {
       add(ComparedKind::modal, from, to, fmt::format("{} exact stops", ours.exact_stops),
           fmt::format("{} exact stops", theirs.exact_stops));
@@ -323,27 +323,27 @@ class Comparer {
     ++result_.counts[of_kind(ComparedKind::modal)].emitted;
   }
 
-  [[nodiscard]] Place source(std::size_t side, const Event& event) const {
+  [[nodiscard]] SourceLine source(std::size_t side, const Event& event) const {
     return event.call == nullptr ? source(side, event.line) : source(side, event.call->origin);
   }
-  [[nodiscard]] Place source(std::size_t side, std::uint32_t line) const {
+  [[nodiscard]] SourceLine source(std::size_t side, std::uint32_t line) const {
     const auto& origins = programs_[side]->origins;
-    return line == 0 || line > origins.size() ? Place{line, ""} : source(side, origins[line - 1]);
+    return line == 0 || line > origins.size() ? SourceLine{line, ""} : source(side, origins[line - 1]);
   }
-  [[nodiscard]] Place source(std::size_t side, const LineOrigin& origin) const {
+  [[nodiscard]] SourceLine source(std::size_t side, const LineOrigin& origin) const {
     return {origin.line, programs_[side]->files[origin.file]};
   }
 
-  void add(ComparedKind kind, const Place& from, const Place& to, std::string original, std::string emitted,
+  void add(ComparedKind kind, const SourceLine& from, const SourceLine& to, std::string original, std::string emitted,
            double distance_mm = 0.0) {
-    const auto with_file = [](std::string text, const Place& place) {
-      return place.file.empty() || text.empty() ? text : fmt::format("{} ({})", text, place.file);
+    const auto with_file = [](std::string text, const SourceLine& at) {
+      return at.file.empty() || text.empty() ? text : fmt::format("{} ({})", text, at.file);
     };
     result_.differences.push_back({kind, from.line, to.line, with_file(std::move(original), from),
                                    with_file(std::move(emitted), to), distance_mm});
   }
 
-  void add_feeds(const Place& from, const Place& to, double original_mm_per_s, double emitted_mm_per_s) {
+  void add_feeds(const SourceLine& from, const SourceLine& to, double original_mm_per_s, double emitted_mm_per_s) {
     const auto text = [](double feed) { return fmt::format("{:.6g} mm/min", feed * 60.0); };
     add(ComparedKind::feeds, from, to, text(original_mm_per_s), text(emitted_mm_per_s));
   }
@@ -352,15 +352,15 @@ class Comparer {
     std::string text = event.optional ? "/ " : "";
     if (event.kind == ComparedKind::cuts && event.cut != no_cut) {
       const Cut& of = cut(side, event);
-      return text + fmt::format("cut of {:.3f} mm from {} to {}", of.length_mm, place_text(of.start_mm),
-                                place_text(of.end_mm));
+      return text + fmt::format("cut of {:.3f} mm from {} to {}", of.length_mm, position_text(of.start_mm),
+                                position_text(of.end_mm));
     }
     text += event.word;
     if (event.kind == ComparedKind::dwells) {
-      return text + fmt::format(" {:g} s", event.place_mm[0]);
+      return text + fmt::format(" {:g} s", event.position_mm[0]);
     }
-    for (std::size_t i = 0; i < event.place_mm.size(); ++i) {
-      if (((event.known >> i) & 1) != 0) text += fmt::format(" {}{:.3f}", "XYZR"[i], event.place_mm[i] + 0.0);
+    for (std::size_t i = 0; i < event.position_mm.size(); ++i) {
+      if (((event.known >> i) & 1) != 0) text += fmt::format(" {}{:.3f}", "XYZR"[i], event.position_mm[i] + 0.0);
     }
     return event.cut == no_cut ? text : text + " as cutting moves";
   }
@@ -370,7 +370,7 @@ class Comparer {
   std::array<std::vector<std::size_t>, 2> partners_;  // of each event, in the other program
   std::vector<std::size_t> elsewhere_;                // of the first program, ascending
   std::pair<CutModes, CutModes> told_modes_;
-  double same_place_mm_ = 0.0;
+  double same_position_mm_ = 0.0;
   ProgramComparison result_;
 };
 

@@ -8,7 +8,7 @@
 namespace shapegcode::detail {
 namespace {
 
-constexpr double same_place_mm = 1e-9;
+constexpr double same_position_mm = 1e-9;
 constexpr double looked_at_mm = 0.2;
 constexpr double looked_at_rad = 0.035;
 constexpr double same_feed = 1e-6;
@@ -35,13 +35,15 @@ class Moves {
 };
 
 bool same_move(const Segment& one, const Segment& other) {
-  const auto near = [](const Vector3& a, const Vector3& b) { return (a - b).cwiseAbs().maxCoeff() <= same_place_mm; };
+  const auto near = [](const Vector3& a, const Vector3& b) {
+    return (a - b).cwiseAbs().maxCoeff() <= same_position_mm;
+  };
   if (one.kind != other.kind || !near(one.start_mm, other.start_mm) || !near(one.end_mm, other.end_mm)) {
     return false;
   }
   return one.kind != SegmentKind::arc ||
-         (one.normal == other.normal && std::abs(one.sweep_rad - other.sweep_rad) <= same_place_mm &&
-          std::abs(one.start_radius_mm - other.start_radius_mm) <= same_place_mm);
+         (one.normal == other.normal && std::abs(one.sweep_rad - other.sweep_rad) <= same_position_mm &&
+          std::abs(one.start_radius_mm - other.start_radius_mm) <= same_position_mm);
 }
 
 bool same_stretch(double one_mm, double other_mm) {

@@ -39,15 +39,15 @@ inline constexpr std::size_t no_cut = std::numeric_limits<std::size_t>::max();
 /// One thing that a program does.
 struct Event {
   ComparedKind kind = ComparedKind::functions;
-  bool optional = false;                ///< in a block with '/'
-  std::uint8_t named = 0;               ///< bit n: a word of the block gives `place_mm[n]`
-  std::uint8_t known = 0;               ///< bit n: `place_mm[n]` counts
-  std::uint32_t line = 0;               ///< of the plain program
-  std::string word;                     ///< codes and numbers that are no lengths
-  std::array<double, 4> place_mm = {};  ///< X, Y, Z, R; of a dwell seconds
-  double feed_mm_per_s = 0.0;           ///< of a drilling cycle
-  std::size_t cut = no_cut;             ///< of a cut, and of a shaped rapid
-  const ProgramCall* call = nullptr;    ///< that was executed
+  bool optional = false;                   ///< in a block with '/'
+  std::uint8_t named = 0;                  ///< bit n: a word of the block gives `position_mm[n]`
+  std::uint8_t known = 0;                  ///< bit n: `position_mm[n]` counts
+  std::uint32_t line = 0;                  ///< of the plain program
+  std::string word;                        ///< codes and numbers that are no lengths
+  std::array<double, 4> position_mm = {};  ///< X, Y, Z, R; of a dwell seconds
+  double feed_mm_per_s = 0.0;              ///< of a drilling cycle
+  std::size_t cut = no_cut;                ///< of a cut, and of a shaped rapid
+  const ProgramCall* call = nullptr;       ///< that was executed
 };
 
 struct Events {

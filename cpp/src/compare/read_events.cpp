@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <string_view>
 
-#include "base/text.hpp"
 #include "compare/cut_collector.hpp"
 #include "compare/events.hpp"
 #include "program/interpret/input_rules.hpp"
 #include "program/read/program_store.hpp"
+#include "program/text/characters.hpp"
 #include "program/text/parsed_block.hpp"
 
 namespace shapegcode::detail {
@@ -55,10 +55,10 @@ class EventReader {
     ProgramUnit unit;
     unit.text = &program_.text;
     unit.end = frame.end;
-    LinePlace place{frame.begin, frame.first_line};
+    LinePosition next{frame.begin, frame.first_line};
     std::string_view text;
     std::size_t begin = 0;
-    for (LinePlace here = place; !ended_ && unit.next_line(place, text, begin); here = place) {
+    for (LinePosition here = next; !ended_ && unit.next_line(next, text, begin); here = next) {
       line_ = here.line;
       calls_before_line();
       block_.read(text, line_, options_.reader.max_line_length);
@@ -117,7 +117,8 @@ class EventReader {
       emitted_ = emitted_ || comment.starts_with("(SHAPEGCODE ");
       if (emitted_ && comment == "(SHAPED RAPID)") {
         auto& all = events_.all;
-        if (!all.empty() && all.back().kind == ComparedKind::dwells && all.back().place_mm[0] < stop_before_rapid_s) {
+        if (!all.empty() && all.back().kind == ComparedKind::dwells &&
+            all.back().position_mm[0] < stop_before_rapid_s) {
           all.pop_back();
         }
         close();
@@ -299,7 +300,7 @@ class EventReader {
         return;
       case Group::unknown_position:
         one_shot_ = true;
-        with_places(add(ComparedKind::rapids, with_words(tenths, "P")));
+        with_positions(add(ComparedKind::rapids, with_words(tenths, "P")));
         return;
       case Group::harmless:
         one_shot_ = one_shot_ || tenths == 220;
@@ -322,13 +323,13 @@ class EventReader {
       Event& dwell = add(ComparedKind::dwells, "G04");
       if (words().has(letter)) {
         const bool counts = milliseconds || (!words()[letter].has_point && !options_.reader.calculator_decimal_point);
-        dwell.place_mm[0] = words()[letter].value * (counts ? 1e-3 : 1.0);
+        dwell.position_mm[0] = words()[letter].value * (counts ? 1e-3 : 1.0);
         dwell.known = dwell.named = 1;
       }
     } else if (tenths == 100 || tenths == 520 || tenths == 920) {
-      with_places(add(ComparedKind::offsets, with_words(tenths, "LP")));
+      with_positions(add(ComparedKind::offsets, with_words(tenths, "LP")));
     } else if (words().has_any(xyz_letters | further_axes)) {
-      with_places(add(ComparedKind::rapids, with_words(tenths, "PABC")));
+      with_positions(add(ComparedKind::rapids, with_words(tenths, "PABC")));
     } else {
       add(ComparedKind::functions, with_words(tenths, "P"));
     }
@@ -367,13 +368,13 @@ class EventReader {
   }
 
   // The lengths of a block as they are written, mm.
-  void with_places(Event& event) const {
+  void with_positions(Event& event) const {
     const std::string_view letters = "XYZR";
     for (std::size_t i = 0; i < letters.size(); ++i) {
       if (words().has(letters[i])) {
         const Word& word = words()[letters[i]];
         const bool counts = !word.has_point && !options_.reader.calculator_decimal_point;
-        event.place_mm[i] = word.value * unit_mm(units_) * (counts ? least_increment(options_.reader, units_) : 1.0);
+        event.position_mm[i] = word.value * unit_mm(units_) * (counts ? least_increment(options_.reader, units_) : 1.0);
         event.known = event.named = static_cast<std::uint8_t>(event.known | (1U << i));
       }
     }
@@ -396,7 +397,7 @@ class EventReader {
       Event& cycle =
           add(ComparedKind::cycles, fmt::format("{} G{}", with_words(cycle_ * 10, "PK"), modes_.cycle_return));
       cycle.feed_mm_per_s = feed_;
-      with_places(cycle);
+      with_positions(cycle);
       if (words().has('Q')) {
         cycle.word += fmt::format(" Q{:.3f}", words()['Q'].value * unit_mm(units_));
       }
@@ -435,11 +436,11 @@ class EventReader {
     Event& rapid = add(ComparedKind::rapids, further("G00"));
     const MoveEnd* const end = move_end();
     if (end == nullptr) {
-      with_places(rapid);
+      with_positions(rapid);
       return;
     }
     for (std::size_t i = 0; i < axis_count; ++i) {
-      rapid.place_mm[i] = end->position_mm[static_cast<Eigen::Index>(i)];
+      rapid.position_mm[i] = end->position_mm[static_cast<Eigen::Index>(i)];
       // In G91 the number counts although nobody knows from where.
       const bool is_named = words().has(static_cast<char>('X' + static_cast<int>(i)));
       rapid.named = static_cast<std::uint8_t>(rapid.named | (is_named ? 1U << i : 0U));
@@ -459,7 +460,7 @@ class EventReader {
     });
     if (in_rapid_ && cuts_.is_open()) {
       const Vector3& end = events_.cuts.back().end_mm;
-      std::copy(end.begin(), end.end(), cuts_.event().place_mm.begin());
+      std::copy(end.begin(), end.end(), cuts_.event().position_mm.begin());
     }
   }
 

@@ -96,7 +96,7 @@ class MotionController::Implementation {
     // The last of a way may be gone within one period.
     if (!rested || anew || profile_.distance() != distance) rest_periods_ = 0;
     rest_periods_ = profile_.at_rest() ? std::min(rest_periods_ + 1, settling_periods()) : 0;
-    place(smoothed_distance());
+    stand_at(smoothed_distance());
     filters_.step({position_.data(), axes()});
     const Activity activity = activity_now();
     if (activity == Activity::idle) end_exactly();
@@ -154,7 +154,7 @@ class MotionController::Implementation {
   }
 
   // The point of the path at a distance.
-  void place(double distance) noexcept {
+  void stand_at(double distance) noexcept {
     while (cursor_ + 1 < profile_.entered() && distance >= ring_[cursor_ + 1].distance) ++cursor_;
     has_cursor_ = has_cursor_ || cursor_ < profile_.absorbed();
     if (!has_cursor_) {

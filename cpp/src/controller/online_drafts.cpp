@@ -7,9 +7,9 @@
 namespace shapegcode {
 
 void OnlineProfile::look_ahead(std::uint64_t pushed) noexcept {
-  const auto place = [&] { return OnlinePlan::Place{running_, within_segment()}; };
+  const auto machine = [&] { return OnlinePlan::MachinePosition{running_, within_segment()}; };
   plan_.begin_portion();
-  while (plan_.work(pushed, place())) {
+  while (plan_.work(pushed, machine())) {
     if (refuses()) {
       plan_.refuse();
     } else {
@@ -19,7 +19,7 @@ void OnlineProfile::look_ahead(std::uint64_t pushed) noexcept {
   if (off_ && asked_ == plan_.ratio()) turn_off(false);
   // A motion begins when there is nothing more to be seen, at the override that was asked for: but once only, as a dial
   // may never rest.
-  waiting_ = plan_.has_more(pushed, place()) || plan_.absorbs() || (plan_.plans_anew() && !replanned_);
+  waiting_ = plan_.has_more(pushed, machine()) || plan_.absorbs() || (plan_.plans_anew() && !replanned_);
 }
 
 // Whether a draft comes too late for the speed of a corner, or for the slow stretch around it that the jerk time wants:

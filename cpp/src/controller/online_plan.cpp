@@ -54,7 +54,7 @@ void OnlinePlan::stop_before(std::uint64_t index) noexcept {
 // what a row of zones, each going on from the last, would lower behind them has nothing to do with it.
 void OnlinePlan::visit_zones() noexcept {
   const std::uint64_t i = next_;
-  if (i < machine_.running) return go_through(Stage::pieces);
+  if (i < machine_.running) return go_through(Pass::pieces);
   const QueuedSegment& entry = (*ring_)[i];
   if (i >= absorbed_ && i > machine_.running && entry.corner <= 0.0) stop_before(i);
   if (i == newest_) {
@@ -67,7 +67,7 @@ void OnlinePlan::visit_zones() noexcept {
     if (i + 1 >= first_) {
       for (const Zone& zone : own) reach_ = std::max(reach_, zone.reach);
     }
-    if (i < first_ && machine_.within && reach_ <= 0.0) return go_through(Stage::pieces);
+    if (i < first_ && machine_.within && reach_ <= 0.0) return go_through(Pass::pieces);
     reach_ -= entry.segment.length_mm;
     if (entry.segment.stop_at_end) {
       carry_ = ZoneSet{};  // everything settles there
@@ -76,10 +76,10 @@ void OnlinePlan::visit_zones() noexcept {
     }
   }
   cut_to(carry_, entry.fastest, jump_time_s(limits_, jerk_s()));
-  Versions<SegmentPlan>& plan = places_[i & mask_].plan;
+  Versions<SegmentPlan>& plan = entries_[i & mask_].plan;
   if (i < first_) {
     const SegmentPlan& before = plan.at(version_);
-    if (carry_ == before.at_end) return go_through(Stage::pieces);
+    if (carry_ == before.at_end) return go_through(Pass::pieces);
     plan.draft(draft()).at_start = before.at_start;
   }
   plan.draft(draft()).at_end = carry_;
@@ -90,7 +90,7 @@ void OnlinePlan::visit_zones() noexcept {
   }
   changed_ = i;
   lowest_ = std::min(lowest_, i);
-  if (i == machine_.running) return go_through(Stage::pieces);
+  if (i == machine_.running) return go_through(Pass::pieces);
   --next_;
 }
 
@@ -120,7 +120,7 @@ void OnlinePlan::visit_pieces() noexcept {
   const std::uint64_t i = next_ = std::max(next_, machine_.running);
   const bool is_new = i >= absorbed_;
   QueuedSegment& entry = (*ring_)[i];
-  SegmentPlan& plan = places_[i & mask_].plan.draft(draft());
+  SegmentPlan& plan = entries_[i & mask_].plan.draft(draft());
   double speed = 0.0;
   if (i > machine_.running) {
     const QueuedSegment& before = (*ring_)[i - 1];
@@ -158,7 +158,7 @@ void OnlinePlan::visit_pieces() noexcept {
   speed_ = speed;
   if (next_++ == newest_) {
     speed_ = 0.0;
-    go_through(Stage::speeds);
+    go_through(Pass::speeds);
   }
 }
 
@@ -167,7 +167,7 @@ void OnlinePlan::visit_speeds() noexcept {
   const std::uint64_t i = next_;
   const std::uint64_t last = machine_.within ? machine_.running + 1 : machine_.running;
   if (i < last) {
-    stage_ = Stage::complete;
+    pass_ = Pass::complete;
     return;
   }
   const SegmentPlan& plan = segment(i, draft());
@@ -176,11 +176,11 @@ void OnlinePlan::visit_speeds() noexcept {
   }
   const bool same = i < changed_ && speed_ == start(i, version_);
   if (!same) {
-    places_[i & mask_].start.draft(draft()) = speed_;
+    entries_[i & mask_].start.draft(draft()) = speed_;
     lowest_ = std::min(lowest_, i);
   }
   if (same || i == last) {
-    stage_ = Stage::complete;
+    pass_ = Pass::complete;
   } else {
     --next_;
   }

@@ -31,9 +31,9 @@ class Versions {
   /// Of this version, newer than any other: what was written for it so far, or a place for it.
   [[nodiscard]] Value& draft(std::uint64_t version) noexcept {
     if (is_of(version)) return values_[newest()];
-    const std::size_t place = 1 - newest();
-    since_[place] = version;
-    return values_[place];
+    const std::size_t older = 1 - newest();
+    since_[older] = version;
+    return values_[older];
   }
   void forget(std::uint64_t version) noexcept {
     if (is_of(version)) since_[newest()] = 0;
@@ -52,7 +52,7 @@ class Versions {
 class OnlinePlan {
  public:
   /// Where the machine is: the segment that it runs or that comes next, and whether it is within it.
-  struct Place {
+  struct MachinePosition {
     std::uint64_t running = 0;
     bool within = false;
   };
@@ -71,7 +71,7 @@ class OnlinePlan {
   void override_feeds(double ratio) noexcept { wished_ = ratio; }
   void begin_portion() noexcept { left_ = portion; }
   /// Goes on as far as the portion lets it. True when a draft is complete: take it over or refuse it, then call again.
-  [[nodiscard]] bool work(std::uint64_t pushed, Place machine) noexcept;
+  [[nodiscard]] bool work(std::uint64_t pushed, MachinePosition machine) noexcept;
   void take_over() noexcept;
   /// The machine cannot keep the draft: fewer segments, and at last a stop before the first of them.
   void refuse() noexcept;
@@ -82,10 +82,10 @@ class OnlinePlan {
   [[nodiscard]] std::uint64_t draft() const noexcept { return version_ + 1; }
   [[nodiscard]] double ratio() const noexcept { return ratio_; }
   /// Whether segments that were pushed are not yet seen, though there is room for them.
-  [[nodiscard]] bool has_more(std::uint64_t pushed, Place machine) const noexcept {
+  [[nodiscard]] bool has_more(std::uint64_t pushed, MachinePosition machine) const noexcept {
     return absorbed_ < pushed && absorbed_ - machine.running < window_;
   }
-  [[nodiscard]] bool absorbs() const noexcept { return stage_ != Stage::none && !anew_; }
+  [[nodiscard]] bool absorbs() const noexcept { return pass_ != Pass::none && !anew_; }
   [[nodiscard]] bool plans_anew() const noexcept { return anew_ || wished_ != ratio_; }
   /// New segments of the draft, and the first segment that it runs in another way than before.
   [[nodiscard]] std::uint64_t first_new() const noexcept { return first_; }
@@ -97,17 +97,17 @@ class OnlinePlan {
   [[nodiscard]] int done() const noexcept { return portion - left_; }
 
   [[nodiscard]] const SegmentPlan& segment(std::uint64_t index, std::uint64_t version) const noexcept {
-    return places_[index & mask_].plan.at(version);
+    return entries_[index & mask_].plan.at(version);
   }
   /// Speed at the start of a segment, of both passes.
   [[nodiscard]] double start(std::uint64_t index, std::uint64_t version) const noexcept {
-    return places_[index & mask_].start.at(version);
+    return entries_[index & mask_].start.at(version);
   }
   [[nodiscard]] double acceleration_of(const QueuedSegment& entry, double speed, bool eased) const noexcept;
 
  private:
   // What a draft goes through; each visits one segment after the other.
-  enum class Stage : std::uint8_t {
+  enum class Pass : std::uint8_t {
     none,
     forget,  // a draft that was refused
     zones,   // backwards: those that reach over the junctions at the ends
@@ -123,7 +123,7 @@ class OnlinePlan {
   bool next_draft(std::uint64_t pushed) noexcept;
   void absorb(std::uint64_t first, std::uint64_t count) noexcept;
   void plan_anew() noexcept;
-  void go_through(Stage stage) noexcept;
+  void go_through(Pass pass) noexcept;
   void visit() noexcept;
   void visit_zones() noexcept;
   void visit_pieces() noexcept;
@@ -139,7 +139,7 @@ class OnlinePlan {
   MotionLimits limits_;
   std::uint64_t window_;  // an eighth more than was asked for: what a draft is being made of is not yet in sight
   std::uint64_t mask_;
-  std::vector<Entry> places_;
+  std::vector<Entry> entries_;
   static constexpr std::uint64_t least_batch = 8;  // as many new segments a draft takes in, if so many are there
 
   std::uint64_t absorbed_ = 0;
@@ -148,14 +148,14 @@ class OnlinePlan {
   double wished_ = 1.0;
   std::uint64_t seen_ = 0;  // segments in sight when the last draft with a new override was begun
 
-  Stage stage_ = Stage::none;
+  Pass pass_ = Pass::none;
   int left_ = 0;         // of the portion
   bool anew_ = false;    // with another override; else new segments are taken in
   bool joined_ = false;  // to a motion that may have gone on since the draft was begun
-  Place machine_;
+  MachinePosition machine_;
   double draft_ratio_ = 1.0;
   std::uint64_t first_ = 0, newest_ = 0;
-  std::uint64_t next_ = 0;  // to be visited, of this stage
+  std::uint64_t next_ = 0;  // to be visited, of this pass
   std::uint64_t changed_ = 0;
   std::uint64_t lowest_ = 0;  // written for the draft
   ZoneSet carry_{};

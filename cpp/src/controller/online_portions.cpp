@@ -11,26 +11,26 @@ OnlinePlan::OnlinePlan(SegmentRing& ring, const MotionLimits& limits, std::size_
       limits_(limits),
       window_(window + window / 8),
       mask_(std::bit_ceil(window_) - 1),
-      places_(mask_ + 1) {}
+      entries_(mask_ + 1) {}
 
 void OnlinePlan::restart(std::uint64_t next) noexcept {
   absorbed_ = first_ = newest_ = changed_ = next;
-  stage_ = Stage::none;
+  pass_ = Pass::none;
   anew_ = false;
   seen_ = 0;
   // What was drafted is of no version any more.
   version_ += 2;
 }
 
-bool OnlinePlan::work(std::uint64_t pushed, Place machine) noexcept {
+bool OnlinePlan::work(std::uint64_t pushed, MachinePosition machine) noexcept {
   machine_ = machine;
   // The machine came to rest before the first of the new segments: with it a motion begins.
   if (absorbs() && joined_ && machine.running == first_) absorb(first_, newest_ + 1 - first_);
   // Nothing is left of what was to be planned with another override.
-  if (anew_ && machine.running > newest_) stage_ = Stage::complete;
-  if (stage_ == Stage::none && !next_draft(pushed)) return false;
-  while (stage_ != Stage::complete && left_ > 0) visit();
-  return stage_ == Stage::complete;
+  if (anew_ && machine.running > newest_) pass_ = Pass::complete;
+  if (pass_ == Pass::none && !next_draft(pushed)) return false;
+  while (pass_ != Pass::complete && left_ > 0) visit();
+  return pass_ == Pass::complete;
 }
 
 // A new override waits for the segments that came into reach while the last one was being worked out, so that a dial
@@ -57,7 +57,7 @@ void OnlinePlan::absorb(std::uint64_t first, std::uint64_t count) noexcept {
   newest_ = first + count - 1;
   joined_ = first > machine_.running;
   lowest_ = first;
-  go_through(Stage::zones);
+  go_through(Pass::zones);
 }
 
 void OnlinePlan::plan_anew() noexcept {
@@ -66,33 +66,33 @@ void OnlinePlan::plan_anew() noexcept {
   first_ = machine_.running;
   newest_ = absorbed_ - 1;
   lowest_ = first_;
-  go_through(Stage::zones);
+  go_through(Pass::zones);
 }
 
-void OnlinePlan::go_through(Stage stage) noexcept {
-  stage_ = stage;
-  next_ = stage == Stage::forget ? lowest_ : stage == Stage::pieces ? changed_ : newest_;
+void OnlinePlan::go_through(Pass pass) noexcept {
+  pass_ = pass;
+  next_ = pass == Pass::forget ? lowest_ : pass == Pass::pieces ? changed_ : newest_;
 }
 
 void OnlinePlan::visit() noexcept {
-  switch (stage_) {
-    case Stage::none:
-    case Stage::complete:
+  switch (pass_) {
+    case Pass::none:
+    case Pass::complete:
       return;
-    case Stage::forget:
+    case Pass::forget:
       --left_;
       next_ = std::max(next_, machine_.running);
-      places_[next_ & mask_].plan.forget(draft());
-      places_[next_ & mask_].start.forget(draft());
+      entries_[next_ & mask_].plan.forget(draft());
+      entries_[next_ & mask_].start.forget(draft());
       if (next_++ >= newest_) absorb(first_, 1);
       return;
-    case Stage::zones:
+    case Pass::zones:
       left_ -= next_ >= absorbed_ ? first_visit : 2;
       return visit_zones();
-    case Stage::pieces:
+    case Pass::pieces:
       left_ -= 5;
       return visit_pieces();
-    case Stage::speeds:
+    case Pass::speeds:
       --left_;
       return visit_speeds();
   }
@@ -103,14 +103,14 @@ void OnlinePlan::take_over() noexcept {
   ++version_;
   absorbed_ = newest_ + 1;
   ratio_ = draft_ratio_;
-  stage_ = Stage::none;
+  pass_ = Pass::none;
   anew_ = false;
 }
 
 void OnlinePlan::refuse() noexcept {
   --left_;
   if (newest_ == first_) stop_before(first_);
-  go_through(Stage::forget);
+  go_through(Pass::forget);
 }
 
 }  // namespace shapegcode

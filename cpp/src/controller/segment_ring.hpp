@@ -37,17 +37,17 @@ struct QueuedSegment {
 [[nodiscard]] double acceleration_along(const QueuedSegment& entry, double speed, const MotionLimits& limits,
                                         bool eased) noexcept;
 
-/// A ring of segments: `index & mask` is the place of segment `index`, counted from the first ever pushed.
+/// A ring of segments: segment `index`, counted from the first ever pushed, is entry `index & mask`.
 class SegmentRing {
  public:
-  explicit SegmentRing(std::size_t capacity) : places_(capacity) {}
+  explicit SegmentRing(std::size_t capacity) : entries_(capacity) {}
   [[nodiscard]] QueuedSegment& operator[](std::uint64_t index) noexcept {
-    return places_[index & (places_.size() - 1)];
+    return entries_[index & (entries_.size() - 1)];
   }
-  [[nodiscard]] std::size_t capacity() const noexcept { return places_.size(); }
+  [[nodiscard]] std::size_t capacity() const noexcept { return entries_.size(); }
 
  private:
-  std::vector<QueuedSegment> places_;
+  std::vector<QueuedSegment> entries_;
 };
 
 }  // namespace shapegcode

@@ -4,11 +4,9 @@
 #include <cmath>
 #include <numeric>
 
-#include <fmt/format.h>
-
 #include "base/checks.hpp"
+#include "base/refuse.hpp"
 #include "filter/dense.hpp"
-#include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
@@ -28,8 +26,7 @@ std::vector<Fir> shapers_of(const ControllerSettings& settings, int n_axes) {
   if (const auto* following = std::get_if<FollowingFir>(&settings.shaper)) return following->fir().set();
   std::vector<Fir> each = std::get<std::vector<Fir>>(settings.shaper);
   if (each.size() != static_cast<std::size_t>(n_axes)) {
-    throw Error(ErrorKind::argument,
-                fmt::format("{} shapers for {} axes: one for all, or one for each", each.size(), n_axes));
+    detail::refuse("{} shapers for {} axes: one for all, or one for each", each.size(), n_axes);
   }
   for (Fir& fir : each) fir = scaled_to_one(fir);
   return each;
@@ -43,17 +40,17 @@ Fir correction(double variance, int delay) {
 
 }  // namespace
 
-SetPointFilters::Stage::Stage(const std::vector<Fir>& filters, int n_axes) {
+SetPointFilters::AxisFilters::AxisFilters(const std::vector<Fir>& filters, int n_axes) {
   const int axes_of_each = filters.size() == 1 ? n_axes : 1;
   for (const Fir& fir : filters) streams_.emplace_back(fir, axes_of_each);
 }
 
-void SetPointFilters::Stage::reset(std::span<const double> position) noexcept {
+void SetPointFilters::AxisFilters::reset(std::span<const double> position) noexcept {
   const std::size_t width = position.size() / streams_.size();
   for (std::size_t i = 0; i < streams_.size(); ++i) streams_[i].reset(position.subspan(i * width, width));
 }
 
-void SetPointFilters::Stage::step(std::span<double> position) noexcept {
+void SetPointFilters::AxisFilters::step(std::span<double> position) noexcept {
   const std::size_t width = position.size() / streams_.size();
   for (std::size_t i = 0; i < streams_.size(); ++i) {
     const std::span<double> part = position.subspan(i * width, width);
@@ -88,20 +85,20 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
       chain = convolved(fir, chain);
       if (!following_ || corrections.empty()) corrections.push_back(fir);
     }
-    stages_.emplace_back(corrections, n_axes);
+    chain_.emplace_back(corrections, n_axes);
   }
   tolerance_.contour_tolerance_mm = settings.contour_tolerance_mm;
   for (const Fir& chain : chains) measure(chain, settings.period_s);
   if (length > 1) {
-    stages_.emplace_back(std::vector{average}, n_axes);
-    stages_.emplace_back(std::vector{average}, n_axes);
+    chain_.emplace_back(std::vector{average}, n_axes);
+    chain_.emplace_back(std::vector{average}, n_axes);
   }
   if (following_) {
     const double fastest = settings.limits.max_feed_mm_per_s[following_->axis()];
     change_ = cost_of_change(chains, following_->position_mm(), settings.period_s, fastest);
     gain_ = std::max(gain_, change_.gain);
   } else {
-    stages_.emplace_back(shapers, n_axes);
+    chain_.emplace_back(shapers, n_axes);
   }
 }
 
@@ -134,7 +131,7 @@ void SetPointFilters::measure(const Fir& chain, double period_s) {
 }
 
 void SetPointFilters::reset(std::span<const double> position) noexcept {
-  for (Stage& stage : stages_) stage.reset(position);
+  for (AxisFilters& filters : chain_) filters.reset(position);
   for (VaryingFirStream& varying : varying_) varying.reset(position);
   if (following_) followed_mm_ = position[static_cast<std::size_t>(following_->axis())];
 }
@@ -146,7 +143,7 @@ void SetPointFilters::step(std::span<double> position) noexcept {
     varying_.front().step(position, position, following_->place(0.5 * (followed_mm_ + now_mm)));
     followed_mm_ = now_mm;
   }
-  for (Stage& stage : stages_) stage.step(position);
+  for (AxisFilters& filters : chain_) filters.step(position);
 }
 
 }  // namespace shapegcode

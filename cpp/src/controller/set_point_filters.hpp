@@ -35,9 +35,9 @@ class SetPointFilters {
 
  private:
   // One filter for all axes, or one for each.
-  class Stage {
+  class AxisFilters {
    public:
-    Stage(const std::vector<Fir>& filters, int n_axes);
+    AxisFilters(const std::vector<Fir>& filters, int n_axes);
     void reset(std::span<const double> position) noexcept;
     void step(std::span<double> position) noexcept;
 
@@ -47,7 +47,7 @@ class SetPointFilters {
 
   void measure(const Fir& chain, double period_s);
 
-  std::vector<Stage> stages_;
+  std::vector<AxisFilters> chain_;
   std::optional<FollowingFir> following_;
   std::vector<VaryingFirStream> varying_;  // one where the shaper follows an axis
   double followed_mm_ = 0.0;

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/format.h>
-
 #include "base/checks.hpp"
+#include "base/refuse.hpp"
 #include "motion/speed_limits.hpp"
-#include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
@@ -66,13 +64,11 @@ void check_settings(const ControllerSettings& settings) {
   check_limits(settings.limits, {settings.contour_tolerance_mm, 1.0, 0.0, 0.0});
   require(settings.limits.feed_override <= most_override, "feed override", settings.limits.feed_override, "", "<= 2");
   if (settings.following.size() > most_following_axes) {
-    throw Error(ErrorKind::argument, fmt::format("{} following axes, at most {} are possible",
-                                                 settings.following.size(), most_following_axes));
+    detail::refuse("{} following axes, at most {} are possible", settings.following.size(), most_following_axes);
   }
   const auto jerk_has_acceleration = [](double jerk, double acceleration, std::size_t axis) {
     if (std::isfinite(jerk) && !std::isfinite(acceleration)) {
-      throw Error(ErrorKind::argument,
-                  fmt::format("axis {}: a jerk limit of {} needs an acceleration limit", axis, jerk));
+      detail::refuse("axis {}: a jerk limit of {} needs an acceleration limit", axis, jerk);
     }
   };
   for (int i = 0; i < axis_count; ++i) {

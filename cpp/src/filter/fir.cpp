@@ -7,9 +7,8 @@
 #include <limits>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "base/checks.hpp"
+#include "base/refuse.hpp"
 #include "base/rest.hpp"
 #include "shapegcode/error.hpp"
 
@@ -207,8 +206,7 @@ void decay_column(const double* in, Index rows, Index length, const GeometricWei
 
 void Fir::apply_rows(const double* in, Index rows, int n_axes, double* out) const {
   if (rows < 1 || n_axes < 1) {
-    throw Error(ErrorKind::argument,
-                fmt::format("filter input of {} samples and {} axes, at least 1 of each needed", rows, n_axes));
+    detail::refuse("filter input of {} samples and {} axes, at least 1 of each needed", rows, n_axes);
   }
   const bool flat_delays_fit = duration_samples() <= std::numeric_limits<int>::max() / n_axes;
   if (!moving_average_ && decay_ == 0.0 && flat_delays_fit) {
@@ -227,37 +225,36 @@ void Fir::apply_rows(const double* in, Index rows, int n_axes, double* out) cons
 Fir::Fir(std::vector<int> delays, std::vector<double> taps) : delays_(std::move(delays)), taps_(std::move(taps)) {
   if (taps_.empty()) throw Error(ErrorKind::argument, "filter without taps");
   if (delays_.size() != taps_.size()) {
-    throw Error(ErrorKind::argument, fmt::format("filter with {} delays but {} taps", delays_.size(), taps_.size()));
+    detail::refuse("filter with {} delays but {} taps", delays_.size(), taps_.size());
   }
   if (delays_.front() < 0) {
-    throw Error(ErrorKind::argument, fmt::format("filter delay {} is negative", delays_.front()));
+    detail::refuse("filter delay {} is negative", delays_.front());
   }
   double sum = 0.0;
   for (std::size_t k = 0; k < taps_.size(); ++k) {
     if (delays_[k] > most_delay) {
-      throw Error(ErrorKind::argument, fmt::format("filter delay {}, at most {} is possible", delays_[k], most_delay));
+      detail::refuse("filter delay {}, at most {} is possible", delays_[k], most_delay);
     }
     if (k > 0 && delays_[k] <= delays_[k - 1]) {
-      throw Error(ErrorKind::argument,
-                  fmt::format("filter delays must ascend: {} follows {}", delays_[k], delays_[k - 1]));
+      detail::refuse("filter delays must ascend: {} follows {}", delays_[k], delays_[k - 1]);
     }
     if (!std::isfinite(taps_[k])) {
-      throw Error(ErrorKind::argument, fmt::format("filter tap {} is not finite", k));
+      detail::refuse("filter tap {} is not finite", k);
     }
     sum += taps_[k];
   }
   if (!(std::abs(sum - 1.0) <= 1e-9)) {
-    throw Error(ErrorKind::argument, fmt::format("filter taps add up to 1 + {:.6g}, limit 1 +- 1e-9", sum - 1.0));
+    detail::refuse("filter taps add up to 1 + {:.6g}, limit 1 +- 1e-9", sum - 1.0);
   }
 }
 
 Fir Fir::on_finer_grid(int factor) const {
   if (factor < 1) {
-    throw Error(ErrorKind::argument, fmt::format("grid {} times as fine, at least 1 needed", factor));
+    detail::refuse("grid {} times as fine, at least 1 needed", factor);
   }
   if (duration_samples() > most_delay / factor) {
-    throw Error(ErrorKind::argument, fmt::format("filter delay {} on a grid {} times as fine, at most {} is possible",
-                                                 duration_samples(), factor, most_delay));
+    detail::refuse("filter delay {} on a grid {} times as fine, at most {} is possible", duration_samples(), factor,
+                   most_delay);
   }
   std::vector<int> delays = delays_;
   for (int& delay : delays) delay *= factor;
@@ -266,11 +263,10 @@ Fir Fir::on_finer_grid(int factor) const {
 
 Fir Fir::moving_average(int length) {
   if (length < 1) {
-    throw Error(ErrorKind::argument, fmt::format("moving average over {} samples, at least 1 needed", length));
+    detail::refuse("moving average over {} samples, at least 1 needed", length);
   }
   if (length > most_delay) {
-    throw Error(ErrorKind::argument,
-                fmt::format("moving average over {} samples, at most {} are possible", length, most_delay));
+    detail::refuse("moving average over {} samples, at most {} are possible", length, most_delay);
   }
   std::vector<int> delays(static_cast<std::size_t>(length));
   for (std::size_t k = 0; k < delays.size(); ++k) delays[k] = static_cast<int>(k);
@@ -281,17 +277,14 @@ Fir Fir::moving_average(int length) {
 
 Fir Fir::exponential(double time_constant_samples, double rest) {
   if (!(time_constant_samples > 0.0) || !std::isfinite(time_constant_samples)) {
-    throw Error(ErrorKind::argument,
-                fmt::format("exponential time constant is {} samples, must be > 0 and finite", time_constant_samples));
+    detail::refuse("exponential time constant is {} samples, must be > 0 and finite", time_constant_samples);
   }
   if (!(rest > 0.0 && rest < 1.0)) {
-    throw Error(ErrorKind::argument,
-                fmt::format("share of the exponential that is cut off is {}, must be between 0 and 1", rest));
+    detail::refuse("share of the exponential that is cut off is {}, must be between 0 and 1", rest);
   }
   const double length = std::max(1.0, std::ceil(-std::log(rest) * time_constant_samples));
   if (!(length <= most_filter_samples)) {
-    throw Error(ErrorKind::argument, fmt::format("exponential filter of {:.10g} taps, at most {:.10g} are possible",
-                                                 length, most_filter_samples));
+    detail::refuse("exponential filter of {:.10g} taps, at most {:.10g} are possible", length, most_filter_samples);
   }
   const double decay = std::exp(-1.0 / time_constant_samples);
   const double leaving = std::exp(-length / time_constant_samples);
@@ -332,7 +325,7 @@ double Fir::variance_samples2() const noexcept {
 void Fir::apply(std::span<const double> in, std::span<double> out) const {
   const auto expected = in.size() + static_cast<std::size_t>(duration_samples());
   if (out.size() != expected) {
-    throw Error(ErrorKind::argument, fmt::format("filter output has {} samples, {} needed", out.size(), expected));
+    detail::refuse("filter output has {} samples, {} needed", out.size(), expected);
   }
   apply(in.data(), static_cast<Index>(in.size()), 1, out.data());
 }
@@ -348,7 +341,7 @@ Samples Fir::apply(const Samples& in) const {
 
 void Fir::apply(const double* in, Index in_rows, int n_axes, double* out) const {
   if (in_rows < 1) throw Error(ErrorKind::argument, "filter input has no samples: there is no value to hold");
-  if (n_axes < 0) throw Error(ErrorKind::argument, fmt::format("filter input has {} axes", n_axes));
+  if (n_axes < 0) detail::refuse("filter input has {} axes", n_axes);
   const Index out_rows = in_rows + duration_samples();
   for (int axis = 0; axis < n_axes; ++axis) {
     const double* column_in = in + axis * in_rows;
@@ -365,7 +358,7 @@ void Fir::apply(const double* in, Index in_rows, int n_axes, double* out) const 
 
 FirStream::FirStream(Fir fir, int n_axes) : fir_(std::move(fir)), n_axes_(n_axes) {
   if (n_axes < 1) {
-    throw Error(ErrorKind::argument, fmt::format("filter stream of {} axes, at least 1 needed", n_axes));
+    detail::refuse("filter stream of {} axes, at least 1 needed", n_axes);
   }
   // A moving average also needs the sample that leaves it: one more than the largest delay, beside the newest.
   const auto rows = std::bit_ceil(static_cast<std::size_t>(fir_.duration_samples()) + 2);

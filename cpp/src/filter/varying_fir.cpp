@@ -6,8 +6,7 @@
 #include <cstddef>
 #include <utility>
 
-#include <fmt/format.h>
-
+#include "base/refuse.hpp"
 #include "shapegcode/error.hpp"
 
 #ifdef __FAST_MATH__
@@ -92,11 +91,11 @@ Samples VaryingFir::apply(const Samples& in, std::span<const double> place) cons
   const Index axes = in.positions_mm.cols();
   if (rows < 1) throw Error(ErrorKind::argument, "filter input has no samples: there is no value to hold");
   if (place.size() != static_cast<std::size_t>(rows)) {
-    throw Error(ErrorKind::argument, fmt::format("{} places for {} samples", place.size(), rows));
+    detail::refuse("{} places for {} samples", place.size(), rows);
   }
   for (std::size_t i = 0; i < place.size(); ++i) {
     if (!std::isfinite(place[i])) {
-      throw Error(ErrorKind::argument, fmt::format("place of sample {} is not finite", i));
+      detail::refuse("place of sample {} is not finite", i);
     }
   }
   Samples out;
@@ -128,7 +127,7 @@ void VaryingFirStream::Lag::add(double value) noexcept {
 
 VaryingFirStream::VaryingFirStream(VaryingFir fir, int n_axes) : fir_(std::move(fir)) {
   if (n_axes < 1) {
-    throw Error(ErrorKind::argument, fmt::format("filter stream of {} axes, at least 1 needed", n_axes));
+    detail::refuse("filter stream of {} axes, at least 1 needed", n_axes);
   }
   const auto rows = std::bit_ceil(static_cast<std::size_t>(fir_.duration_samples()) + 1);
   const auto axes = static_cast<std::size_t>(n_axes);
@@ -197,17 +196,14 @@ void VaryingFirStream::step(std::span<const double> in, std::span<double> out, d
 FollowingFir::FollowingFir(VaryingFir fir, int axis, std::vector<double> position_mm)
     : fir_(std::move(fir)), axis_(axis), position_mm_(std::move(position_mm)) {
   if (axis < 0 || axis >= axis_count) {
-    throw Error(ErrorKind::argument, fmt::format("axis {}, 0 to 2 are X, Y and Z", axis));
+    detail::refuse("axis {}, 0 to 2 are X, Y and Z", axis);
   }
   if (position_mm_.size() != fir_.set().size()) {
-    throw Error(ErrorKind::argument,
-                fmt::format("{} positions for {} filters", position_mm_.size(), fir_.set().size()));
+    detail::refuse("{} positions for {} filters", position_mm_.size(), fir_.set().size());
   }
   for (std::size_t k = 0; k < position_mm_.size(); ++k) {
     if (!std::isfinite(position_mm_[k]) || (k > 0 && !(position_mm_[k] > position_mm_[k - 1]))) {
-      throw Error(
-          ErrorKind::argument,
-          fmt::format("positions of filters must be finite and ascend: position {} is {} mm", k, position_mm_[k]));
+      detail::refuse("positions of filters must be finite and ascend: position {} is {} mm", k, position_mm_[k]);
     }
   }
 }
@@ -225,8 +221,7 @@ FollowingFir FollowingFir::on_finer_grid(int factor) const { return {fir_.on_fin
 
 Samples FollowingFir::apply(const Samples& in) const {
   if (in.positions_mm.cols() <= axis_) {
-    throw Error(ErrorKind::argument,
-                fmt::format("samples of {} axes, the filters follow axis {}", in.positions_mm.cols(), axis_));
+    detail::refuse("samples of {} axes, the filters follow axis {}", in.positions_mm.cols(), axis_);
   }
   std::vector<double> places(static_cast<std::size_t>(in.positions_mm.rows()));
   for (std::size_t row = 0; row < places.size(); ++row) {

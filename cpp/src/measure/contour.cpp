@@ -26,12 +26,12 @@ constexpr double retreat_tie_absolute_mm2 = 1e-16;
 constexpr double negligible_share = 1e-6;
 constexpr std::uint32_t growing_until_lost = 8;  // and at every power of two from there
 constexpr double widest_local_window_rad = 1.0;
-// Pieces that lie further away than the best foot are passed in groups.
+// Segments that lie further away than the best foot are passed in groups.
 constexpr std::size_t group_size = 16;  // a power of two
 constexpr double group_slack = 1e-6;
 constexpr double group_slack_mm = 1e-6;
-// Directions of a straight stretch lie within 5.7 degrees of one, hence 11.5 of each other: then no other piece of it
-// is nearer than a foot that lies further from both ends of its piece than .104 of the deviation.
+// Directions of a straight stretch lie within 5.7 degrees of one, hence 11.5 of each other: then no other segment of it
+// is nearer than a foot that lies further from both ends of its segment than .104 of the deviation.
 constexpr double straight_cosine2 = 0.99;
 constexpr double nearest_share = 0.125;
 constexpr double nearest_margin_mm = 1e-5;
@@ -84,15 +84,15 @@ ContourTracker::Arc ContourTracker::arc_of(const Segment& segment) noexcept {
   return arc;
 }
 
-ContourTracker::Piece ContourTracker::piece_of(std::size_t i) const noexcept {
-  Piece piece = bare_piece_of(i);
-  const Vector3& direction = piece.direction;
-  piece.across2 = direction[0] * direction[0] + direction[1] * direction[1];
-  piece.has_side = piece.across2 > negligible_share * negligible_share * direction.squaredNorm();
-  return piece;
+ContourTracker::NearSegment ContourTracker::near_segment_of(std::size_t i) const noexcept {
+  NearSegment part = bare_segment_of(i);
+  const Vector3& direction = part.direction;
+  part.across2 = direction[0] * direction[0] + direction[1] * direction[1];
+  part.has_side = part.across2 > negligible_share * negligible_share * direction.squaredNorm();
+  return part;
 }
 
-ContourTracker::Piece ContourTracker::bare_piece_of(std::size_t i) const noexcept {
+ContourTracker::NearSegment ContourTracker::bare_segment_of(std::size_t i) const noexcept {
   const Path& path = geometry_->path;
   if (path.is_plain(i)) {
     const Vector3& start = path.start_mm(i);
@@ -102,23 +102,23 @@ ContourTracker::Piece ContourTracker::bare_piece_of(std::size_t i) const noexcep
       return {start, along / length, length, path.distance_mm(i), path.distance_mm(i + 1), -1, false, 0.0};
   }
   const Segment segment = path[i];
-  Piece piece{segment.start_mm,
-              tangent_at(segment, 0.0),
-              segment.length_mm,
-              path.distance_mm(i),
-              path.distance_mm(i + 1),
-              geometry_->arc_of[i],
-              false,
-              0.0};
-  // Pieces without length take the direction of the end before them; at the start the one that follows.
-  for (std::size_t k = i; !(piece.length > 0.0) && piece.direction.isZero(0.0) && k-- > 0;) {
+  NearSegment part{segment.start_mm,
+                   tangent_at(segment, 0.0),
+                   segment.length_mm,
+                   path.distance_mm(i),
+                   path.distance_mm(i + 1),
+                   geometry_->arc_of[i],
+                   false,
+                   0.0};
+  // Segments without length take the direction of the end before them; at the start the one that follows.
+  for (std::size_t k = i; !(part.length > 0.0) && part.direction.isZero(0.0) && k-- > 0;) {
     const Segment before = path[k];
-    piece.direction = tangent_at(before, before.length_mm);
+    part.direction = tangent_at(before, before.length_mm);
   }
-  for (std::size_t k = i; !(piece.length > 0.0) && piece.direction.isZero(0.0) && ++k < path.size();) {
-    piece.direction = tangent_at(path[k], 0.0);
+  for (std::size_t k = i; !(part.length > 0.0) && part.direction.isZero(0.0) && ++k < path.size();) {
+    part.direction = tangent_at(path[k], 0.0);
   }
-  return piece;
+  return part;
 }
 
 ContourTracker::ContourTracker(const Path& path) : geometry_(geometry_of(path)) { last_ = path.start_mm(0); }
@@ -134,14 +134,14 @@ void ContourTracker::begin_at(double s_mm, const Vector3& p) noexcept {
   near_ = {std::numeric_limits<double>::infinity(), 0.0};
 }
 
-Vector3 ContourTracker::start_tangent(std::size_t piece) const noexcept { return at(piece).direction; }
+Vector3 ContourTracker::start_tangent(std::size_t index) const noexcept { return at(index).direction; }
 
-Vector3 ContourTracker::end_tangent(std::size_t piece) const noexcept {
-  const Piece& of = at(piece);
+Vector3 ContourTracker::end_tangent(std::size_t index) const noexcept {
+  const NearSegment& of = at(index);
   return of.arc < 0 ? of.direction : geometry_->arcs[static_cast<std::size_t>(of.arc)].end_tangent;
 }
 
-inline ContourTracker::Foot ContourTracker::foot_on(const Piece& line, const Vector3& p,
+inline ContourTracker::Foot ContourTracker::foot_on(const NearSegment& line, const Vector3& p,
                                                     const Window& window) const noexcept {
   if (line.arc >= 0) return foot_on_arc(line, p, window);
   Foot foot;
@@ -190,7 +190,7 @@ double ContourTracker::refined_foot(const Arc& arc, const Vector3& p, const Pola
 }
 
 // Angles `u` count from the arc's start in the sense of its turning, without wrapping.
-ContourTracker::Foot ContourTracker::foot_on_arc(const Piece& base, const Vector3& p,
+ContourTracker::Foot ContourTracker::foot_on_arc(const NearSegment& base, const Vector3& p,
                                                  const Window& window) const noexcept {
   const Arc& arc = geometry_->arcs[static_cast<std::size_t>(base.arc)];
   const double rad_per_mm = arc.turn / base.length;
@@ -250,7 +250,7 @@ bool ContourTracker::is_beyond(std::size_t first, std::size_t size, const Vector
 
 std::size_t ContourTracker::group_from(std::size_t first, const Vector3& p, double limit2) const noexcept {
   std::size_t passed = 0;
-  for (std::size_t size = group_size; (first & (size - 1)) == 0 && first + size < pieces(); size *= group_size) {
+  for (std::size_t size = group_size; (first & (size - 1)) == 0 && first + size < segments(); size *= group_size) {
     if (!is_beyond(first, size, p, limit2)) break;
     passed = size;
   }
@@ -259,7 +259,7 @@ std::size_t ContourTracker::group_from(std::size_t first, const Vector3& p, doub
 
 std::size_t ContourTracker::group_before(std::size_t end, const Vector3& p, double limit2) const noexcept {
   std::size_t passed = 0;
-  for (std::size_t size = group_size; (end & (size - 1)) == 0 && end >= size && end < pieces(); size *= group_size) {
+  for (std::size_t size = group_size; (end & (size - 1)) == 0 && end >= size && end < segments(); size *= group_size) {
     if (!is_beyond(end - size, size, p, limit2)) break;
     passed = size;
   }
@@ -268,8 +268,8 @@ std::size_t ContourTracker::group_before(std::size_t end, const Vector3& p, doub
 
 ContourTracker::Found ContourTracker::search(const Vector3& p, double move, const Window& window,
                                              double bound) const noexcept {
-  // What follows looks other pieces up, which may take this one's slot: what is needed of it is read before.
-  const Piece& here = at(cursor_);
+  // What follows looks other segments up, which may take this one's slot: what is needed of it is read before.
+  const NearSegment& here = at(cursor_);
   Found best{foot_on(here, p, window), cursor_, 0.0};
   best.s = here.s + best.foot.along;
   const double advance = best.s - s_;
@@ -283,7 +283,7 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
   double next_s = here.next_s;
   if (next_s <= forward.end) {
     const Vector3 heading = here.arc < 0 ? here.direction : best.foot.tangent;
-    for (std::size_t i = cursor_ + 1; i < pieces() && next_s <= forward.end; ++i) {
+    for (std::size_t i = cursor_ + 1; i < segments() && next_s <= forward.end; ++i) {
       const double limit = retreats ? best.foot.distance2 * (1.0 + retreat_tie_relative) + retreat_tie_absolute_mm2
                                     : best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
       if (const std::size_t passed = i % group_size == 0 ? group_from(i, p, limit) : 0; passed > 0) {
@@ -291,57 +291,57 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
         next_s = begin_mm(i + 1);
         continue;
       }
-      const Piece& piece = at(i);
-      next_s = piece.next_s;
-      const Foot foot = foot_on(piece, p, forward);
+      const NearSegment& part = at(i);
+      next_s = part.next_s;
+      const Foot foot = foot_on(part, p, forward);
       if (foot.distance2 >= limit) continue;
       // A return leg runs back: another turn of a circle does not. Far ahead it is one only as far behind the tip as
       // the point was before it, and nearer: a vibration along the path is no reason to jump.
       const bool nearer = foot.distance2 < best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
-      const bool back = (piece.arc < 0 ? piece.direction : foot.tangent).dot(heading) < 0.0;
-      const bool within = piece.s + foot.along <= window.end;
+      const bool back = (part.arc < 0 ? part.direction : foot.tangent).dot(heading) < 0.0;
+      const bool within = part.s + foot.along <= window.end;
       if (within ? nearer || back : nearer && back && i == cursor_ + 1 && 2.0 * foot.along > to_tip) {
-        best = {foot, i, piece.s + foot.along};
+        best = {foot, i, part.s + foot.along};
         retreats = false;
       }
     }
   }
   for (std::size_t i = cursor_; i-- > 0;) {
-    const Piece& piece = at(i);
-    if (piece.s + piece.length < window.begin) break;
+    const NearSegment& part = at(i);
+    if (part.s + part.length < window.begin) break;
     const double limit = best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
     if (const std::size_t passed = (i + 1) % group_size == 0 ? group_before(i + 1, p, limit) : 0; passed > 0) {
       i -= passed - 1;
       continue;
     }
-    const Foot foot = foot_on(piece, p, window);
-    if (foot.distance2 < limit) best = {foot, i, piece.s + foot.along};
+    const Foot foot = foot_on(part, p, window);
+    if (foot.distance2 < limit) best = {foot, i, part.s + foot.along};
   }
   return best;
 }
 
-bool ContourTracker::runs_along(std::size_t piece) const noexcept {
+bool ContourTracker::runs_along(std::size_t index) const noexcept {
   const Path& path = geometry_->path;
-  if (!path.is_plain(piece)) return false;
-  const Vector3 along = path.start_mm(piece + 1) - path.start_mm(piece);
+  if (!path.is_plain(index)) return false;
+  const Vector3 along = path.start_mm(index + 1) - path.start_mm(index);
   const double forward = along.dot(straight_.direction);
   return forward > 0.0 && forward * forward >= straight_cosine2 * along.squaredNorm();
 }
 
 void ContourTracker::straighten() noexcept {
-  const Piece& here = at(cursor_);
+  const NearSegment& here = at(cursor_);
   const bool is_line = here.arc < 0 && here.length > 0.0;
   straight_ = {cursor_, here.direction, cursor_, cursor_, here.s, here.next_s, !is_line, !is_line};
 }
 
-// A stretch grows with the window as far as it runs straight; where it ends, one is begun about each new piece.
+// A stretch grows with the window as far as it runs straight; where it ends, one is begun about each new segment.
 bool ContourTracker::runs_straight(const Window& window) noexcept {
   constexpr double infinite = std::numeric_limits<double>::infinity();
-  if (straight_.about == no_piece) straighten();
+  if (straight_.about == no_segment) straighten();
   for (;;) {
     Straight& now = straight_;
     while (!now.turns_behind && (now.end <= window.end || now.last <= cursor_)) {
-      if (now.last + 1 >= pieces()) {
+      if (now.last + 1 >= segments()) {
         now.end = infinite;
         break;
       }
@@ -370,14 +370,14 @@ bool ContourTracker::runs_straight(const Window& window) noexcept {
 
 // 1 left, -1 right; 0 where the deviation or the travel is along Z only.
 double ContourTracker::lateral_side(const Found& found, double distance) const noexcept {
-  const Piece& piece = at(found.piece);  // its neighbours have other slots
+  const NearSegment& part = at(found.index);  // its neighbours have other slots
   const double from_start = found.foot.along;
-  Vector3 travel = piece.arc < 0 ? piece.direction : found.foot.tangent;
+  Vector3 travel = part.arc < 0 ? part.direction : found.foot.tangent;
   // At a corner one leg alone may see the point on the wrong side: the mean direction decides.
-  if (from_start <= 0.0 && found.piece > 0) {
-    travel = start_tangent(found.piece) + end_tangent(found.piece - 1);
-  } else if (from_start >= piece.length && found.piece + 1 < pieces()) {
-    travel = end_tangent(found.piece) + start_tangent(found.piece + 1);
+  if (from_start <= 0.0 && found.index > 0) {
+    travel = start_tangent(found.index) + end_tangent(found.index - 1);
+  } else if (from_start >= part.length && found.index + 1 < segments()) {
+    travel = end_tangent(found.index) + start_tangent(found.index + 1);
   }
   const Vector3& offset = found.foot.offset;
   const double travel_xy2 = travel[0] * travel[0] + travel[1] * travel[1];
@@ -404,9 +404,9 @@ double ContourTracker::step(const Vector3& p, const ContourTracker& driver) noex
   return follow(p, [&] { return driver.s_ + 2.0 * (p - driver.last_).norm() + reach_mm; });
 }
 
-// Most points lie beside the middle of a piece, or of the next one, of a path that runs straight about them, and then
-// no other piece needs a look: all points within so straight a stretch that lie `t` of path away from the foot, of
-// which `rest` on the foot's own piece, are further off, since t^2 cos^2 - 2 |offset| (t - rest) sin > 0.
+// Most points lie beside the middle of a segment, or of the next one, of a path that runs straight about them, and then
+// no other segment needs a look: all points within so straight a stretch that lie `t` of path away from the foot, of
+// which `rest` on the foot's own segment, are further off, since t^2 cos^2 - 2 |offset| (t - rest) sin > 0.
 template <typename Bound>
 inline double ContourTracker::follow(const Vector3& p, const Bound& bound) noexcept {
   // The sum of the components' sizes bounds the step's length without a square root.
@@ -422,38 +422,38 @@ inline double ContourTracker::follow(const Vector3& p, const Bound& bound) noexc
   if (!is_near && !runs_straight(window)) return follow_any(p, move, window, furthest());
 
   std::size_t i = cursor_;
-  const Piece* piece = &at(i);
-  Vector3 from_start = p - piece->start;
-  double along = from_start.dot(piece->direction);
-  if (along > piece->length && i + 1 < pieces()) {
-    piece = &at(++i);
-    from_start = p - piece->start;
-    along = from_start.dot(piece->direction);
-    if (!(piece->s + along <= std::min(window.end, furthest()))) return follow_any(p, move, window, furthest());
+  const NearSegment* part = &at(i);
+  Vector3 from_start = p - part->start;
+  double along = from_start.dot(part->direction);
+  if (along > part->length && i + 1 < segments()) {
+    part = &at(++i);
+    from_start = p - part->start;
+    along = from_start.dot(part->direction);
+    if (!(part->s + along <= std::min(window.end, furthest()))) return follow_any(p, move, window, furthest());
   }
-  const Vector3 offset = from_start - along * piece->direction;
+  const Vector3 offset = from_start - along * part->direction;
   const double distance = std::sqrt(offset.squaredNorm());
   const double margin = nearest_share * distance + nearest_margin_mm;
-  const double rest = piece->length - along;
+  const double rest = part->length - along;
   const bool nearest =
-      along >= 0.0 && rest >= 0.0 && (along >= margin || i == 0) && (rest >= margin || i + 1 == pieces());
+      along >= 0.0 && rest >= 0.0 && (along >= margin || i == 0) && (rest >= margin || i + 1 == segments());
   const bool grows = distance > deviation_ + 0.25 * move && move > 0.0;
   if (!nearest || (grows && growing_ + 1 >= growing_until_lost)) return follow_any(p, move, window, furthest());
 
   growing_ = grows ? growing_ + 1 : 0;
   if (i != cursor_) {
     cursor_ = i;
-    // The next piece must run straight too, where there is one.
+    // The next segment must run straight too, where there is one.
     if (i >= straight_.last && std::isfinite(straight_.end)) near_.begin = std::numeric_limits<double>::infinity();
   }
-  s_ = piece->s + along;
+  s_ = part->s + along;
   furthest_ = std::clamp(furthest_, s_, s_ + longest_retreat_mm);
   deviation_ = distance;
   last_ = p;
   height_ = offset[2];
-  const double lateral = piece->direction[0] * offset[1] - piece->direction[1] * offset[0];
+  const double lateral = part->direction[0] * offset[1] - part->direction[1] * offset[0];
   const double negligible = negligible_share * distance;
-  const bool has_side = piece->has_side && lateral * lateral > negligible * negligible * piece->across2;
+  const bool has_side = part->has_side && lateral * lateral > negligible * negligible * part->across2;
   if (!has_side) {
     lateral_ = 0.0;
     return height_ < 0.0 ? -distance : distance;
@@ -484,8 +484,8 @@ double ContourTracker::follow_any(const Vector3& p, double move, const Window& w
     }
   }
 
-  if (cursor_ != found.piece) near_.begin = std::numeric_limits<double>::infinity();
-  cursor_ = found.piece;
+  if (cursor_ != found.index) near_.begin = std::numeric_limits<double>::infinity();
+  cursor_ = found.index;
   s_ = found.s;
   furthest_ = jumped ? s_ : std::clamp(furthest_, s_, s_ + longest_retreat_mm);
   deviation_ = distance;

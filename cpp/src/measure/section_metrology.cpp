@@ -323,25 +323,25 @@ void SectionMetrology::measure_orbits(std::vector<SectionFigures>& figures) cons
   }
 }
 
-RunFigures SectionMetrology::finish() const {
-  RunFigures run;
-  run.sections.reserve(sections_.size());
-  for (std::size_t i = 0; i < sections_.size(); ++i) run.sections.push_back(figures_of(i));
-  measure_orbits(run.sections);
-  run.rest = vibration_.rest();
-  run.duration_s = run.rest.begin_s;
-  run.command = command_.whole;
-  run.command.include_missed(command_.reach.largest_mm());
-  run.response = response_.whole;
-  run.response.include_missed(response_.reach.largest_mm());
-  run.command_sides = command_.sides;
-  run.response_sides = response_.sides;
+TrackFigures SectionMetrology::finish() const {
+  TrackFigures figures;
+  figures.sections.reserve(sections_.size());
+  for (std::size_t i = 0; i < sections_.size(); ++i) figures.sections.push_back(figures_of(i));
+  measure_orbits(figures.sections);
+  figures.rest = vibration_.rest();
+  figures.duration_s = figures.rest.begin_s;
+  figures.command = command_.whole;
+  figures.command.include_missed(command_.reach.largest_mm());
+  figures.response = response_.whole;
+  figures.response.include_missed(response_.reach.largest_mm());
+  figures.command_sides = command_.sides;
+  figures.response_sides = response_.sides;
   const std::int32_t last = section_of_[command_.tracker.segment()];
   if (last >= 0 && has_moved_) {
     // The stop at the end is the one that a part is left with: it counts even if one before was worse.
-    run.sections[static_cast<std::size_t>(last)].rest = run.rest;
+    figures.sections[static_cast<std::size_t>(last)].rest = figures.rest;
   }
-  return run;
+  return figures;
 }
 
 }  // namespace shapegcode

@@ -23,7 +23,7 @@ using Eigen::Vector2d;
 constexpr double pi = std::numbers::pi;
 constexpr double degree = pi / 180.0;
 constexpr double chord_error_mm = 5e-5;
-constexpr double place_tolerance_mm = 1e-9;  // so far an s may lie outside, as sums of lengths do
+constexpr double position_tolerance_mm = 1e-9;  // so far an s may lie outside, as sums of lengths do
 
 /// The corner as if it turned left, with the finished walls' meeting point at the origin.
 struct Geometry {
@@ -38,7 +38,7 @@ struct Geometry {
 
   static Vector2d left_of(const Vector2d& v) { return {-v.y(), v.x()}; }
 
-  /// The place at a distance inward from both walls.
+  /// The point at a distance inward from both walls.
   static Vector2d at_both_walls(double distance, double turn) { return {-distance * std::tan(0.5 * turn), distance}; }
 
   std::array<Vector2d, 2> along;   // both walls, in the direction of travel
@@ -51,14 +51,14 @@ struct Geometry {
 };
 
 /// Where the tool stands and where it goes, as if the corner turned left.
-struct Place {
+struct ToolPosition {
   Vector2d centre;
   Vector2d direction;
   double turned;
   int leg;  // 0 before the arc, 1 on it, 2 behind
 };
 
-Place place_at(const CornerCut& cut, const Geometry& g, double s, bool behind_vertex) {
+ToolPosition position_at(const CornerCut& cut, const Geometry& g, double s, bool behind_vertex) {
   const bool before = s < cut.before_mm || (s == cut.before_mm && !(behind_vertex && g.arc_length == 0.0));
   if (before) {
     const Vector2d tangent_point = -g.finish_tangent * g.along[0] + cut.tool_radius_mm * g.inward[0];
@@ -76,22 +76,22 @@ Place place_at(const CornerCut& cut, const Geometry& g, double s, bool behind_ve
 }
 
 struct Entry {
-  Vector2d place;
+  Vector2d point;
   bool in_corner;
 };
 
 /// Where the front of the tool, looked along from the finished wall, first crosses the rough boundary, if it does. (At
 /// a narrow corner the other wall may lie further on; there the tool has been.)
-std::optional<Entry> entry_of(const CornerCut& cut, const Geometry& g, const Place& tool) {
+std::optional<Entry> entry_of(const CornerCut& cut, const Geometry& g, const ToolPosition& tool) {
   const double radius = cut.tool_radius_mm;
   std::optional<Entry> best;
   double lowest = 2.0;  // sine of the azimuth
-  const auto consider = [&](const Vector2d& place, bool in_corner) {
-    const Vector2d arm = (place - tool.centre) / radius;
+  const auto consider = [&](const Vector2d& point, bool in_corner) {
+    const Vector2d arm = (point - tool.centre) / radius;
     const double sine = arm.dot(Geometry::left_of(tool.direction));
     if (arm.dot(tool.direction) > -1e-12 && sine < lowest) {
       lowest = sine;
-      best = Entry{place, in_corner};
+      best = Entry{point, in_corner};
     }
   };
   for (std::size_t wall = 0; wall < 2; ++wall) {
@@ -99,9 +99,9 @@ std::optional<Entry> entry_of(const CornerCut& cut, const Geometry& g, const Pla
     const double half_squared = radius * radius - height * height;
     if (half_squared < 0.0) continue;
     for (const double sign : {-1.0, 1.0}) {
-      const Vector2d place = tool.centre + height * g.inward[wall] + sign * std::sqrt(half_squared) * g.along[wall];
-      const double beyond = (place - g.rough_centre).dot(g.along[wall]);  // of where the rough corner is tangent
-      if (wall == 0 ? beyond <= 0.0 : beyond >= 0.0) consider(place, false);
+      const Vector2d point = tool.centre + height * g.inward[wall] + sign * std::sqrt(half_squared) * g.along[wall];
+      const double beyond = (point - g.rough_centre).dot(g.along[wall]);  // of where the rough corner is tangent
+      if (wall == 0 ? beyond <= 0.0 : beyond >= 0.0) consider(point, false);
     }
   }
   const Vector2d between = g.rough_centre - tool.centre;
@@ -113,24 +113,24 @@ std::optional<Entry> entry_of(const CornerCut& cut, const Geometry& g, const Pla
     if (half_squared >= 0.0) {
       const Vector2d unit = between / distance;
       for (const double sign : {-1.0, 1.0}) {
-        const Vector2d place = tool.centre + share * unit + sign * std::sqrt(half_squared) * Geometry::left_of(unit);
-        const Vector2d arm = place - g.rough_centre;
-        if (arm.dot(g.along[0]) >= 0.0 && arm.dot(g.along[1]) <= 0.0) consider(place, true);
+        const Vector2d point = tool.centre + share * unit + sign * std::sqrt(half_squared) * Geometry::left_of(unit);
+        const Vector2d arm = point - g.rough_centre;
+        if (arm.dot(g.along[0]) >= 0.0 && arm.dot(g.along[1]) <= 0.0) consider(point, true);
       }
     }
   }
   return best;
 }
 
-/// How far a place lies from where the tool's axis has been before.
-double distance_from_way(const CornerCut& cut, const Geometry& g, const Place& tool, const Vector2d& place) {
+/// How far a point lies from where the tool's axis has been before.
+double distance_from_way(const CornerCut& cut, const Geometry& g, const ToolPosition& tool, const Vector2d& point) {
   if (tool.leg == 0) return cut.tool_radius_mm;  // on a straight nothing in front has been swept
-  const Vector2d start = place_at(cut, g, 0.0, false).centre;
-  const Vector2d corner = place_at(cut, g, cut.before_mm, false).centre;
-  double distance = ToolStep(start, corner).distance_mm(place);
+  const Vector2d start = position_at(cut, g, 0.0, false).centre;
+  const Vector2d corner = position_at(cut, g, cut.before_mm, false).centre;
+  double distance = ToolStep(start, corner).distance_mm(point);
   if (g.arc_length > 0.0) {
-    const Vector2d end = tool.leg == 1 ? tool.centre : place_at(cut, g, cut.before_mm + g.arc_length, false).centre;
-    distance = std::min(distance, ToolStep(corner, end, 1.0 / g.path_radius).distance_mm(place));
+    const Vector2d end = tool.leg == 1 ? tool.centre : position_at(cut, g, cut.before_mm + g.arc_length, false).centre;
+    distance = std::min(distance, ToolStep(corner, end, 1.0 / g.path_radius).distance_mm(point));
   }
   return distance;
 }
@@ -176,27 +176,27 @@ double corner_length_mm(const CornerCut& cut) {
 
 CornerEngagement corner_engagement(const CornerCut& cut, double s_mm, bool behind_vertex) {
   const double length = corner_length_mm(cut);
-  if (!(s_mm >= -place_tolerance_mm && s_mm <= length + place_tolerance_mm)) {
+  if (!(s_mm >= -position_tolerance_mm && s_mm <= length + position_tolerance_mm)) {
     refuse("place on the corner's path is {} mm, must be 0 to {}", s_mm, length);
   }
   const Geometry g(cut);
-  const Place tool = place_at(cut, g, std::clamp(s_mm, 0.0, length), behind_vertex);
+  const ToolPosition tool = position_at(cut, g, std::clamp(s_mm, 0.0, length), behind_vertex);
   const std::optional<Entry> met = entry_of(cut, g, tool);
-  if (!met || distance_from_way(cut, g, tool, met->place) < cut.tool_radius_mm - place_tolerance_mm) {
+  if (!met || distance_from_way(cut, g, tool, met->point) < cut.tool_radius_mm - position_tolerance_mm) {
     refuse(
         "at {} mm the tool meets the rough pocket only where it has been itself: no closed form for a turn of {:g} "
         "degrees from a rough radius of {} mm to {} mm",
         s_mm, cut.turn_rad / degree, cut.rough_radius_mm, cut.finish_radius_mm);
   }
   const Entry& entry = *met;
-  const Vector2d arm = entry.place - tool.centre;
+  const Vector2d arm = entry.point - tool.centre;
   const double across = arm.dot(Geometry::left_of(tool.direction));
   const double azimuth = std::atan2(across, std::max(arm.dot(tool.direction), 0.0));
 
   CornerEngagement result;
   const Vector2d centre = turned_over(cut, tool.centre);
   const Vector2d direction = turned_over(cut, tool.direction);
-  const bool on_straight_wall = !entry.in_corner && (entry.place - g.rough_centre).dot(g.along[0]) <= 0.0;
+  const bool on_straight_wall = !entry.in_corner && (entry.point - g.rough_centre).dot(g.along[0]) <= 0.0;
   result.section = tool.leg == 1   ? CornerSection::s3
                    : tool.leg == 2 ? CornerSection::s4
                                    : (on_straight_wall ? CornerSection::s1 : CornerSection::s2);
@@ -213,15 +213,15 @@ CornerEngagement corner_engagement(const CornerCut& cut, double s_mm, bool behin
 Path corner_path(const CornerCut& cut, double feed_mm_per_s, double z_mm) {
   const double length = corner_length_mm(cut);
   const Geometry g(cut);
-  const auto place = [&](double s) { return at_height(turned_over(cut, place_at(cut, g, s, true).centre), z_mm); };
+  const auto point = [&](double s) { return at_height(turned_over(cut, position_at(cut, g, s, true).centre), z_mm); };
   const double arc_end = cut.before_mm + g.arc_length;
   std::vector<Segment> segments;
-  if (cut.before_mm > 0.0) segments.push_back(make_line(place(0.0), place(cut.before_mm), feed_mm_per_s));
+  if (cut.before_mm > 0.0) segments.push_back(make_line(point(0.0), point(cut.before_mm), feed_mm_per_s));
   if (g.arc_length > 0.0) {
-    segments.push_back(make_arc(place(cut.before_mm), place(arc_end), at_height(turned_over(cut, g.path_centre), z_mm),
+    segments.push_back(make_arc(point(cut.before_mm), point(arc_end), at_height(turned_over(cut, g.path_centre), z_mm),
                                 cut.mirrored ? -cut.turn_rad : cut.turn_rad, 2, feed_mm_per_s));
   }
-  if (cut.after_mm > 0.0) segments.push_back(make_line(place(arc_end), place(length), feed_mm_per_s));
+  if (cut.after_mm > 0.0) segments.push_back(make_line(point(arc_end), point(length), feed_mm_per_s));
   return Path(segments);
 }
 

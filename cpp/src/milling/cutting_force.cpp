@@ -20,9 +20,9 @@ using detail::refuse;
 
 constexpr double arc_slack_rad = 1e-9;
 constexpr double same_end_rad = 1e-9;
-constexpr double pieces_per_overhang = 10.0;  // of a load on the beam
-constexpr double most_turns = 1000.0;         // of a flute around the tool
-constexpr double largest_angle_rad = 1e9;     // beyond it too little is left of an angle within one turn
+constexpr double parts_per_overhang = 10.0;  // of a load on the beam
+constexpr double most_turns = 1000.0;        // of a flute around the tool
+constexpr double largest_angle_rad = 1e9;    // beyond it too little is left of an angle within one turn
 
 bool same(const ToolBeam& a, const ToolBeam& b) {
   return a.overhang_mm == b.overhang_mm && a.fluted_length_mm == b.fluted_length_mm &&
@@ -36,26 +36,26 @@ void prepare(FluteSet& set) {
   for (ChipTable& table : set.tables) table.prepare_twice();
 }
 
-// Cuts pieces so short that the beam's influence is nearly a straight line along each: the one through its Gauss
+// Cuts into parts so short that the beam's influence is nearly a straight line along each: the one through its Gauss
 // points, under which an even load of any cubic has no error.
 template <class Influence>
-void weighted_pieces(std::span<const EngagedPiece> arcs, double overhang_mm, const Influence& influence,
-                     std::vector<EngagedPiece>& pieces) {
-  pieces.clear();
-  for (const EngagedPiece& arc : arcs) {
+void weighted_parts(std::span<const EngagedPart> arcs, double overhang_mm, const Influence& influence,
+                    std::vector<EngagedPart>& parts) {
+  parts.clear();
+  for (const EngagedPart& arc : arcs) {
     const double height = arc.top_mm - arc.bottom_mm;
-    const int count = std::max(1, static_cast<int>(std::ceil(height * pieces_per_overhang / overhang_mm)));
+    const int count = std::max(1, static_cast<int>(std::ceil(height * parts_per_overhang / overhang_mm)));
     for (int i = 0; i < count; ++i) {
-      EngagedPiece piece = arc;
-      piece.bottom_mm = arc.bottom_mm + height * i / count;
-      piece.top_mm = arc.bottom_mm + height * (i + 1) / count;
-      piece.centre_mm = 0.5 * (piece.bottom_mm + piece.top_mm);
-      const double side = (piece.top_mm - piece.bottom_mm) * 0.5 / std::numbers::sqrt3;
-      const double low = influence(piece.centre_mm - side);
-      const double high = influence(piece.centre_mm + side);
-      piece.weight = 0.5 * (low + high);
-      piece.slope_per_mm = 0.5 * (high - low) / side;
-      pieces.push_back(piece);
+      EngagedPart part = arc;
+      part.bottom_mm = arc.bottom_mm + height * i / count;
+      part.top_mm = arc.bottom_mm + height * (i + 1) / count;
+      part.centre_mm = 0.5 * (part.bottom_mm + part.top_mm);
+      const double side = (part.top_mm - part.bottom_mm) * 0.5 / std::numbers::sqrt3;
+      const double low = influence(part.centre_mm - side);
+      const double high = influence(part.centre_mm + side);
+      part.weight = 0.5 * (low + high);
+      part.slope_per_mm = 0.5 * (high - low) / side;
+      parts.push_back(part);
     }
   }
 }
@@ -111,15 +111,15 @@ struct MillingForce::Impl {
 
   // The engagement and feed that the tables and sums below belong to.
   std::vector<EngagedArc> arcs;
-  std::vector<EngagedPiece> pieces;  // of the arcs, as a clockwise spindle sees them
-  double mean_cosine = 0.0;          // of the engagement
+  std::vector<EngagedPart> parts;  // of the arcs, as a clockwise spindle sees them
+  double mean_cosine = 0.0;        // of the engagement
   double feed_per_tooth = 0.0;
   bool built = false;
   Revolution revolution;
   bool bent_built = false;
   ToolBeam bent_beam;
   Revolution bent;
-  std::vector<EngagedPiece> weighted;
+  std::vector<EngagedPart> weighted;
 
   Impl(EndMill t, CuttingCoefficients c, double rpm, SpindleSense s)
       : tool(std::move(t)),
@@ -146,14 +146,14 @@ struct MillingForce::Impl {
     }
     if (!detail::same_arcs(engagement, arcs)) {
       for (const EngagedArc& arc : engagement) check_arc(arc);  // before anything is changed
-      pieces.clear();
+      parts.clear();
       take_arcs(engagement);
       arcs.assign(engagement.begin(), engagement.end());
       built = false;
       bent_built = false;
     }
     const double per_tooth = feed_mm_per_min / (rev_per_min * tool.flutes);
-    if (pieces.empty() || !(per_tooth > 0.0)) return false;
+    if (parts.empty() || !(per_tooth > 0.0)) return false;
     if (per_tooth == feed_per_tooth) return true;
     feed_per_tooth = per_tooth;
     if (runout) {
@@ -195,19 +195,19 @@ struct MillingForce::Impl {
       extent += height * (to - from);
     }
     mean_cosine = extent > 0.0 ? cosine / extent : 0.0;
-    if (mean_cosine <= 0.0) pieces.clear();  // too narrow to tell from nothing
+    if (mean_cosine <= 0.0) parts.clear();  // too narrow to tell from nothing
   }
 
-  // Layers of a material model that meet the tool alike are one piece.
-  void join(const EngagedPiece& piece) {
-    for (EngagedPiece& below : pieces) {
-      if (below.top_mm == piece.bottom_mm && std::abs(below.from_rad - piece.from_rad) < same_end_rad &&
-          std::abs(below.to_rad - piece.to_rad) < same_end_rad) {
-        below.top_mm = piece.top_mm;
+  // Layers of a material model that meet the tool alike are one part.
+  void join(const EngagedPart& part) {
+    for (EngagedPart& below : parts) {
+      if (below.top_mm == part.bottom_mm && std::abs(below.from_rad - part.from_rad) < same_end_rad &&
+          std::abs(below.to_rad - part.to_rad) < same_end_rad) {
+        below.top_mm = part.top_mm;
         return;
       }
     }
-    pieces.push_back(piece);
+    parts.push_back(part);
   }
 
   [[nodiscard]] ChipMix mix() const {
@@ -253,10 +253,10 @@ struct MillingForce::Impl {
     ChipTable::Values high;
     const double share = static_cast<double>(tool.flutes) / static_cast<double>(set.tables.size());
     for (const ChipTable& table : set.tables) {
-      for (const EngagedPiece& piece : pieces) {
-        table.cumulated(piece.from_rad, low);
-        table.cumulated(piece.to_rad, high);
-        const double weight = share * (piece.top_mm - piece.bottom_mm) / (2.0 * std::numbers::pi);
+      for (const EngagedPart& part : parts) {
+        table.cumulated(part.from_rad, low);
+        table.cumulated(part.to_rad, high);
+        const double weight = share * (part.top_mm - part.bottom_mm) / (2.0 * std::numbers::pi);
         for (std::size_t k = 0; k < table.size(); ++k) sum[k] += weight * (high[k] - low[k]);
       }
     }
@@ -265,8 +265,8 @@ struct MillingForce::Impl {
 
   [[nodiscard]] double peak_chip_mm() const {
     double chip = 0.0;
-    for (const EngagedPiece& piece : pieces) {
-      const double ahead = std::clamp(0.0, piece.from_rad, piece.to_rad);  // where cos is largest
+    for (const EngagedPart& part : parts) {
+      const double ahead = std::clamp(0.0, part.from_rad, part.to_rad);  // where cos is largest
       for (const ChipTable& table : set.tables) {
         chip = std::max(chip, table.chip_mm(ahead) * (runout ? 1.0 : feed_per_tooth));
       }
@@ -278,7 +278,7 @@ struct MillingForce::Impl {
     ForceFigures f;
     if (!take(engagement, feed)) return f;
     if (!built) {
-      revolution.build(set, pieces, pieces);
+      revolution.build(set, parts, parts);
       built = true;
     }
     const ChipMix m = mix();
@@ -297,17 +297,17 @@ struct MillingForce::Impl {
     return f;
   }
 
-  // Integrals of one flute in some pieces, its tip at an azimuth (clockwise sense) that may be turns away.
-  [[nodiscard]] ChipTable::Values flute_integrals(std::span<const EngagedPiece> of, int flute, double azimuth) const {
+  // Integrals of one flute in some parts, its tip at an azimuth (clockwise sense) that may be turns away.
+  [[nodiscard]] ChipTable::Values flute_integrals(std::span<const EngagedPart> of, int flute, double azimuth) const {
     constexpr double turn = 2.0 * std::numbers::pi;
     const ChipTable& table = set.tables[set.tables.size() == 1 ? 0 : static_cast<std::size_t>(flute)];
     ChipTable::Values sum{};
-    for (const EngagedPiece& piece : of) {
-      const double lag_top = set.lag_rad_per_mm * piece.top_mm;
-      const double lag_bottom = set.lag_rad_per_mm * piece.bottom_mm;
-      const auto first = static_cast<int>(std::ceil((piece.from_rad - lag_top - azimuth) / turn));
-      const auto last = static_cast<int>(std::floor((piece.to_rad - lag_bottom - azimuth) / turn));
-      for (int k = first; k <= last; ++k) set.add(piece, table, azimuth + turn * k, sum);
+    for (const EngagedPart& part : of) {
+      const double lag_top = set.lag_rad_per_mm * part.top_mm;
+      const double lag_bottom = set.lag_rad_per_mm * part.bottom_mm;
+      const auto first = static_cast<int>(std::ceil((part.from_rad - lag_top - azimuth) / turn));
+      const auto last = static_cast<int>(std::floor((part.to_rad - lag_bottom - azimuth) / turn));
+      for (int k = first; k <= last; ++k) set.add(part, table, azimuth + turn * k, sum);
     }
     return sum;
   }
@@ -317,7 +317,7 @@ struct MillingForce::Impl {
     return std::remainder(flute * set.pitch_rad - turned_rad, 2.0 * std::numbers::pi);
   }
 
-  [[nodiscard]] Eigen::Vector2d weighted_force(std::span<const EngagedPiece> of, const ChipMix& m,
+  [[nodiscard]] Eigen::Vector2d weighted_force(std::span<const EngagedPart> of, const ChipMix& m,
                                                double turned_rad) const {
     Eigen::Vector2d force = Eigen::Vector2d::Zero();
     const std::size_t size = set.tables.front().size();
@@ -329,9 +329,9 @@ struct MillingForce::Impl {
   }
 
   void check_below_clamp(double overhang_mm) const {
-    for (const EngagedPiece& piece : pieces) {
-      if (piece.top_mm > overhang_mm) {
-        refuse("engagement reaches {} mm above the tip, the tool's overhang is {} mm", piece.top_mm, overhang_mm);
+    for (const EngagedPart& part : parts) {
+      if (part.top_mm > overhang_mm) {
+        refuse("engagement reaches {} mm above the tip, the tool's overhang is {} mm", part.top_mm, overhang_mm);
       }
     }
   }
@@ -381,7 +381,7 @@ ForceCurve MillingForce::curve(std::span<const EngagedArc> arcs, double feed_mm_
   for (int i = 0; i < angles; ++i) {
     for (int flute = 0; flute < flutes; ++flute) {
       const double azimuth = impl_->tip_azimuth(flute, curve.turned_rad[i]);
-      const ChipTable::Values sum = impl_->flute_integrals(impl_->pieces, flute, azimuth);
+      const ChipTable::Values sum = impl_->flute_integrals(impl_->parts, flute, azimuth);
       const Eigen::RowVector2d force(sum_of(m.x, sum, size), impl_->mirror * sum_of(m.y, sum, size));
       curve.flute_n[static_cast<std::size_t>(flute)].row(i) = force;
       curve.force_n.row(i) += force;
@@ -398,10 +398,10 @@ double MillingForce::peak_deflection_um(std::span<const EngagedArc> arcs, double
   if (!impl.bent_built || !same(beam, impl.bent_beam)) {
     check(beam);
     impl.check_below_clamp(beam.overhang_mm);
-    weighted_pieces(
-        impl.pieces, beam.overhang_mm, [&](double z) { return compliance_um_per_n(beam, 0.0, z); }, impl.weighted);
+    weighted_parts(
+        impl.parts, beam.overhang_mm, [&](double z) { return compliance_um_per_n(beam, 0.0, z); }, impl.weighted);
     prepare(impl.set);
-    impl.bent.build(impl.set, impl.pieces, impl.weighted);
+    impl.bent.build(impl.set, impl.parts, impl.weighted);
     impl.bent_beam = beam;
     impl.bent_built = true;
   }
@@ -416,9 +416,9 @@ Eigen::Vector2d MillingForce::deflection_um(std::span<const EngagedArc> arcs, do
   Impl& impl = *impl_;
   if (!impl.take(arcs, feed_mm_per_min)) return Eigen::Vector2d::Zero();
   impl.check_below_clamp(beam.overhang_mm);
-  std::vector<EngagedPiece> weighted;
-  weighted_pieces(
-      impl.pieces, beam.overhang_mm, [&](double z) { return compliance_um_per_n(beam, height_mm, z); }, weighted);
+  std::vector<EngagedPart> weighted;
+  weighted_parts(
+      impl.parts, beam.overhang_mm, [&](double z) { return compliance_um_per_n(beam, height_mm, z); }, weighted);
   prepare(impl.set);
   return impl.weighted_force(weighted, impl.mix(), turned_rad);
 }
@@ -432,10 +432,10 @@ Eigen::Vector2d MillingForce::force_centre_mm(std::span<const EngagedArc> arcs, 
   if (!impl.take(arcs, feed_mm_per_min)) return {none, none};
   impl.check_below_clamp(overhang_mm);
   const ChipMix m = impl.mix();
-  const Eigen::Vector2d force = impl.weighted_force(impl.pieces, m, turned_rad);
-  std::vector<EngagedPiece> weighted;
-  weighted_pieces(
-      impl.pieces, 0.25 * overhang_mm, [&](double z) { return overhang_mm - z; }, weighted);
+  const Eigen::Vector2d force = impl.weighted_force(impl.parts, m, turned_rad);
+  std::vector<EngagedPart> weighted;
+  weighted_parts(
+      impl.parts, 0.25 * overhang_mm, [&](double z) { return overhang_mm - z; }, weighted);
   prepare(impl.set);
   const Eigen::Vector2d moment = impl.weighted_force(weighted, m, turned_rad);
   return {force.x() != 0.0 ? moment.x() / force.x() : none, force.y() != 0.0 ? moment.y() / force.y() : none};

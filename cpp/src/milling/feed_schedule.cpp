@@ -13,9 +13,9 @@ namespace {
 using detail::refuse;
 
 constexpr double rounding_mm = 1e-9;
-constexpr double same_place_mm = 1e-6;
+constexpr double same_position_mm = 1e-6;
 constexpr double border_charge = 0.01;    // of the time of the shortest stretch
-constexpr double candidates = 4.0;        // places for a border per least length within a block
+constexpr double candidates = 4.0;        // for a border, per least length within a block
 constexpr double longest_stretch = 16.0;  // least lengths; longer ones come from equal neighbours
 constexpr double seconds_per_minute = 60.0;
 
@@ -94,31 +94,31 @@ double rounded_down(double feed, const FeedScheduleOptions& options) {
 
 // Where a run of blocks may change its feed, its begin and end included.
 std::vector<double> border_candidates(double begin_mm, std::span<const FeedBlock> run, double least_mm) {
-  std::vector<double> places = {begin_mm};
+  std::vector<double> borders = {begin_mm};
   for (const FeedBlock& block : run) {
-    const double from = places.back();
+    const double from = borders.back();
     const double room = block.end_mm - from - 2.0 * least_mm;
     if (block.divisible && room > -rounding_mm) {
       const auto steps = static_cast<std::size_t>(std::max(0.0, std::ceil(candidates * room / least_mm - rounding_mm)));
       const double width = steps > 0 ? room / static_cast<double>(steps) : 0.0;
       for (std::size_t k = 0; k <= steps; ++k) {
-        places.push_back(from + least_mm + width * static_cast<double>(k));
+        borders.push_back(from + least_mm + width * static_cast<double>(k));
       }
     }
     if (block.end_mm > from) {
-      places.push_back(block.end_mm);
+      borders.push_back(block.end_mm);
     }
   }
-  return places;
+  return borders;
 }
 
 // Borders of the stretches of one run: the cheapest way from its begin to its end.
-void schedule_run(const std::vector<double>& places, LowestFeed& lowest, const FeedScheduleOptions& options,
+void schedule_run(const std::vector<double>& borders, LowestFeed& lowest, const FeedScheduleOptions& options,
                   std::vector<FeedStretch>& stretches) {
-  const std::size_t count = places.size();
+  const std::size_t count = borders.size();
   std::vector<double> between(count - 1);
   for (std::size_t k = 0; k + 1 < count; ++k) {
-    between[k] = lowest(places[k], places[k + 1]);
+    between[k] = lowest(borders[k], borders[k + 1]);
   }
   struct Best {
     double cost = std::numeric_limits<double>::infinity();
@@ -132,7 +132,7 @@ void schedule_run(const std::vector<double>& places, LowestFeed& lowest, const F
     double feed = std::numeric_limits<double>::infinity();
     for (std::size_t from = to; from-- > 0;) {
       feed = std::min(feed, between[from]);
-      const double length = places[to] - places[from];
+      const double length = borders[to] - borders[from];
       if (length > longest_stretch * options.least_length_mm && std::isfinite(best[to].cost)) {
         break;
       }
@@ -151,7 +151,7 @@ void schedule_run(const std::vector<double>& places, LowestFeed& lowest, const F
   }
   const std::size_t first = stretches.size();
   for (std::size_t to = count - 1; to > 0; to = best[to].from) {
-    stretches.push_back({places[best[to].from], places[to], best[to].feed});
+    stretches.push_back({borders[best[to].from], borders[to], best[to].feed});
   }
   std::reverse(stretches.begin() + static_cast<std::ptrdiff_t>(first), stretches.end());
 }
@@ -200,9 +200,9 @@ std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const 
     while (end < blocks.size() && !(blocks[end].kept_mm_per_min > 0.0)) {
       ++end;
     }
-    const std::vector<double> places = border_candidates(begin, blocks.subspan(i, end - i), options.least_length_mm);
-    if (places.size() > 1) {
-      schedule_run(places, lowest, options, stretches);
+    const std::vector<double> borders = border_candidates(begin, blocks.subspan(i, end - i), options.least_length_mm);
+    if (borders.size() > 1) {
+      schedule_run(borders, lowest, options, stretches);
       kept.resize(stretches.size(), false);
     }
     begin = blocks[end - 1].end_mm;
@@ -221,7 +221,7 @@ std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const 
 }
 
 Path with_feeds(const Path& path, std::span<const FeedStretch> stretches) {
-  if (stretches.empty() || std::abs(stretches.back().end_mm - path.length_mm()) > same_place_mm) {
+  if (stretches.empty() || std::abs(stretches.back().end_mm - path.length_mm()) > same_position_mm) {
     refuse("the stretches of a feed schedule must cover the path of {} mm", path.length_mm());
   }
   std::vector<Segment> pieces;
@@ -231,14 +231,14 @@ Path with_feeds(const Path& path, std::span<const FeedStretch> stretches) {
     const Segment& segment = path[i];
     const double begin = path.distance_mm(i);
     const double end = path.distance_mm(i + 1);
-    while (k + 1 < stretches.size() && stretches[k].end_mm <= begin + same_place_mm) {
+    while (k + 1 < stretches.size() && stretches[k].end_mm <= begin + same_position_mm) {
       ++k;
     }
     Vector3 from = segment.start_mm;
     double at = begin;
     for (; k < stretches.size(); ++k) {
       const double feed = stretches[k].feed_mm_per_min / seconds_per_minute;
-      if (k + 1 == stretches.size() || stretches[k].end_mm >= end - same_place_mm) {
+      if (k + 1 == stretches.size() || stretches[k].end_mm >= end - same_position_mm) {
         pieces.push_back(piece_of(segment, from, segment.end_mm, (end - at) / segment.length_mm, feed));
         pieces.back().stop_at_end = segment.stop_at_end;
         break;

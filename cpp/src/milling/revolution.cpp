@@ -18,39 +18,39 @@ constexpr double short_rad = 1e-2;
 
 }  // namespace
 
-void FluteSet::add(const EngagedPiece& piece, const ChipTable& table, double azimuth,
+void FluteSet::add(const EngagedPart& part, const ChipTable& table, double azimuth,
                    ChipTable::Values& sum) const noexcept {
   ChipTable::Values upper;
-  if (straight(piece)) {
-    const double middle_mm = 0.5 * (piece.bottom_mm + piece.top_mm);
+  if (straight(part)) {
+    const double middle_mm = 0.5 * (part.bottom_mm + part.top_mm);
     const double at = azimuth + lag_rad_per_mm * middle_mm;
-    if (at < piece.from_rad || at > piece.to_rad) return;
+    if (at < part.from_rad || at > part.to_rad) return;
     table.density(at, upper);
     const double weight =
-        (piece.weight + piece.slope_per_mm * (middle_mm - piece.centre_mm)) * (piece.top_mm - piece.bottom_mm);
+        (part.weight + part.slope_per_mm * (middle_mm - part.centre_mm)) * (part.top_mm - part.bottom_mm);
     for (std::size_t k = 0; k < table.size(); ++k) sum[k] += weight * upper[k];
     return;
   }
-  const double low = std::max(piece.from_rad, azimuth + lag_rad_per_mm * piece.bottom_mm);
-  const double high = std::min(piece.to_rad, azimuth + lag_rad_per_mm * piece.top_mm);
+  const double low = std::max(part.from_rad, azimuth + lag_rad_per_mm * part.bottom_mm);
+  const double high = std::min(part.to_rad, azimuth + lag_rad_per_mm * part.top_mm);
   if (!(high > low)) return;
   ChipTable::Values lower;
   table.cumulated(low, lower);
   table.cumulated(high, upper);
-  add_stretch(piece, table, azimuth, {low, high, lower, upper}, sum);
+  add_stretch(part, table, azimuth, {low, high, lower, upper}, sum);
 }
 
-void FluteSet::add_stretch(const EngagedPiece& piece, const ChipTable& table, double azimuth,
-                           const FluteStretch& stretch, ChipTable::Values& sum) const noexcept {
+void FluteSet::add_stretch(const EngagedPart& part, const ChipTable& table, double azimuth, const FluteStretch& stretch,
+                           ChipTable::Values& sum) const noexcept {
   const auto [low, high, lower, upper] = stretch;
   const double share = 1.0 / lag_rad_per_mm;
-  if (piece.slope_per_mm == 0.0) {
-    const double weight = piece.weight * share;
+  if (part.slope_per_mm == 0.0) {
+    const double weight = part.weight * share;
     for (std::size_t k = 0; k < table.size(); ++k) sum[k] += weight * (upper[k] - lower[k]);
     return;
   }
   const auto weight_at = [&](double p) {
-    return piece.weight + piece.slope_per_mm * ((p - azimuth) * share - piece.centre_mm);
+    return part.weight + part.slope_per_mm * ((p - azimuth) * share - part.centre_mm);
   };
   if (high - low < short_rad) {
     const double weight = weight_at(0.5 * (low + high)) * share;
@@ -64,19 +64,19 @@ void FluteSet::add_stretch(const EngagedPiece& piece, const ChipTable& table, do
   table.cumulated_twice(high, upper_twice);
   const double at_low = weight_at(low) * share;
   const double at_high = weight_at(high) * share;
-  const double slope = piece.slope_per_mm * share * share;
+  const double slope = part.slope_per_mm * share * share;
   for (std::size_t k = 0; k < table.size(); ++k) {
     sum[k] += at_high * upper[k] - at_low * lower[k] - slope * (upper_twice[k] - lower_twice[k]);
   }
 }
 
-void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPiece> arcs) {
+void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPart> arcs) {
   kinks_.clear();
   const auto note = [&](double angle) {
     const double turns = std::floor(angle / set.pitch_rad);
     kinks_.push_back(std::clamp(angle - turns * set.pitch_rad, 0.0, set.pitch_rad));
   };
-  for (const EngagedPiece& arc : arcs) {
+  for (const EngagedPart& arc : arcs) {
     if (set.straight(arc)) {
       const double lag = set.lag_rad_per_mm * 0.5 * (arc.bottom_mm + arc.top_mm);
       note(arc.from_rad - lag);
@@ -116,21 +116,21 @@ void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPiece>
   stretches_.push_back(angle_.size());
 }
 
-// What the flutes of a kind have in a piece, pass by pass.
-void Revolution::add(const FluteSet& set, const EngagedPiece& piece, std::size_t kind) {
+// What the flutes of a kind have in a part, pass by pass.
+void Revolution::add(const FluteSet& set, const EngagedPart& part, std::size_t kind) {
   const ChipTable& table = set.tables[kind];
   const std::size_t n = angle_.size();
   const double lag = set.lag_rad_per_mm;
-  const bool straight = set.straight(piece);
+  const bool straight = set.straight(part);
   const double first_angle = angle_.front();
   const double last_angle = angle_.back();
-  const auto first = static_cast<int>(std::ceil((piece.from_rad - lag * piece.top_mm - last_angle) / set.pitch_rad));
-  const auto last = static_cast<int>(std::floor((piece.to_rad - lag * piece.bottom_mm - first_angle) / set.pitch_rad));
+  const auto first = static_cast<int>(std::ceil((part.from_rad - lag * part.top_mm - last_angle) / set.pitch_rad));
+  const auto last = static_cast<int>(std::floor((part.to_rad - lag * part.bottom_mm - first_angle) / set.pitch_rad));
   ChipTable::Values at_from;
   ChipTable::Values at_to;
   if (!straight) {
-    table.cumulated(piece.from_rad, at_from);
-    table.cumulated(piece.to_rad, at_to);
+    table.cumulated(part.from_rad, at_from);
+    table.cumulated(part.to_rad, at_to);
   }
   ChipTable::Values lower;
   ChipTable::Values upper;
@@ -142,28 +142,28 @@ void Revolution::add(const FluteSet& set, const EngagedPiece& piece, std::size_t
       const double azimuth = angle_[j] + pass * set.pitch_rad;
       if (straight) {
         ChipTable::Values value{};
-        set.add(piece, table, azimuth, value);
+        set.add(part, table, azimuth, value);
         for (std::size_t k = 0; k < size_; ++k) to[k * n + j] += value[k];
         continue;
       }
-      const double tip = azimuth + lag * piece.bottom_mm;
-      const double top = azimuth + lag * piece.top_mm;
-      const bool tip_inside = tip > piece.from_rad;
-      const bool top_inside = top < piece.to_rad;
-      if (tip >= piece.to_rad || top <= piece.from_rad) continue;
+      const double tip = azimuth + lag * part.bottom_mm;
+      const double top = azimuth + lag * part.top_mm;
+      const bool tip_inside = tip > part.from_rad;
+      const bool top_inside = top < part.to_rad;
+      if (tip >= part.to_rad || top <= part.from_rad) continue;
       if (tip_inside) table.cumulated(tip, lower);
       if (top_inside) table.cumulated(top, upper);
       const ChipTable::Values& low = tip_inside ? lower : at_from;
       const ChipTable::Values& high = top_inside ? upper : at_to;
       ChipTable::Values value{};
-      set.add_stretch(piece, table, azimuth,
-                      {tip_inside ? tip : piece.from_rad, top_inside ? top : piece.to_rad, low, high}, value);
+      set.add_stretch(part, table, azimuth,
+                      {tip_inside ? tip : part.from_rad, top_inside ? top : part.to_rad, low, high}, value);
       for (std::size_t k = 0; k < size_; ++k) to[k * n + j] += value[k];
     }
   }
 }
 
-void Revolution::build(const FluteSet& set, std::span<const EngagedPiece> arcs, std::span<const EngagedPiece> pieces) {
+void Revolution::build(const FluteSet& set, std::span<const EngagedPart> arcs, std::span<const EngagedPart> parts) {
   size_ = set.tables.front().size();
   flutes_ = static_cast<std::size_t>(set.flutes);
   kinds_ = set.tables.size();
@@ -175,7 +175,7 @@ void Revolution::build(const FluteSet& set, std::span<const EngagedPiece> arcs, 
   total_.assign(kinds_ * block, 0.0);
   if (n == 0) return;
   for (std::size_t kind = 0; kind < kinds_; ++kind) {
-    for (const EngagedPiece& piece : pieces) add(set, piece, kind);
+    for (const EngagedPart& part : parts) add(set, part, kind);
   }
   // Turned on by a pitch, flute i stands where its column i + turn is; flutes of one kind are all the first.
   for (std::size_t turn = 0; turn < kinds_; ++turn) {

@@ -13,7 +13,7 @@ namespace shapegcode {
 
 /// Part of the engagement, seen with a clockwise spindle. Its force counts `weight` times at `centre_mm`, and
 /// `slope_per_mm` more for each mm above.
-struct EngagedPiece {
+struct EngagedPart {
   double from_rad;
   double to_rad;
   double bottom_mm;
@@ -30,7 +30,7 @@ struct ChipMix {
   ChipTable::Values tangential{};
 };
 
-/// What of a flute is in a piece: from azimuth `low` to `high`, with the integrals of ChipTable at both.
+/// What of a flute is in a part: from azimuth `low` to `high`, with the integrals of ChipTable at both.
 struct FluteStretch {
   double low;
   double high;
@@ -46,14 +46,14 @@ struct FluteSet {
   std::vector<ChipTable> tables;
 
   /// Too little lag to tell from none: the element at the middle stands for all.
-  [[nodiscard]] bool straight(const EngagedPiece& piece) const noexcept {
-    return lag_rad_per_mm * (piece.top_mm - piece.bottom_mm) < 1e-6;
+  [[nodiscard]] bool straight(const EngagedPart& part) const noexcept {
+    return lag_rad_per_mm * (part.top_mm - part.bottom_mm) < 1e-6;
   }
-  /// Adds the force over a stretch of a piece, the flute's tip at `azimuth`.
-  void add_stretch(const EngagedPiece& piece, const ChipTable& table, double azimuth, const FluteStretch& stretch,
+  /// Adds the force over a stretch of a part, the flute's tip at `azimuth`.
+  void add_stretch(const EngagedPart& part, const ChipTable& table, double azimuth, const FluteStretch& stretch,
                    ChipTable::Values& sum) const noexcept;
-  /// Adds what a flute whose tip stands at `azimuth` has in a piece.
-  void add(const EngagedPiece& piece, const ChipTable& table, double azimuth, ChipTable::Values& sum) const noexcept;
+  /// Adds what a flute whose tip stands at `azimuth` has in a part.
+  void add(const EngagedPart& part, const ChipTable& table, double azimuth, ChipTable::Values& sum) const noexcept;
 };
 
 /// The integrals on a grid of angles that ends where a flute's tip or top enters or leaves an arc, kept so that they
@@ -67,13 +67,13 @@ class Revolution {
     double peak_tangential = 0.0;
   };
 
-  /// `arcs` give the angles, `pieces` of them the forces.
-  void build(const FluteSet& set, std::span<const EngagedPiece> arcs, std::span<const EngagedPiece> pieces);
+  /// `arcs` give the angles, `parts` of them the forces.
+  void build(const FluteSet& set, std::span<const EngagedPart> arcs, std::span<const EngagedPart> parts);
   [[nodiscard]] Figures mix(const ChipMix& mix, bool with_flutes);
 
  private:
-  void place_angles(const FluteSet& set, std::span<const EngagedPiece> arcs);
-  void add(const FluteSet& set, const EngagedPiece& piece, std::size_t kind);
+  void place_angles(const FluteSet& set, std::span<const EngagedPart> arcs);
+  void add(const FluteSet& set, const EngagedPart& part, std::size_t kind);
   [[nodiscard]] double peak(const std::vector<double>& values) const noexcept;
   void weigh(const double* integrals, const ChipTable::Values& by, std::vector<double>& out) const;
 

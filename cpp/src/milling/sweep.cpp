@@ -41,7 +41,7 @@ constexpr double touching_mm = 1e-6;  // a tip so little below a layer's top sta
 constexpr std::size_t samples_between_reports = 1024;
 
 /// A step of the tool with the lowest layer that it cuts.
-struct Piece {
+struct LayerStep {
   ToolStep step;
   std::size_t lowest;
   std::uint32_t segment;
@@ -75,7 +75,7 @@ class Sweeper {
     grid_error_ = std::max(1e-6, h * h / (8.0 * radius_));
     touch_ = std::max(options.touch_mm, 4.0 * grid_error_);
     kept_mm_ = exact_share * radius_;
-    longest_piece_mm_ = 2.0 * kept_mm_;
+    longest_step_mm_ = 2.0 * kept_mm_;
   }
 
   EngagementTrack run(const Path& path) {
@@ -97,27 +97,27 @@ class Sweeper {
     const double longest = segment.kind == SegmentKind::arc
                                ? std::min(step_, largest_turn_rad * segment.length_mm / std::abs(segment.sweep_rad))
                                : step_;
-    places_.clear();
+    stations_.clear();
     const double count = std::ceil(segment.length_mm / longest * (1.0 - 1e-12));
     const double spacing = segment.length_mm / count;
     const Vector3 start_tangent = tangent_at(segment, 0.0);
     const Vector2d start_direction = start_tangent.head<2>();
     if (start_direction.norm() > least_horizontal && !goes_on(start_direction.normalized())) {
-      for (const double share : shares_behind_vertex) places_.push_back(share * spacing);
+      for (const double share : shares_behind_vertex) stations_.push_back(share * spacing);
     }
-    for (double k = 1.0; k < count; ++k) places_.push_back(k * spacing);
-    places_.push_back(segment.length_mm);
+    for (double k = 1.0; k < count; ++k) stations_.push_back(k * spacing);
+    stations_.push_back(segment.length_mm);
     if (segment.start_mm.z() != segment.end_mm.z()) add_crossings(segment);
 
     double from_mm = 0.0;
-    for (const double to_mm : places_) {
+    for (const double to_mm : stations_) {
       const double middle_z = point_at(segment, 0.5 * (from_mm + to_mm)).z();
       sample(segment, begin_mm, to_mm, material_.lowest_cut(middle_z));
       from_mm = to_mm;
     }
   }
 
-  /// Places at which a ramp passes the middle of a layer.
+  /// Positions at which a ramp passes the middle of a layer.
   void add_crossings(const Segment& segment) {
     const double low = std::min(segment.start_mm.z(), segment.end_mm.z());
     const double high = std::max(segment.start_mm.z(), segment.end_mm.z());
@@ -125,10 +125,10 @@ class Sweeper {
     const std::vector<double>& borders = material_.borders_mm();
     for (std::size_t i = 1; i < borders.size(); ++i) {
       const double middle = 0.5 * (borders[i - 1] + borders[i]);
-      if (middle > low && middle < high) places_.push_back((middle - segment.start_mm.z()) * per_mm);
+      if (middle > low && middle < high) stations_.push_back((middle - segment.start_mm.z()) * per_mm);
     }
-    std::sort(places_.begin(), places_.end());
-    places_.erase(std::unique(places_.begin(), places_.end()), places_.end());
+    std::sort(stations_.begin(), stations_.end());
+    stations_.erase(std::unique(stations_.begin(), stations_.end()), stations_.end());
   }
 
   [[nodiscard]] bool goes_on(const Vector2d& direction) const {
@@ -202,7 +202,7 @@ class Sweeper {
     return plunged_layer_ == lowest ? plunged_mm2_ : 0.0;
   }
 
-  /// Adds the way to a place to what is pending; on one segment to the latest piece, so that the grid has less to do.
+  /// Adds the way to a place to what is pending; on one segment to the latest step, so that the grid has less to do.
   void travel(const Segment& segment, const Vector2d& point, std::size_t lowest, double end_mm) {
     double curvature = 0.0;
     if (segment.kind == SegmentKind::arc) {
@@ -213,9 +213,9 @@ class Sweeper {
     }
     if (!pending_.empty() && pending_.back().continues && pending_.back().segment == index_ &&
         pending_.back().lowest == lowest) {
-      Piece& latest = pending_.back();
+      LayerStep& latest = pending_.back();
       const double chord = (point - latest.step.from()).norm();
-      if (chord < longest_piece_mm_ && chord * std::abs(curvature) < 2.0 * largest_turn_rad) {
+      if (chord < longest_step_mm_ && chord * std::abs(curvature) < 2.0 * largest_turn_rad) {
         latest.step = ToolStep(latest.step.from(), point, curvature);
         latest.end_mm = end_mm;
         return;
@@ -225,17 +225,17 @@ class Sweeper {
   }
 
   void sweep_oldest() {
-    const Piece& piece = pending_.front();
-    const double half = 0.5 * piece.step.chord().norm();
-    const Vector2d middle = piece.step.from() + 0.5 * piece.step.chord();
-    for (std::size_t layer = piece.lowest; layer < material_.size(); ++layer) {
+    const LayerStep& swept = pending_.front();
+    const double half = 0.5 * swept.step.chord().norm();
+    const Vector2d middle = swept.step.from() + 0.5 * swept.step.chord();
+    for (std::size_t layer = swept.lowest; layer < material_.size(); ++layer) {
       const MaterialLayer& field = material_.layer(layer);
       // Nor is there anything above: see `sample`.
       if (field.is_empty_around(middle.x(), middle.y(), radius_ + half + field.band_mm())) break;
-      const bool continues = piece.continues && layer >= piece.predecessor_lowest;
+      const bool continues = swept.continues && layer >= swept.predecessor_lowest;
       if (half == 0.0 && continues) continue;
       // Where nothing is left to take away, nothing is above; only the layers that the tool has just reached are new.
-      if (!material_.remove(layer, piece.step, radius_, continues) && continues) break;
+      if (!material_.remove(layer, swept.step, radius_, continues) && continues) break;
     }
     pending_.pop_front();
   }
@@ -245,8 +245,8 @@ class Sweeper {
     double d = material_.layer(layer).distance_mm(place.x(), place.y());
     in_grid_ = d;
     if (d <= 0.0) return d;
-    for (const Piece& piece : pending_) {
-      if (piece.lowest <= layer) d = std::min(d, piece.step.distance_mm(place) - radius_);
+    for (const LayerStep& swept : pending_) {
+      if (swept.lowest <= layer) d = std::min(d, swept.step.distance_mm(place) - radius_);
     }
     return d;
   }
@@ -350,7 +350,7 @@ class Sweeper {
   }
 
   double area_below(std::size_t layer, const Vector2d& point) {
-    const auto is_swept_later = [&](const Piece& piece) { return piece.lowest <= layer; };
+    const auto is_swept_later = [&](const LayerStep& swept) { return swept.lowest <= layer; };
     if (std::any_of(pending_.begin(), pending_.end(), is_swept_later)) {
       while (!pending_.empty()) sweep_oldest();
     }
@@ -370,10 +370,10 @@ class Sweeper {
   double touch_ = 0.0;
   double in_grid_ = 0.0;  // the latest distance, without the newest way: tells how deep a contact is at any step
   double kept_mm_ = 0.0;
-  double longest_piece_mm_ = 0.0;
+  double longest_step_mm_ = 0.0;
   std::vector<Look> looks_;
-  std::deque<Piece> pending_;  // not yet in the grid, oldest first
-  std::vector<double> places_;
+  std::deque<LayerStep> pending_;  // not yet in the grid, oldest first
+  std::vector<double> stations_;
   std::vector<AzimuthRange> found_;
   std::vector<std::pair<double, double>> widths_;
   std::vector<std::size_t> open_;  // arcs of the layer below

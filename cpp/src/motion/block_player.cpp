@@ -1,13 +1,12 @@
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "base/checks.hpp"
+#include "base/refuse.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -125,11 +124,10 @@ void BlockPlayer::open_block() noexcept {
 
 void BlockPlayer::pause_after(std::size_t block, double seconds) {
   if (!(seconds >= 0.0) || !std::isfinite(seconds)) {
-    throw Error(ErrorKind::argument, fmt::format("pause of {} s: must be finite and >= 0", seconds));
+    detail::refuse("pause of {} s: must be finite and >= 0", seconds);
   }
   if (block < block_ || block >= blocks_.size()) {
-    throw Error(ErrorKind::argument,
-                fmt::format("pause behind block {}: block {} of {} is open", block, block_, blocks_.size()));
+    detail::refuse("pause behind block {}: block {} of {} is open", block, block_, blocks_.size());
   }
   paused_block_ = block;
   pause_s_ = block_end_ == BlockEnd::ceil ? whole_periods(seconds / period_s_) * period_s_ : seconds;

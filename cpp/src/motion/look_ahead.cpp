@@ -4,8 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include <fmt/format.h>
-
+#include "base/refuse.hpp"
 #include "motion/phase_maker.hpp"
 #include "motion/pieces.hpp"
 #include "motion/planned_motion.hpp"
@@ -195,7 +194,7 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const Filt
   check_limits(limits, filter);
   const std::size_t n = path.size();
   if (caps != nullptr && (caps->on_segment.size() != n || caps->at_junction.size() != n)) {
-    throw Error(ErrorKind::argument, fmt::format("speed caps of a path of {} segments: one per segment", n));
+    detail::refuse("speed caps of a path of {} segments: one per segment", n);
   }
   if (n == 0 || path.length_mm() <= 0.0) {
     return SpeedProfile({}, path.length_mm(), 0.0);

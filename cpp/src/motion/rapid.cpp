@@ -1,4 +1,4 @@
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@ struct Way {
   double acceleration_mm_per_s2 = MotionLimits::none;
 };
 
-Way axis_way(const Vector3& travel_mm, int axis, const ControllerModel& model) noexcept {
+Way axis_way(const Vector3& travel_mm, int axis, const FanucModel& model) noexcept {
   const double full_rate = model.rapid_rate_mm_per_s[axis];
   const double ramp_s = model.rapid_time_constant_s[axis];
   return {std::abs(travel_mm[axis]), full_rate * model.rapid_override,
@@ -23,7 +23,7 @@ Way axis_way(const Vector3& travel_mm, int axis, const ControllerModel& model) n
 }
 
 // fanuc.md B1: v = min_i(1420_i L/d_i), a = min_i(1420_i/1620_i L/d_i).
-Way straight_way(const Vector3& travel_mm, const ControllerModel& model) noexcept {
+Way straight_way(const Vector3& travel_mm, const FanucModel& model) noexcept {
   Way way;
   way.length_mm = travel_mm.norm();
   for (int i = 0; i < axis_count; ++i) {
@@ -80,9 +80,7 @@ Counts counts_by_trial(const Way& way, double period_s) {
   return counts;
 }
 
-int bell_periods(const ControllerModel& model) {
-  return countable(std::round(model.rapid_bell_time_s / model.period_s));
-}
+int bell_periods(const FanucModel& model) { return countable(std::round(model.rapid_bell_time_s / model.period_s)); }
 
 int periods_of(const RapidShape& shape, std::size_t axis) noexcept {
   return shape.travel[axis] > 0 ? shape.travel[axis] + shape.ramp[axis] + shape.bell : 0;
@@ -93,7 +91,7 @@ int periods_of(const RapidShape& shape) noexcept {
 }
 
 template <class CountsOf>
-RapidShape shape_of(const Vector3& travel_mm, const ControllerModel& model, CountsOf&& counts_of) {
+RapidShape shape_of(const Vector3& travel_mm, const FanucModel& model, CountsOf&& counts_of) {
   RapidShape shape;
   shape.bell = bell_periods(model);
   if (travel_mm.isZero(0.0)) {
@@ -128,16 +126,15 @@ double smoothing_share(int n, double decay) noexcept {
 
 }  // namespace
 
-RapidShape rapid_shape(const Vector3& travel_mm, const ControllerModel& model) {
+RapidShape rapid_shape(const Vector3& travel_mm, const FanucModel& model) {
   return shape_of(travel_mm, model, counts_in_closed_form);
 }
 
-double rapid_time_s(const Vector3& travel_mm, const ControllerModel& model) {
+double rapid_time_s(const Vector3& travel_mm, const FanucModel& model) {
   return periods_of(rapid_shape(travel_mm, model)) * model.period_s;
 }
 
-double in_position_wait_s(const Vector3& error_mm, const std::array<bool, axis_count>& moved,
-                          const ControllerModel& model) {
+double in_position_wait_s(const Vector3& error_mm, const std::array<bool, axis_count>& moved, const FanucModel& model) {
   double wait_s = 0.0;
   for (int i = 0; i < axis_count; ++i) {
     if (!moved[static_cast<std::size_t>(i)]) {
@@ -153,7 +150,7 @@ double in_position_wait_s(const Vector3& error_mm, const std::array<bool, axis_c
   return wait_s;
 }
 
-double in_position_wait_s(const Vector3& travel_mm, const ControllerModel& model) {
+double in_position_wait_s(const Vector3& travel_mm, const FanucModel& model) {
   const RapidShape shape = rapid_shape(travel_mm, model);
   const int longest = periods_of(shape);
   Vector3 error = Vector3::Zero();
@@ -176,7 +173,7 @@ double in_position_wait_s(const Vector3& travel_mm, const ControllerModel& model
   return in_position_wait_s(error, moved, model);
 }
 
-RapidPlayer::RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model)
+RapidPlayer::RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model)
     : start_mm_(start_mm), travel_mm_(end_mm - start_mm), end_mm_(end_mm) {
   check(model);
   const RapidShape shape = shape_of(travel_mm_, model, counts_by_trial);
@@ -214,7 +211,7 @@ bool RapidPlayer::step(Vector3& position) noexcept {
   return true;
 }
 
-Samples rapid_samples(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model) {
+Samples rapid_samples(const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model) {
   RapidPlayer player(start_mm, end_mm, model);
   Samples samples;
   samples.period_s = model.period_s;

@@ -1,13 +1,12 @@
 #include "shapegcode/path.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <string>
 #include <utility>
 
+#include "base/refuse.hpp"
 #include "path/arc_end.hpp"
 #include "shapegcode/error.hpp"
 
@@ -39,15 +38,15 @@ Path::Path(const Segments& segments) {
 
 void PathBuilder::add(const Segment& segment) {
   if (!std::isfinite(segment.length_mm) || !segment.start_mm.allFinite() || !segment.end_mm.allFinite()) {
-    throw Error(ErrorKind::argument, fmt::format("path segment {} has a coordinate that is not finite", size_),
+    throw Error(ErrorKind::argument, detail::message("path segment {} has a coordinate that is not finite", size_),
                 segment.line);
   }
   if (size_ > 0) {
     const double gap = (segment.start_mm - last_.end_mm).norm();
     if (gap > largest_gap_mm) {
       throw Error(ErrorKind::argument,
-                  fmt::format("path segment {} starts {:.3g} mm from the end of its predecessor (limit {} mm)", size_,
-                              gap, largest_gap_mm),
+                  detail::message("path segment {} starts {:.3g} mm from the end of its predecessor (limit {} mm)",
+                                  size_, gap, largest_gap_mm),
                   segment.line);
     }
     put(segment.start_mm);
@@ -66,7 +65,7 @@ void PathBuilder::put(const Vector3& next_mm) {
   }
   data.nodes.push_back({last_.start_mm, distance_mm_});
   data.feeds.push_back(last_.feed_mm_per_s);
-  data.places.push_back({line, kept});
+  data.sources.push_back({line, kept});
   distance_mm_ += last_.length_mm;
 }
 

@@ -1,13 +1,12 @@
 #include "shapegcode/path.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <string>
 
+#include "base/refuse.hpp"
 #include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 
@@ -16,7 +15,7 @@ namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
 
-std::string shown(const Vector3& p) { return fmt::format("({} {} {})", p[0], p[1], p[2]); }
+std::string shown(const Vector3& p) { return detail::message("({} {} {})", p[0], p[1], p[2]); }
 
 double pitch_mm_per_rad(const Segment& segment) noexcept {
   const int n = segment.normal;
@@ -90,15 +89,15 @@ Nearest nearest_on_arc(const Segment& segment, const Vector3& p) noexcept {
 Segment make_arc(const Vector3& start, const Vector3& end, const Vector3& centre, double sweep_rad, int normal,
                  double feed_mm_per_s, std::uint32_t line) {
   if (normal < 0 || normal > 2) {
-    throw Error(ErrorKind::argument, fmt::format("an arc turns about axis 0, 1 or 2, not {}", normal), line);
+    throw Error(ErrorKind::argument, detail::message("an arc turns about axis 0, 1 or 2, not {}", normal), line);
   }
   const ArcFrame frame(normal);
   // The height of the centre has no say.
   if (!start.allFinite() || !end.allFinite() || !frame.project(centre).allFinite() || !std::isfinite(sweep_rad) ||
       !std::isfinite(feed_mm_per_s)) {
     throw Error(ErrorKind::argument,
-                fmt::format("an arc needs finite numbers: start {}, end {}, centre {}, sweep {} rad, feed {} mm/s",
-                            shown(start), shown(end), shown(centre), sweep_rad, feed_mm_per_s),
+                detail::message("an arc needs finite numbers: start {}, end {}, centre {}, sweep {} rad, feed {} mm/s",
+                                shown(start), shown(end), shown(centre), sweep_rad, feed_mm_per_s),
                 line);
   }
   Segment segment = make_line(start, end, feed_mm_per_s, line);

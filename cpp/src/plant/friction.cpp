@@ -7,8 +7,8 @@
 
 namespace shapegcode {
 
-void FrictionParameters::check(const char* place) const {
-  const std::string of = std::string(" of the ") + place;
+void FrictionParameters::check(const char* part) const {
+  const std::string of = std::string(" of the ") + part;
   require_not_below_zero(viscous_n_s_per_m, "viscous friction" + of, "N s/m");
   if (model == FrictionModel::viscous) return;
   require_above_zero(coulomb_n, "Coulomb friction" + of, "N");

@@ -110,7 +110,7 @@ ModalPlant::ModalPlant(AxisModes modes, double period_s, AxisModeTables tables)
     }
   }
   first_[axis_count] = states_.size();
-  place_.resize(varying.size());
+  table_position_.resize(varying.size());
   varying_ = std::make_shared<const std::vector<Varying>>(std::move(varying));
   move_to(command_);
 }
@@ -139,43 +139,44 @@ ModalPlant::Varying ModalPlant::tabulate(std::size_t axis, std::size_t mode, con
 }
 
 void ModalPlant::move_to(const Vector3& position) noexcept {
-  for (std::size_t v = 0; v < place_.size(); ++v) {
+  for (std::size_t v = 0; v < table_position_.size(); ++v) {
     const Varying& varying = (*varying_)[v];
-    Place& place = place_[v];
+    TablePosition& found = table_position_[v];
     const double at = position[varying.table.axis];
-    if (at == place.position_mm && place.known) continue;
-    place = {at, 0, 0.0, true};
+    if (at == found.position_mm && found.known) continue;
+    found = {at, 0, 0.0, true};
     const std::vector<double>& rows = varying.table.position_mm;
     const auto above = static_cast<std::size_t>(std::upper_bound(rows.begin(), rows.end(), at) - rows.begin());
     if (above == rows.size()) {
-      place.node = varying.nodes.size() - 1;
+      found.node = varying.nodes.size() - 1;
     } else if (above > 0) {
       const std::size_t first = varying.first_node[above - 1];
       const std::size_t intervals = varying.first_node[above] - first;
       const double along = (at - rows[above - 1]) / (rows[above] - rows[above - 1]) * static_cast<double>(intervals);
       const std::size_t whole = std::min(static_cast<std::size_t>(along), intervals - 1);
-      place.node = first + whole;
-      place.share = along - static_cast<double>(whole);
+      found.node = first + whole;
+      found.share = along - static_cast<double>(whole);
     }
-    const Node& low = varying.nodes[place.node];
-    const Node& high = varying.nodes[std::min(place.node + 1, varying.nodes.size() - 1)];
+    const Node& low = varying.nodes[found.node];
+    const Node& high = varying.nodes[std::min(found.node + 1, varying.nodes.size() - 1)];
     Node& here = states_[first_[varying.axis] + varying.mode];
-    here.over_period = between(low.over_period, high.over_period, place.share);
-    here.decay_rate = low.decay_rate + place.share * (high.decay_rate - low.decay_rate);
-    here.damped_period_s = low.damped_period_s + place.share * (high.damped_period_s - low.damped_period_s);
+    here.over_period = between(low.over_period, high.over_period, found.share);
+    here.decay_rate = low.decay_rate + found.share * (high.decay_rate - low.decay_rate);
+    here.damped_period_s = low.damped_period_s + found.share * (high.damped_period_s - low.damped_period_s);
   }
 }
 
 void ModalPlant::move_sub_steps(std::size_t axis) noexcept {
   const std::size_t modes = first_[axis + 1] - first_[axis];
   const auto substeps = static_cast<std::size_t>(substeps_[axis]);
-  for (std::size_t v = 0; v < place_.size(); ++v) {
+  for (std::size_t v = 0; v < table_position_.size(); ++v) {
     const Varying& varying = (*varying_)[v];
     if (varying.axis != axis) continue;
-    const std::size_t next = std::min(place_[v].node + 1, varying.nodes.size() - 1);
+    const std::size_t next = std::min(table_position_[v].node + 1, varying.nodes.size() - 1);
     for (std::size_t k = 0; k < substeps; ++k) {
       sub_[first_sub_[axis] + k * modes + varying.mode] =
-          between(varying.sub[place_[v].node * substeps + k], varying.sub[next * substeps + k], place_[v].share);
+          between(varying.sub[table_position_[v].node * substeps + k], varying.sub[next * substeps + k],
+                  table_position_[v].share);
     }
   }
 }
@@ -254,7 +255,7 @@ inline void ModalPlant::step_only_mode(std::size_t axis, double jump) noexcept {
 }
 
 Vector3 ModalPlant::step(const Vector3& command) noexcept {
-  if (!place_.empty()) move_to(0.5 * (command_ + command));
+  if (!table_position_.empty()) move_to(0.5 * (command_ + command));
   const Vector3 velocity = (command - command_) * rate_hz_;
   const Vector3 jumps = velocity - command_velocity_;
   command_ = command;

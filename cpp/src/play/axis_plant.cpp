@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "base/checks.hpp"
-#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
+#include "shapegcode/fanuc_model.hpp"
 
 namespace shapegcode::detail {
 namespace {

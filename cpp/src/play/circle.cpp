@@ -8,7 +8,7 @@
 
 namespace shapegcode {
 
-CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const ControllerModel& model) {
+CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const FanucModel& model) {
   check(model);
   require_above_zero(radius_mm, "radius of a circle", "mm");
   require_above_zero(feed_mm_per_s, "feed on a circle", "mm/s");

@@ -7,8 +7,8 @@
 
 #include "play/function_clock.hpp"
 #include "play/program_runs.hpp"
-#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/motion.hpp"
 
 namespace shapegcode {
@@ -17,7 +17,7 @@ namespace {
 // Closed forms for the runs of one program.
 class Clock {
  public:
-  Clock(const Program& program, const ControllerModel& model, bool per_block)
+  Clock(const Program& program, const FanucModel& model, bool per_block)
       : program_(program),
         model_(model),
         per_block_(per_block),
@@ -52,9 +52,9 @@ class Clock {
  private:
   // The controller as it plays a run.
   struct Playing {
-    explicit Playing(ControllerModel controller)
+    explicit Playing(FanucModel controller)
         : model(std::move(controller)), filters(acceleration_filters(model)), periods(filter_periods(filters)) {}
-    ControllerModel model;
+    FanucModel model;
     std::vector<Fir> filters;
     int periods;  // that the filters add to a run
   };
@@ -221,7 +221,7 @@ class Clock {
   }
 
   const Program& program_;
-  const ControllerModel& model_;
+  const FanucModel& model_;
   bool per_block_;
   MotionLimits limits_;
   detail::FunctionClock function_clock_;
@@ -246,7 +246,7 @@ TimeParts& TimeParts::operator+=(const TimeParts& other) noexcept {
   return *this;
 }
 
-CycleTime time_program(const Program& program, const ControllerModel& model, bool per_block) {
+CycleTime time_program(const Program& program, const FanucModel& model, bool per_block) {
   check(model);
   return Clock(program, model, per_block).run();
 }

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/measure/contour.hpp"
 #include "shapegcode/path.hpp"
 

@@ -37,7 +37,7 @@ bool waits_for_rest(int code) noexcept { return code <= 4 || code == detail::too
 
 namespace detail {
 
-FunctionClock::FunctionClock(const Program& program, const ControllerModel& model) : model_(model) {
+FunctionClock::FunctionClock(const Program& program, const FanucModel& model) : model_(model) {
   if (model.last_tool_in_spindle) {
     std::int64_t selected = -1;
     for (const MachineFunction& function : program.functions) {

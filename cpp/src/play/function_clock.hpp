@@ -1,6 +1,6 @@
 #pragma once
 
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/program.hpp"
 
 namespace shapegcode::detail {
@@ -15,7 +15,7 @@ struct FunctionWait {
 /// its time is waited for where a machine waits, before the next cut, M code or stop of the program.
 class FunctionClock {
  public:
-  FunctionClock(const Program& program, const ControllerModel& model);
+  FunctionClock(const Program& program, const FanucModel& model);
 
   /// Of a block that begins at that time.
   [[nodiscard]] FunctionWait functions(const MachineFunction& function, double now_s);
@@ -28,7 +28,7 @@ class FunctionClock {
   /// What is left of it: all of it before the first block that takes time here.
   [[nodiscard]] double start_of_program() noexcept;
 
-  const ControllerModel& model_;
+  const FanucModel& model_;
   bool started_ = false;
   std::int64_t selected_ = -1;  // by the last T
   std::int64_t tool_ = -1;      // in the spindle; -1: not known

@@ -3,7 +3,7 @@
 
 namespace shapegcode {
 
-InterpolatedTime interpolate_program(const Program& program, const ControllerModel& model) {
+InterpolatedTime interpolate_program(const Program& program, const FanucModel& model) {
   detail::ProgramSetPoints set_points(program, model, detail::ProgramSetPoints::Waits::cut);
   for (detail::SetPoint next; set_points.step(next);) {
   }

@@ -48,7 +48,7 @@ OverrideFigures OverrideMaxima::at(double override_ratio) {
   }
   const BlockPlayer player(blocks_, options_.period_s, block_end_, override_ratio);
   followed_.assign(groups_.size(), false);
-  places_.resize(groups_.size());
+  starts_.resize(groups_.size());
   states_.resize(groups_.size() * modes_.size());
   deflection_mm_.assign(groups_.size(), 0.0);
   response_mm_.resize(groups_.size());
@@ -73,7 +73,7 @@ void OverrideMaxima::pass(BlockPlayer player) {
   bool started = false;
   std::size_t group = 0;
   const auto begin_group = [&] {
-    places_[group] = {player.block(), player.elapsed_s(), modes_.velocity_mm_per_s()};
+    starts_[group] = {player.block(), player.elapsed_s(), modes_.velocity_mm_per_s()};
     modes_.save(std::span(states_).subspan(group * modes_.size(), modes_.size()));
   };
   while (player.step(position)) {
@@ -150,9 +150,9 @@ bool OverrideMaxima::may_hold_response(std::size_t group) const noexcept {
 }
 
 Vector3 OverrideMaxima::begin_at(BlockPlayer& player, std::size_t group) noexcept {
-  const Place& place = places_[group];
-  modes_.load(std::span(states_).subspan(group * modes_.size(), modes_.size()), place.velocity_mm_per_s);
-  return player.begin_on(place.block, place.elapsed_s);
+  const GroupStart& start = starts_[group];
+  modes_.load(std::span(states_).subspan(group * modes_.size(), modes_.size()), start.velocity_mm_per_s);
+  return player.begin_on(start.block, start.elapsed_s);
 }
 
 // The distance from any piece of path near by is a bound; where the path turns, the tracker may hold to another one.

@@ -7,7 +7,7 @@
 #include "play/deviation_bounds.hpp"
 #include "play/free_modes.hpp"
 #include "play/path_walk.hpp"
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/measure/contour.hpp"
 #include "shapegcode/play.hpp"
 
@@ -27,7 +27,7 @@ class OverrideMaxima {
   [[nodiscard]] OverrideFigures at(double override_ratio);
 
  private:
-  struct Place {  // at the first set-point of a group
+  struct GroupStart {  // at the first set-point of a group
     std::size_t block = 0;
     double elapsed_s = 0.0;
     Vector3 velocity_mm_per_s = Vector3::Zero();
@@ -58,7 +58,7 @@ class OverrideMaxima {
   CornerReach command_reach_;
   CornerReach response_reach_;
   // Of each group:
-  std::vector<Place> places_;
+  std::vector<GroupStart> starts_;
   std::vector<double> states_;         // of the modes
   std::vector<double> deflection_mm_;  // no response is further from its command
   std::vector<double> response_mm_;    // no response is further from the path, nor a corner from its track

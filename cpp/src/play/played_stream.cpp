@@ -24,9 +24,10 @@ using Source = std::function<bool(SetPoint&)>;
 
 // Set-points of one run from rest to rest, then so many at rest as its filters need.
 template <class Player>
-class Run {
+class FilteredRun {
  public:
-  Run(Player player, const PlaybackOptions& options) : player_(std::move(player)), filters_(options.axis_filters) {}
+  FilteredRun(Player player, const PlaybackOptions& options)
+      : player_(std::move(player)), filters_(options.axis_filters) {}
 
   template <class LineOf>
   bool step(SetPoint& next, LineOf&& line_of) {
@@ -117,7 +118,8 @@ struct PlayedStream::Impl {
 
 PlayedStream::PlayedStream(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
                            const PlaybackOptions& options, double rest_s) {
-  auto run = std::make_shared<Run<Interpolator>>(Interpolator(path, std::move(profile), options.period_s), options);
+  auto run =
+      std::make_shared<FilteredRun<Interpolator>>(Interpolator(path, std::move(profile), options.period_s), options);
   impl_ = std::make_unique<Impl>(
       [run, path](SetPoint& next) {
         return run->step(
@@ -128,7 +130,7 @@ PlayedStream::PlayedStream(std::shared_ptr<const Path> path, std::shared_ptr<con
 
 PlayedStream::PlayedStream(std::shared_ptr<const Path> blocks, BlockEnd block_end, double override_ratio,
                            const PlaybackOptions& options, double rest_s) {
-  auto run = std::make_shared<Run<BlockPlayer>>(
+  auto run = std::make_shared<FilteredRun<BlockPlayer>>(
       BlockPlayer(blocks->segments(), options.period_s, block_end, override_ratio), options);
   impl_ = std::make_unique<Impl>(
       [run, blocks](SetPoint& next) {
@@ -137,7 +139,7 @@ PlayedStream::PlayedStream(std::shared_ptr<const Path> blocks, BlockEnd block_en
       options, rest_s);
 }
 
-PlayedStream::PlayedStream(std::shared_ptr<const Program> program, const ControllerModel& model,
+PlayedStream::PlayedStream(std::shared_ptr<const Program> program, const FanucModel& model,
                            const PlaybackOptions& options, std::vector<Vector3> region_offsets_mm, double rest_s) {
   if (!region_offsets_mm.empty() && region_offsets_mm.size() != program->regions.size()) {
     throw Error(ErrorKind::argument, fmt::format("{} offsets for {} regions: must be one for each",
@@ -149,12 +151,12 @@ PlayedStream::PlayedStream(std::shared_ptr<const Program> program, const Control
   }
   // What the set-points refer to lives with them.
   struct Played {
-    Played(std::shared_ptr<const Program> text, const ControllerModel& controller)
+    Played(std::shared_ptr<const Program> text, const FanucModel& controller)
         : program(std::move(text)),
           model(controller),
           set_points(*program, model, detail::ProgramSetPoints::Waits::played) {}
     std::shared_ptr<const Program> program;
-    ControllerModel model;
+    FanucModel model;
     detail::ProgramSetPoints set_points;
   };
   auto played = std::make_shared<Played>(std::move(program), model);

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "base/checks.hpp"
-#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
+#include "shapegcode/fanuc_model.hpp"
 
 namespace shapegcode::detail {
 namespace {
@@ -19,7 +19,7 @@ constexpr double junction_gap_mm = 1e-6;
 // one first: e = (1 - a) / K * sum of v (exp(-K t) - exp(-K (t + d))), t from a piece's end to the end of the command.
 class LagAtEnd {
  public:
-  LagAtEnd(const ControllerModel& model, double idle_s) : model_(model), until_end_s_(idle_s) {}
+  LagAtEnd(const FanucModel& model, double idle_s) : model_(model), until_end_s_(idle_s) {}
 
   void add(const Vector3& travel_mm, double duration_s) {
     for (int i = 0; i < axis_count; ++i) {
@@ -55,7 +55,7 @@ class LagAtEnd {
   }
 
  private:
-  const ControllerModel& model_;
+  const FanucModel& model_;
   double until_end_s_;
   Vector3 error_ = Vector3::Zero();
 };
@@ -101,26 +101,26 @@ std::size_t gather_run(const Program& program, std::size_t at, std::vector<Segme
   return at;
 }
 
-bool plays_shaped(const Region& region, const ControllerModel& model) noexcept {
+bool plays_shaped(const Region& region, const FanucModel& model) noexcept {
   return model.shaped_regions == ShapedRegions::all || (model.shaped_regions == ShapedRegions::marked && region.shaped);
 }
 
-bool plays_shaped_outside(const ControllerModel& model) noexcept { return model.shaped_regions == ShapedRegions::all; }
+bool plays_shaped_outside(const FanucModel& model) noexcept { return model.shaped_regions == ShapedRegions::all; }
 
-double checked_feed(const Segment& segment, const ControllerModel& model) {
+double checked_feed(const Segment& segment, const FanucModel& model) {
   if (segment.length_mm > 0.0 && !(segment.feed_mm_per_s > 0.0)) {
     throw Error(ErrorKind::argument, "block without a feed greater than zero", segment.line);
   }
   return controlled_feed_mm_per_s(segment, model);
 }
 
-MotionLimits overridden_limits(const ControllerModel& model) {
+MotionLimits overridden_limits(const FanucModel& model) {
   MotionLimits limits = model.limits;
   limits.feed_override *= model.feed_override;
   return limits;
 }
 
-PlannedEnd planned_end(const SpeedProfile& profile, const std::vector<Fir>& filters, const ControllerModel& model) {
+PlannedEnd planned_end(const SpeedProfile& profile, const std::vector<Fir>& filters, const FanucModel& model) {
   PlannedEnd end;
   const double jerk = std::round(profile.jerk_time_s() / model.period_s);
   const auto jerk_periods = static_cast<int>(require_count(jerk, most_filter_samples, "the jerk time", "periods"));
@@ -135,7 +135,7 @@ PlannedEnd planned_end(const SpeedProfile& profile, const std::vector<Fir>& filt
 }
 
 double wait_behind_blocks(const Path& path, double idle_periods, const std::vector<Fir>& filters,
-                          const ControllerModel& model) {
+                          const FanucModel& model) {
   const auto moved = moved_axes(last_moving(path));
   if (model.in_position == InPosition::measured) {
     return in_position_wait_s(Vector3::Zero(), moved, model);
@@ -161,7 +161,7 @@ double wait_behind_blocks(const Path& path, double idle_periods, const std::vect
 }
 
 double wait_behind_profile(const Path& path, const SpeedProfile& profile, const PlannedEnd& end,
-                           const ControllerModel& model) {
+                           const FanucModel& model) {
   const auto moved = moved_axes(last_moving(path));
   if (model.in_position == InPosition::measured) {
     return in_position_wait_s(Vector3::Zero(), moved, model);
@@ -180,7 +180,7 @@ double wait_behind_profile(const Path& path, const SpeedProfile& profile, const 
   return in_position_wait_s(lag.behind(end.smoothing), moved, model);
 }
 
-void lower_to_reached(std::span<BlockTime> rows, const ControllerModel& model) {
+void lower_to_reached(std::span<BlockTime> rows, const FanucModel& model) {
   if (model.filter_shape == FilterShape::exponential) {
     double speed = 0.0;
     for (BlockTime& row : rows) {

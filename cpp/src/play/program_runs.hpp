@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/filter.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/program.hpp"
@@ -28,14 +28,14 @@ inline constexpr int tool_change_code = 6;
 [[nodiscard]] std::size_t gather_run(const Program& program, std::size_t at, std::vector<Segment>& run);
 
 /// Whether a region, and whether a cut outside of the regions, is played as shaped blocks.
-[[nodiscard]] bool plays_shaped(const Region& region, const ControllerModel& model) noexcept;
-[[nodiscard]] bool plays_shaped_outside(const ControllerModel& model) noexcept;
+[[nodiscard]] bool plays_shaped(const Region& region, const FanucModel& model) noexcept;
+[[nodiscard]] bool plays_shaped_outside(const FanucModel& model) noexcept;
 
 /// Controlled feed of a block; throws Error(argument) where a move has none.
-[[nodiscard]] double checked_feed(const Segment& segment, const ControllerModel& model);
+[[nodiscard]] double checked_feed(const Segment& segment, const FanucModel& model);
 
 /// Limits of look-ahead with the model's feed override in them.
-[[nodiscard]] MotionLimits overridden_limits(const ControllerModel& model);
+[[nodiscard]] MotionLimits overridden_limits(const FanucModel& model);
 
 /// How a look-ahead run ends: whole duration and everything that smooths the profile.
 struct PlannedEnd {
@@ -44,17 +44,17 @@ struct PlannedEnd {
   std::vector<Fir> smoothing;
 };
 [[nodiscard]] PlannedEnd planned_end(const SpeedProfile& profile, const std::vector<Fir>& filters,
-                                     const ControllerModel& model);
+                                     const FanucModel& model);
 
 /// Wait for in-position behind an exact stop, in closed form. `idle_periods`: from the last block's end to its tick.
 [[nodiscard]] double wait_behind_blocks(const Path& path, double idle_periods, const std::vector<Fir>& filters,
-                                        const ControllerModel& model);
+                                        const FanucModel& model);
 [[nodiscard]] double wait_behind_profile(const Path& path, const SpeedProfile& profile, const PlannedEnd& end,
-                                         const ControllerModel& model);
+                                         const FanucModel& model);
 
 /// Lowers the feeds of a run's rows to what the acceleration lets them reach: the larger one of the mean feeds over the
 /// longest moving average before a block's end and behind its start; for exponential acceleration the feed at its end.
-void lower_to_reached(std::span<BlockTime> rows, const ControllerModel& model);
+void lower_to_reached(std::span<BlockTime> rows, const FanucModel& model);
 
 /// Rows of a look-ahead run, each with the highest speed of the profile on it.
 void append_rows(const Path& path, const SpeedProfile& profile, double start_s, std::vector<BlockTime>& rows);

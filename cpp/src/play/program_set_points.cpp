@@ -16,7 +16,7 @@ constexpr double settled_time_constants = 40.0;  // time constants of the servo 
 constexpr double tick_slack = 1e-9;
 constexpr double rounding_mm = 1e-9;  // between the end of a motion and the start of the next
 
-const ControllerModel& checked(const ControllerModel& model) {
+const FanucModel& checked(const FanucModel& model) {
   check(model);
   return model;
 }
@@ -37,7 +37,7 @@ std::uint32_t ProgramSetPoints::Cut::line() const {
   return blocks[std::get<BlockPlayer>(player).block()].line;
 }
 
-ProgramSetPoints::ProgramSetPoints(const Program& program, const ControllerModel& model, Waits waits)
+ProgramSetPoints::ProgramSetPoints(const Program& program, const FanucModel& model, Waits waits)
     : program_(program),
       model_(checked(model)),
       shaped_model_(for_shaped_blocks(model)),
@@ -202,7 +202,7 @@ void ProgramSetPoints::open_cut(const std::shared_ptr<const Path>& programmed, b
   if (!(programmed->length_mm() > 0.0)) {
     return;
   }
-  const ControllerModel& model = shaped ? shaped_model_ : model_;
+  const FanucModel& model = shaped ? shaped_model_ : model_;
   next_.kind = BlockKind::cutting;
   active_ = Cut{};
   Cut& cut = std::get<Cut>(active_);

@@ -11,7 +11,7 @@
 
 #include "play/filter_chain.hpp"
 #include "play/function_clock.hpp"
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/plant/servo_lag.hpp"
 #include "shapegcode/program.hpp"
@@ -39,7 +39,7 @@ class ProgramSetPoints {
     cut,     ///< only as many as the servo loop needs to settle; their whole time is counted
   };
   /// Program and model must outlive the object. Throws Error(argument) on a model that `check` refuses.
-  ProgramSetPoints(const Program& program, const ControllerModel& model, Waits waits);
+  ProgramSetPoints(const Program& program, const FanucModel& model, Waits waits);
   // A player of blocks holds a view of blocks that the object owns.
   ProgramSetPoints(const ProgramSetPoints&) = delete;
   ProgramSetPoints& operator=(const ProgramSetPoints&) = delete;
@@ -96,8 +96,8 @@ class ProgramSetPoints {
   void end_region();
 
   const Program& program_;
-  const ControllerModel& model_;
-  ControllerModel shaped_model_;
+  const FanucModel& model_;
+  FanucModel shaped_model_;
   Waits waits_;
   FilterChain filters_;
   FilterChain shaped_filters_;

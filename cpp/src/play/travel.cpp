@@ -15,7 +15,7 @@
 namespace shapegcode {
 namespace {
 
-constexpr double same_place_mm = 1e-6;
+constexpr double same_position_mm = 1e-6;
 constexpr double steepest = 0.05;  // share of the path in XY below which it counts as a plunge
 
 // Follows set-points along a path and keeps what happened between two stations.
@@ -70,10 +70,10 @@ class Follower {
     }
     const double speed = moves ? chip_travel(step) / (static_cast<double>(steps_.size()) * options_.period_s) : 0.0;
     // The period covers the stretches from where it began to where it ended.
-    advance(behind_mm_ + same_place_mm);
+    advance(behind_mm_ + same_position_mm);
     const std::size_t from = station_;
     behind_mm_ = tracker_.s_mm();
-    advance(behind_mm_ - same_place_mm);
+    advance(behind_mm_ - same_position_mm);
     for (std::size_t i = from; i <= station_; ++i) {
       result_.highest_mm_per_s[i] = std::max(result_.highest_mm_per_s[i], speed);
     }
@@ -88,11 +88,11 @@ class Follower {
     }
     // A stretch without length, as at a corner with a station on both sides, has the feed of the one before it; the
     // first one that of the next.
-    if (stations_.size() > 1 && stations_[0] < same_place_mm) {
+    if (stations_.size() > 1 && stations_[0] < same_position_mm) {
       result_.highest_mm_per_s[0] = result_.highest_mm_per_s[1];
     }
     for (std::size_t i = 1; i < stations_.size(); ++i) {
-      if (stations_[i] - stations_[i - 1] < same_place_mm) {
+      if (stations_[i] - stations_[i - 1] < same_position_mm) {
         result_.highest_mm_per_s[i] = std::max(result_.highest_mm_per_s[i], result_.highest_mm_per_s[i - 1]);
       }
     }

@@ -18,7 +18,7 @@
 namespace shapegcode {
 namespace {
 
-constexpr double same_place_mm = 1e-6;
+constexpr double same_position_mm = 1e-6;
 constexpr int most_feed_decimals = 4;
 constexpr double largest_sweep_by_radius = 0.5 * std::numbers::pi;
 constexpr std::size_t longest_line = 100000;  // the reader has held the program's own limit already
@@ -67,7 +67,7 @@ void for_each_line(const Program& program, const Region& region, Use use) {
   }
 }
 
-// Words that a piece of a block may hold; any other one could act once, or twice.
+// Words that a part of a block may hold; any other one could act once, or twice.
 bool is_plain(const Word& word) noexcept {
   constexpr std::string_view letters = "NFXYZIJR";
   constexpr std::array<double, 9> modal_codes = {1.0, 2.0, 3.0, 17.0, 40.0, 64.0, 90.0, 91.0, 94.0};
@@ -76,7 +76,7 @@ bool is_plain(const Word& word) noexcept {
 }
 
 bool divisible(const SourceLine& line, const Block& block, const Segment& segment, const FeedWriterOptions& options) {
-  // Each piece of a block with an exact stop would stop.
+  // Each part of a block with an exact stop would stop.
   if (line.count != 1 || segment.stop_at_end || block.optional_skip || block.macro ||
       !std::all_of(block.begin(), block.end(), is_plain)) {
     return false;
@@ -92,7 +92,7 @@ bool divisible(const SourceLine& line, const Block& block, const Segment& segmen
     }
     const double from = line.incremental ? segment.start_mm[axis] : 0.0;
     // A position in other coordinates, or one whose number was read in another way.
-    if (std::abs(word.value * options.unit_mm + from - segment.end_mm[axis]) > same_place_mm) {
+    if (std::abs(word.value * options.unit_mm + from - segment.end_mm[axis]) > same_position_mm) {
       return false;
     }
   }
@@ -116,11 +116,11 @@ class Writer {
     const double end = path_.distance_mm(line.first + line.count);
     std::vector<double> ends;
     std::vector<double> feeds;
-    while (stretch_ + 1 < stretches_.size() && stretches_[stretch_].end_mm <= begin + same_place_mm) {
+    while (stretch_ + 1 < stretches_.size() && stretches_[stretch_].end_mm <= begin + same_position_mm) {
       ++stretch_;
     }
     feeds.push_back(stretches_[stretch_].feed_mm_per_min);
-    for (std::size_t k = stretch_; k + 1 < stretches_.size() && stretches_[k].end_mm < end - same_place_mm; ++k) {
+    for (std::size_t k = stretch_; k + 1 < stretches_.size() && stretches_[k].end_mm < end - same_position_mm; ++k) {
       ends.push_back(stretches_[k].end_mm - begin);
       feeds.push_back(stretches_[k + 1].feed_mm_per_min);
     }
@@ -129,7 +129,7 @@ class Writer {
                   fmt::format("a feed changes within line {}, which cannot be divided", line.number));
     }
     ends.push_back(end - begin);
-    write_pieces(line, block, ends, feeds);
+    write_parts(line, block, ends, feeds);
   }
 
   RefedRegion finish() {
@@ -194,8 +194,8 @@ class Writer {
     end_line(line);
   }
 
-  void write_pieces(const SourceLine& line, const Block& block, const std::vector<double>& ends,
-                    const std::vector<double>& feeds) {
+  void write_parts(const SourceLine& line, const Block& block, const std::vector<double>& ends,
+                   const std::vector<double>& feeds) {
     const Segment& segment = path_[line.first];
     const bool whole = ends.size() == 1;
     Increments position = increments(segment.start_mm);
@@ -205,13 +205,13 @@ class Writer {
       result_.lines.push_back(line_count_);
       ++result_.blocks;
       const double sweep = std::abs(segment.sweep_rad) * (ends[k] - (k > 0 ? ends[k - 1] : 0.0)) / ends.back();
-      const Piece piece{segment, line.incremental, position, end, feeds[k] / options_.unit_mm, sweep};
+      const BlockPart part{segment, line.incremental, position, end, feeds[k] / options_.unit_mm, sweep};
       if (k == 0) {
-        write_first(line, block, piece, whole);
+        write_first(line, block, part, whole);
       } else {
-        write_further(block, piece);
+        write_further(block, part);
       }
-      modal_feed_ = piece.feed;
+      modal_feed_ = part.feed;
       position = end;
       if (last) {
         end_line(line);
@@ -222,7 +222,7 @@ class Writer {
     }
   }
 
-  struct Piece {
+  struct BlockPart {
     const Segment& segment;
     bool incremental;
     Increments start;
@@ -239,13 +239,13 @@ class Writer {
     return result;
   }
 
-  void append_position(const Piece& piece, std::size_t axis) {
-    append_decimal(result_.text, piece.end[axis] - (piece.incremental ? piece.start[axis] : 0),
+  void append_position(const BlockPart& part, std::size_t axis) {
+    append_decimal(result_.text, part.end[axis] - (part.incremental ? part.start[axis] : 0),
                    options_.position_decimals);
   }
 
-  // The words of the original, but for feed and, of a first piece, the end.
-  void write_first(const SourceLine& line, const Block& block, const Piece& piece, bool whole) {
+  // The words of the original, but for feed and, of a first part, the end.
+  void write_first(const SourceLine& line, const Block& block, const BlockPart& part, bool whole) {
     std::size_t at = 0;
     std::size_t behind_words = 0;  // where an F may stand: before comments
     bool has_feed = false;
@@ -257,59 +257,59 @@ class Writer {
       text += line.text.substr(at, (replaced ? word.column - 1 : word.end) - at);
       at = word.end;
       if (word.letter == 'F') {
-        append_feed_word(piece.feed);
+        append_feed_word(part.feed);
         has_feed = true;
       } else if (replaced && is_axis) {
         text += word.letter;
         const auto axis = static_cast<std::size_t>(word.letter - 'X');
-        append_position(piece, axis);
+        append_position(part, axis);
         written[axis] = true;
       } else if (replaced) {
-        append_radius(std::abs(word.value), piece);
+        append_radius(std::abs(word.value), part);
       }
       behind_words = text.size();
     }
     std::string added;
     std::swap(added, text);
     if (!whole) {
-      append_missing_axes(piece, written);
+      append_missing_axes(part, written);
     }
-    if (!has_feed && !same_feed(piece.feed, modal_feed_)) {
-      append_feed_word(piece.feed);
+    if (!has_feed && !same_feed(part.feed, modal_feed_)) {
+      append_feed_word(part.feed);
     }
     std::swap(added, text);
     text.insert(behind_words, added);
     text += line.text.substr(at);
   }
 
-  void write_further(const Block& block, const Piece& piece) {
-    append_missing_axes(piece, {});
+  void write_further(const Block& block, const BlockPart& part) {
+    append_missing_axes(part, {});
     for (const Word& word : block) {
       if (word.letter == 'R') {
-        append_radius(std::abs(word.value), piece);
+        append_radius(std::abs(word.value), part);
       } else if (word.letter == 'I' || word.letter == 'J') {
-        append_centre(piece);
+        append_centre(part);
         break;
       }
     }
-    if (!same_feed(piece.feed, modal_feed_)) {
-      append_feed_word(piece.feed);
+    if (!same_feed(part.feed, modal_feed_)) {
+      append_feed_word(part.feed);
     }
   }
 
-  void append_missing_axes(const Piece& piece, const std::array<bool, axis_count>& written) {
+  void append_missing_axes(const BlockPart& part, const std::array<bool, axis_count>& written) {
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
-      if (!written[axis] && piece.end[axis] != piece.start[axis]) {
+      if (!written[axis] && part.end[axis] != part.start[axis]) {
         result_.text += static_cast<char>('X' + axis);
-        append_position(piece, axis);
+        append_position(part, axis);
       }
     }
   }
 
   // Where an arc turns far, the increment by which its end is rounded moves the centre that R stands for.
-  void append_radius(double radius, const Piece& piece) {
-    if (piece.sweep_rad > largest_sweep_by_radius) {
-      append_centre(piece);
+  void append_radius(double radius, const BlockPart& part) {
+    if (part.sweep_rad > largest_sweep_by_radius) {
+      append_centre(part);
       return;
     }
     result_.text += 'R';
@@ -317,11 +317,11 @@ class Writer {
                    options_.position_decimals);
   }
 
-  void append_centre(const Piece& piece) {
+  void append_centre(const BlockPart& part) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const std::int64_t centre =
-          std::llround(piece.segment.centre_mm[static_cast<Eigen::Index>(axis)] / options_.increment_mm);
-      const std::int64_t value = options_.absolute_centres ? centre : centre - piece.start[axis];
+          std::llround(part.segment.centre_mm[static_cast<Eigen::Index>(axis)] / options_.increment_mm);
+      const std::int64_t value = options_.absolute_centres ? centre : centre - part.start[axis];
       if (value != 0 || options_.absolute_centres || axis == 0) {
         result_.text += static_cast<char>('I' + axis);
         append_decimal(result_.text, value, options_.position_decimals);
@@ -371,8 +371,8 @@ std::vector<bool> divisible_segments(const Program& program, const Region& regio
 
 RefedRegion write_feeds(const Program& program, const Region& region, std::span<const FeedStretch> stretches,
                         const FeedWriterOptions& options) {
-  if (stretches.empty() || stretches.front().begin_mm > same_place_mm ||
-      std::abs(stretches.back().end_mm - region.path->length_mm()) > same_place_mm) {
+  if (stretches.empty() || stretches.front().begin_mm > same_position_mm ||
+      std::abs(stretches.back().end_mm - region.path->length_mm()) > same_position_mm) {
     throw Error(ErrorKind::argument,
                 fmt::format("the stretches of a feed schedule must cover the region's path of {:g} mm",
                             region.path->length_mm()));

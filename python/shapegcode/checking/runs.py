@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import controller_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program
 
 _CUTTING, _RAPID, _DWELL = (
@@ -198,7 +198,7 @@ def _clamped_feeds(
 
 def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDArray[Any]:
     """One row per move in slow motion, without any acceleration: length over feed."""
-    model = controller_model(machine, feed_override=_SLOW_MOTION, shaped=False)
+    model = fanuc_model(machine, feed_override=_SLOW_MOTION, shaped=False)
     model.motion = _core.MotionKind.after_interpolation
     model.filter_shape = _core.FilterShape.linear
     model.block_end = _core.BlockEnd.carry

@@ -267,7 +267,7 @@ class MeasuredRegion:
 
     lines: tuple[int, int]  # of the program whose path it is measured against, first and last, from 1
     path: _core.Path  # that path
-    figures: _core.RunFigures  # what the core measured
+    figures: _core.TrackFigures  # what the core measured
     sections: tuple[MeasuredSection, ...]  # of the path, in order
     station_spacing_mm: float  # largest distance between two places at which walls were measured
 

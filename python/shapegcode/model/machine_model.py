@@ -28,12 +28,12 @@ from shapegcode.model.modes import (
 )
 
 
-def controller_model(
+def fanuc_model(
     machine: Machine, *, feed_override: float = 1.0, rapid_override: float = 1.0, shaped: bool | None = None
-) -> _core.ControllerModel:
+) -> _core.FanucModel:
     """The controller of a machine as the core times and simulates it."""
     controller = machine.controller
-    model = _core.ControllerModel()
+    model = _core.FanucModel()
     model.period_s = controller.interpolation_period_s
     model.block_end = getattr(_core.BlockEnd, controller.block_end)
     model.motion = getattr(_core.MotionKind, controller.motion)
@@ -153,7 +153,7 @@ class PlayingController:
         override: feed override, 1 = 100 %.
     """
 
-    def __init__(self, model: _core.ControllerModel, override: float = 1.0) -> None:
+    def __init__(self, model: _core.FanucModel, override: float = 1.0) -> None:
         self.model = model
         self._override = override
         model.limits.feed_override *= override
@@ -237,12 +237,12 @@ class MachineModel:
     @cached_property
     def ordinary(self) -> PlayingController:
         """The controller as it simulates an ordinary program."""
-        return PlayingController(controller_model(self.machine))
+        return PlayingController(fanuc_model(self.machine))
 
     @cached_property
     def shaped(self) -> PlayingController:
         """The controller as it simulates shaped blocks: one by one, without look-ahead."""
-        model = _core.for_shaped_blocks(controller_model(self.machine))
+        model = _core.for_shaped_blocks(fanuc_model(self.machine))
         model.block_end = self.own_rule
         return PlayingController(model)
 
@@ -343,7 +343,7 @@ class MachineModel:
         options.record_samples = record_samples
         controller = self.ordinary
         if override != 1.0:
-            controller = PlayingController(controller_model(self.machine), override)
+            controller = PlayingController(fanuc_model(self.machine), override)
         return controller.play(path, options, against=against)
 
     def play_rapid(

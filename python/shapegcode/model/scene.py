@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import MachineModel, controller_model
+from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import axis_modes
 from shapegcode.model.stream import Chunk, stream
 from shapegcode.program import Program
@@ -128,7 +128,7 @@ def _variant(
     on_progress: Callable[[float], None],
 ) -> tuple[Variant, list[SceneSpectrum], Kept]:
     period_s = MachineModel(machine).period_s
-    whole_s = _core.time_program(program.core, controller_model(machine)).total_s or period_s
+    whole_s = _core.time_program(program.core, fanuc_model(machine)).total_s or period_s
     cuts = [_Nominal(mine.first_line, mine.last_line, other.path) for mine, other in paired_regions(program, nominal)]
     followed = _Followed(sorted(cuts, key=lambda cut: cut.first_line))
     thinner, spectrum = Thinner(_scales(nominal), most_points), AccelerationSpectrum(period_s)

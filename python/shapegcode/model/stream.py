@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import MachineModel, controller_model
+from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import Offset
 from shapegcode.program import Program, given_program
 
@@ -136,7 +136,7 @@ def stream(
     model = MachineModel(machine)
     offsets, known = _offsets(program, model)
     options = model.options(plant=plant, offset=known)
-    controller = controller_model(machine, shaped=shaped)
+    controller = fanuc_model(machine, shaped=shaped)
     played = _core.PlayedStream.of_program(program.core, controller, options, offsets, REST_S)
     return _chunks(played, model.period_s, lines, chunk_samples)
 

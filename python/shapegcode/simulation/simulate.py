@@ -12,7 +12,7 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import MachineModel, controller_model
+from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import Offset, machine_warnings, region_range_warnings
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
@@ -118,7 +118,7 @@ def simulate(
         plant=plant,
         shaped=any(run.shaped for run in runs),
         measured_against=(against or program).source,
-        cycle_time_s=_core.time_program(program.core, controller_model(machine, shaped=shaped)).total_s,
+        cycle_time_s=_core.time_program(program.core, fanuc_model(machine, shaped=shaped)).total_s,
         cutting_time_s=cutting_s,
         residual_vibration_um=largest_xyz_um(figures.residual_mm for figures in played),
         peak_vibration_um=largest_xyz_um(figures.peak_mm for figures in played),
@@ -180,7 +180,7 @@ def play_motion(
     program = given_program(program, machine)
     model = MachineModel(machine)
     chunks = stream(program, machine, plant=plant, shaped=shaped, lines=lines)
-    whole_s = _core.time_program(program.core, controller_model(machine, shaped=shaped)).total_s or model.period_s
+    whole_s = _core.time_program(program.core, fanuc_model(machine, shaped=shaped)).total_s or model.period_s
     recorder = MotionRecorder(model.period_s)
     with contextlib.ExitStack() as files:
         written = [

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import controller_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program
@@ -66,7 +66,7 @@ def cycle_time(
         feed_override = machine.times.feed_override_percent / 100.0
     if rapid_override is None:
         rapid_override = machine.times.rapid_override_percent / 100.0
-    model = controller_model(machine, feed_override=feed_override, rapid_override=rapid_override)
+    model = fanuc_model(machine, feed_override=feed_override, rapid_override=rapid_override)
     timed = _core.time_program(program.core, model, per_block)
     slowest, limit_s = min(feed_override, rapid_override, 1.0), machine.controller.max_program_s
     if full and slowest < 1.0 and timed.total_s > limit_s:

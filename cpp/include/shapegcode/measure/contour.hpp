@@ -47,9 +47,9 @@ enum class PathSide : std::uint8_t {
 /// True distance of a moving point to the programmed path (not the tracking error in time), following the path
 /// forward. Positive on the left of the direction of travel seen along the tool axis (+Z looking down), negative on
 /// the right; a deviation along Z only, or from a travel along Z only, is positive above. Amortised O(1) per sample, no
-/// allocation after construction; a step looks at the pieces of the path that may be nearest and passes others in
-/// groups, so that its work has no other bound than how many pieces lie equally near. Reads the path: it keeps no copy
-/// of it.
+/// allocation after construction; a step looks at the segments of the path that may be nearest and passes others in
+/// groups, so that its work has no other bound than how many segments lie equally near. Reads the path: it keeps no
+/// copy of it.
 ///
 /// The foot point is searched within an arc length that the last step and the last deviation allow, so that another
 /// pass of the path nearby is not mistaken for the present one. On a path that turns back on itself the outward and the
@@ -77,23 +77,23 @@ class ContourTracker {
  private:
   static constexpr double reach_mm = 0.01;
   static constexpr std::size_t slots = 16;
-  static constexpr std::size_t no_piece = std::numeric_limits<std::size_t>::max();
+  static constexpr std::size_t no_segment = std::numeric_limits<std::size_t>::max();
 
   /// What a search needs of one segment.
-  struct Piece {
+  struct NearSegment {
     Vector3 start;
-    Vector3 direction;  // unit; of the neighbour if the piece has no length
+    Vector3 direction;  // unit; of the neighbour if the segment has no length
     double length;
     double s;          // of the start, from the path's start
-    double next_s;     // of the next piece's start
+    double next_s;     // of the next segment's start
     std::int32_t arc;  // -1 for a line
     bool has_side;     // the direction is not along Z
     double across2;    // of the direction: the square of what is not along Z
   };
-  /// The piece last asked for of those that share its place.
+  /// The segment last asked for of those that share its slot.
   struct Slot {
-    std::size_t piece = no_piece;
-    Piece of{};
+    std::size_t index = no_segment;
+    NearSegment of{};
   };
   struct Arc {
     Segment segment;
@@ -105,7 +105,7 @@ class ContourTracker {
   };
   struct Foot {
     double distance2 = 0.0;
-    double along = 0.0;                 // distance from the piece's start
+    double along = 0.0;                 // distance from the segment's start
     Vector3 offset = Vector3::Zero();   // foot to point
     Vector3 tangent = Vector3::Zero();  // arcs only
   };
@@ -120,42 +120,42 @@ class ContourTracker {
   };
   struct Found {
     Foot foot;
-    std::size_t piece;
+    std::size_t index;
     double s;  // of the foot, from the path's start
   };
-  /// Lines in a row that all run nearly as the piece in their midst does.
+  /// Lines in a row that all run nearly as the segment in their midst does.
   struct Straight {
-    std::size_t about = no_piece;
-    Vector3 direction = Vector3::Zero();              // of that piece
-    std::size_t first = 0, last = 0;                  // pieces
+    std::size_t about = no_segment;
+    Vector3 direction = Vector3::Zero();              // of that segment
+    std::size_t first = 0, last = 0;                  // segments
     double begin = 0.0, end = 0.0;                    // mm from the path's start; infinite where the path ends
     bool turns_before = false, turns_behind = false;  // what lies beside them does not run so
   };
 
-  [[nodiscard]] Foot foot_on(const Piece& piece, const Vector3& p, const Window& window) const noexcept;
-  [[nodiscard]] Foot foot_on_arc(const Piece& piece, const Vector3& p, const Window& window) const noexcept;
+  [[nodiscard]] Foot foot_on(const NearSegment& part, const Vector3& p, const Window& window) const noexcept;
+  [[nodiscard]] Foot foot_on_arc(const NearSegment& part, const Vector3& p, const Window& window) const noexcept;
   /// Newton on the derivative of half the squared distance from `u` on, kept within `turns`.
   [[nodiscard]] static double refined_foot(const Arc& arc, const Vector3& p, const Polar& polar, const Turns& turns,
                                            double u) noexcept;
   [[nodiscard]] static Foot arc_point_foot(const Arc& arc, double u, const Vector3& p) noexcept;
-  /// Whether no point of so many pieces lies within the root of `limit2` from `p`.
+  /// Whether no point of so many segments lies within the root of `limit2` from `p`.
   [[nodiscard]] bool is_beyond(std::size_t first, std::size_t size, const Vector3& p, double limit2) const noexcept;
-  /// How many pieces from `first` on, or before `end`, need not be looked at one by one; 0: none.
+  /// How many segments from `first` on, or before `end`, need not be looked at one by one; 0: none.
   [[nodiscard]] std::size_t group_from(std::size_t first, const Vector3& p, double limit2) const noexcept;
   [[nodiscard]] std::size_t group_before(std::size_t end, const Vector3& p, double limit2) const noexcept;
   /// `bound`: says how far the foot may lie from the path's start; asked where it matters.
   template <typename Bound>
   double follow(const Vector3& p, const Bound& bound) noexcept;
   double follow_any(const Vector3& p, double move, const Window& window, double bound) noexcept;
-  /// Whether all of the path within the window, and the next piece, runs nearly as the present one.
+  /// Whether all of the path within the window, and the next segment, runs nearly as the present one.
   [[nodiscard]] bool runs_straight(const Window& window) noexcept;
   void straighten() noexcept;
-  [[nodiscard]] bool runs_along(std::size_t piece) const noexcept;
+  [[nodiscard]] bool runs_along(std::size_t index) const noexcept;
   /// `bound`: no foot lies further from the path's start.
   [[nodiscard]] Found search(const Vector3& p, double move, const Window& window, double bound) const noexcept;
   [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
-  [[nodiscard]] Vector3 start_tangent(std::size_t piece) const noexcept;
-  [[nodiscard]] Vector3 end_tangent(std::size_t piece) const noexcept;
+  [[nodiscard]] Vector3 start_tangent(std::size_t index) const noexcept;
+  [[nodiscard]] Vector3 end_tangent(std::size_t index) const noexcept;
 
   /// The path as a search wants it; constant, so that copies of a tracker share it.
   struct Geometry {
@@ -166,18 +166,18 @@ class ContourTracker {
   [[nodiscard]] static std::shared_ptr<const Geometry> geometry_of(const Path& path);
   [[nodiscard]] static Arc arc_of(const Segment& segment) noexcept;
 
-  [[nodiscard]] std::size_t pieces() const noexcept { return geometry_->path.size(); }
-  [[nodiscard]] double begin_mm(std::size_t piece) const noexcept { return geometry_->path.distance_mm(piece); }
-  [[nodiscard]] const Piece& at(std::size_t i) const noexcept {
+  [[nodiscard]] std::size_t segments() const noexcept { return geometry_->path.size(); }
+  [[nodiscard]] double begin_mm(std::size_t index) const noexcept { return geometry_->path.distance_mm(index); }
+  [[nodiscard]] const NearSegment& at(std::size_t i) const noexcept {
     Slot& slot = slots_[i % slots];
-    if (slot.piece != i) slot = {i, piece_of(i)};
+    if (slot.index != i) slot = {i, near_segment_of(i)};
     return slot.of;
   }
-  [[nodiscard]] Piece piece_of(std::size_t i) const noexcept;
-  [[nodiscard]] Piece bare_piece_of(std::size_t i) const noexcept;
+  [[nodiscard]] NearSegment near_segment_of(std::size_t i) const noexcept;
+  [[nodiscard]] NearSegment bare_segment_of(std::size_t i) const noexcept;
 
   std::shared_ptr<const Geometry> geometry_;
-  mutable std::array<Slot, slots> slots_{};  // pieces around the point, worked out once
+  mutable std::array<Slot, slots> slots_{};  // segments around the point, worked out once
   Vector3 last_ = Vector3::Zero();
   std::size_t cursor_ = 0;
   double s_ = 0.0;
@@ -187,7 +187,7 @@ class ContourTracker {
   double height_ = 0.0;        // of the last sample above its foot
   std::uint32_t growing_ = 0;  // samples since the deviation began to grow
   Straight straight_;
-  Window near_{std::numeric_limits<double>::infinity(), 0.0};  // for which it runs straight about the present piece
+  Window near_{std::numeric_limits<double>::infinity(), 0.0};  // for which it runs straight about the present segment
 };
 
 /// Orbit error of every arc of a path: area between the moving point's track and the programmed arc, divided by the
@@ -242,7 +242,7 @@ class CornerReach {
     Vector3 point;
     double s = 0.0;         // from the path's start
     double best2 = 0.0;     // squared distance to the track; infinite before the point was near
-    std::uint32_t tag = 0;  // of the sample at the end of the nearest piece of track
+    std::uint32_t tag = 0;  // of the sample at the end of the nearest segment of track
   };
 
   /// Corners are junctions at which the direction changes by `least_angle_rad` or more, and the path's end.

@@ -249,8 +249,8 @@ struct SectionFigures {
   std::optional<Roughness> right_roughness;
 };
 
-/// Figures of a whole run.
-struct RunFigures {
+/// Figures of all samples measured.
+struct TrackFigures {
   std::vector<SectionFigures> sections;
   double duration_s = 0.0;  ///< until the command rests for the last time
   RestVibration rest;       ///< the stop at the end
@@ -274,7 +274,7 @@ class SectionMetrology {
   /// the caller excludes.
   void step(const Vector3& command, const Vector3& response) noexcept;
   /// Everything measured so far. May be called once more after further samples.
-  [[nodiscard]] RunFigures finish() const;
+  [[nodiscard]] TrackFigures finish() const;
   /// Deviations of the walls at the stations of a section.
   [[nodiscard]] SweptWalls::Profile wall_profile(std::size_t section) const { return walls_.profile(section); }
   [[nodiscard]] const std::vector<PathSection>& sections() const noexcept { return sections_; }

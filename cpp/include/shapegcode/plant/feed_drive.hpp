@@ -31,8 +31,8 @@ struct FrictionParameters {
   double bristle_stiffness_n_per_m = 0.0;   ///< LuGre, sigma0: force over displacement before sliding; > 0
   double bristle_damping_n_s_per_m = 0.0;   ///< LuGre, sigma1; >= 0
 
-  /// Throws Error(argument) with the value and its limit; `place` begins the message ("friction of the table").
-  void check(const char* place) const;
+  /// Throws Error(argument) with the value and its limit; `part` begins the message ("friction of the table").
+  void check(const char* part) const;
   [[nodiscard]] bool has_bristles() const noexcept { return model == FrictionModel::lugre; }
 };
 

@@ -120,7 +120,7 @@ class ModalPlant {
     std::vector<Transition> sub;  // times participation; node, end of sub-step
   };
   /// Where in its nodes a varying mode stands.
-  struct Place {
+  struct TablePosition {
     double position_mm = 0.0;
     std::size_t node = 0;
     double share = 0.0;  // of the next node
@@ -162,7 +162,7 @@ class ModalPlant {
   std::array<std::size_t, axis_count> first_sub_{};      // where an axis' sub-step matrices begin
   std::vector<Transition> sub_;                          // times participation; axis, end of sub-step, mode
   std::shared_ptr<const std::vector<Varying>> varying_;  // never changes: copies of the plant share it
-  std::vector<Place> place_;                             // one per varying mode
+  std::vector<TablePosition> table_position_;            // one per varying mode
   std::int64_t row_ = 0;                                 // set-points since reset()
   Vector3 command_ = Vector3::Zero();
   Vector3 command_velocity_ = Vector3::Zero();

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/text.hpp"
 #include "program/interpret/interpreter_impl.hpp"
+#include "program/text/characters.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode::detail {
@@ -28,15 +28,15 @@ void Interpreter::alarm(int number, const std::string& message, std::uint32_t co
 
 void Interpreter::warn_at(const LineOrigin& origin, const std::string& message) {
   Warned& warned = warned_[message];
-  if (warned.places.contains({origin.file, origin.line})) {
+  if (warned.lines.contains({origin.file, origin.line})) {
     return;
   }
-  if (warned.places.size() >= most_warnings_of_one_kind) {
+  if (warned.lines.size() >= most_warnings_of_one_kind) {
     ++warned.further;
     warned.last = origin;
     return;
   }
-  warned.places.emplace(origin.file, origin.line);
+  warned.lines.emplace(origin.file, origin.line);
   program_.warnings.push_back({origin.line, message, 0, 0, program_.files[origin.file]});
 }
 

@@ -52,7 +52,7 @@ class Interpreter {
   /// Ends an open region: the next line is not part of it.
   void close_region();
   void warn(const std::string& message) { warn_at(origin_, message); }
-  /// Each place once, however often it is executed; of one message only the first ones, and how many more there are.
+  /// Each line once, however often it is executed; of one message only the first ones, and how many more there are.
   void warn_at(const LineOrigin& origin, const std::string& message);
   /// After something whose effect is not known.
   void forget_all() noexcept { state_.known = {false, false, false}; }
@@ -155,7 +155,7 @@ class Interpreter {
   std::array<bool, axis_count> local_offset_uncertain_ = {false, false, false};  ///< set in a '/' block
   CannedCycle cycle_;
   struct Warned {
-    std::set<std::pair<std::uint32_t, std::uint32_t>> places;  ///< file and line
+    std::set<std::pair<std::uint32_t, std::uint32_t>> lines;  ///< file and number
     std::uint64_t further = 0;
     LineOrigin last;
   };

@@ -297,7 +297,7 @@ class Parser {
   }
 
   Value function() {
-    const Place at{line_, i_};
+    const TextPosition at{line_, i_};
     const std::string_view run = letters_at(text_, i_);
     Function function{};
     if (!find_function(run, function)) {

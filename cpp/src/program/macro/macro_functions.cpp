@@ -56,11 +56,11 @@ SineCosine sine_cosine(double degrees) noexcept {
   }
 }
 
-[[noreturn]] void out_of_range(const std::string& what, double value, const std::string& limit, Place at) {
+[[noreturn]] void out_of_range(const std::string& what, double value, const std::string& limit, TextPosition at) {
   fail(119, what + " of " + shown(value) + ", which must be " + limit, at.line, at.index);
 }
 
-std::int32_t to_bits(double value, Place at) {
+std::int32_t to_bits(double value, TextPosition at) {
   const double whole = std::round(value);
   if (!(std::abs(whole) <= 2147483647.0)) {
     out_of_range("logical operation", value, "within +-2147483647", at);
@@ -69,7 +69,7 @@ std::int32_t to_bits(double value, Place at) {
 }
 
 // Eight decimal digits, four bits each.
-double bcd_to_number(double value, Place at) {
+double bcd_to_number(double value, TextPosition at) {
   const double whole = std::round(value);
   if (!(whole >= 0.0 && whole <= 4294967295.0)) {
     out_of_range("BIN", value, "0 ... 99999999 in binary coded decimals", at);
@@ -85,7 +85,7 @@ double bcd_to_number(double value, Place at) {
   return number;
 }
 
-double number_to_bcd(double value, Place at) {
+double number_to_bcd(double value, TextPosition at) {
   const double whole = std::round(value);
   if (!(whole >= 0.0 && whole <= 99999999.0)) {
     out_of_range("BCD", value, "0 ... 99999999", at);
@@ -98,7 +98,7 @@ double number_to_bcd(double value, Place at) {
   return bcd;
 }
 
-double arc_sine_or_cosine(Function function, double x, bool signed_angles, Place at) {
+double arc_sine_or_cosine(Function function, double x, bool signed_angles, TextPosition at) {
   const bool is_sine = function == Function::arc_sine;
   if (!(x >= -1.0 && x <= 1.0)) {
     out_of_range(is_sine ? "ASIN" : "ACOS", x, "within -1 ... 1", at);
@@ -128,14 +128,14 @@ bool find_function(std::string_view run, Function& function) noexcept {
   return false;
 }
 
-double finite(double value, Place at) {
+double finite(double value, TextPosition at) {
   if (!std::isfinite(value)) {
     fail(111, "the result is too large to hold", at.line, at.index);
   }
   return value;
 }
 
-double arc_tangent(double y, double x, bool signed_angles, Place at) {
+double arc_tangent(double y, double x, bool signed_angles, TextPosition at) {
   if (x == 0.0 && y == 0.0) {
     fail(112, "ATAN[0]/[0] has no direction", at.line, at.index);
   }
@@ -143,7 +143,7 @@ double arc_tangent(double y, double x, bool signed_angles, Place at) {
   return angle < 0.0 && !signed_angles ? angle + 360.0 : angle;
 }
 
-double power(double x, double y, Place at) {
+double power(double x, double y, TextPosition at) {
   if (x == 0.0 && y < 0.0) {
     fail(112, "POW of 0 to the negative power " + shown(y) + " divides by zero", at.line, at.index);
   }
@@ -153,7 +153,7 @@ double power(double x, double y, Place at) {
   return finite(std::pow(x, y), at);
 }
 
-double apply(Function function, double x, int round_decimals, bool signed_angles, Place at) {
+double apply(Function function, double x, int round_decimals, bool signed_angles, TextPosition at) {
   switch (function) {
     case Function::sine:
       return sine_cosine(x).sine;
@@ -201,7 +201,7 @@ double apply(Function function, double x, int round_decimals, bool signed_angles
   fail(114, "POW takes two arguments: POW[base,exponent]", at.line, at.index);
 }
 
-double combine(Operator op, double a, double b, Place at) {
+double combine(Operator op, double a, double b, TextPosition at) {
   switch (op) {
     case Operator::multiply:
       return finite(a * b, at);

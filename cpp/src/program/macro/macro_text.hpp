@@ -8,8 +8,8 @@
 #include <string>
 #include <string_view>
 
-#include "base/text.hpp"
 #include "program/macro/macro_expression.hpp"
+#include "program/text/characters.hpp"
 #include "program/text/lexer.hpp"
 
 namespace shapegcode::macro {
@@ -53,7 +53,7 @@ MacroValue evaluate_operand(std::string_view text, std::size_t& i, std::uint32_t
                             int round_decimals);
 
 /// Where in the text an operation stands.
-struct Place {
+struct TextPosition {
   std::uint32_t line;
   std::size_t index;
 };
@@ -79,9 +79,9 @@ enum class Function : std::uint8_t {
 };
 /// Whether `run` names a function (or abbreviates one).
 bool find_function(std::string_view run, Function& function) noexcept;
-double apply(Function function, double x, int round_decimals, bool signed_angles, Place at);
-double arc_tangent(double y, double x, bool signed_angles, Place at);
-double power(double x, double y, Place at);
+double apply(Function function, double x, int round_decimals, bool signed_angles, TextPosition at);
+double arc_tangent(double y, double x, bool signed_angles, TextPosition at);
+double power(double x, double y, TextPosition at);
 
 /// Operators between two numbers.
 enum class Operator : std::uint8_t {
@@ -101,10 +101,10 @@ enum class Operator : std::uint8_t {
   less,
   less_equal
 };
-double combine(Operator op, double a, double b, Place at);
+double combine(Operator op, double a, double b, TextPosition at);
 bool compare(Operator op, MacroValue a, MacroValue b) noexcept;
 
 /// `value`, or alarm 111 if it is not finite.
-double finite(double value, Place at);
+double finite(double value, TextPosition at);
 
 }  // namespace shapegcode::macro

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstring>
 
-#include "base/text.hpp"
+#include "program/text/characters.hpp"
 #include "program/text/lexer.hpp"
 #include "program/text/number_scan.hpp"
 #include "shapegcode/error.hpp"
@@ -211,12 +211,12 @@ TapeFrame find_frame(const std::string& text) {
   return frame;
 }
 
-bool ProgramUnit::next_line(LinePlace& place, std::string_view& line, std::size_t& begin) const noexcept {
-  if (place.at >= end) {
+bool ProgramUnit::next_line(LinePosition& position, std::string_view& line, std::size_t& begin) const noexcept {
+  if (position.at >= end) {
     return false;
   }
   const char* data = text->data();
-  begin = place.at;
+  begin = position.at;
   const void* hit = std::memchr(data + begin, '\n', end - begin);
   const std::size_t next = hit == nullptr ? end : static_cast<std::size_t>(static_cast<const char*>(hit) - data) + 1;
   std::size_t stop = next;
@@ -226,17 +226,17 @@ bool ProgramUnit::next_line(LinePlace& place, std::string_view& line, std::size_
   line = std::string_view(data + begin, stop - begin);
   // A punched end of block may be LF CR CR.
   const bool punched = next + 2 <= end && data[next - 1] == '\n' && data[next] == '\r' && data[next + 1] == '\r';
-  place.at = next + (punched ? 2 : 0);
-  ++place.line;
+  position.at = next + (punched ? 2 : 0);
+  ++position.line;
   return true;
 }
 
 void ProgramUnit::index_numbers() {
   indexed_ = true;
-  LinePlace place = first;
+  LinePosition position = first;
   std::string_view line;
   std::size_t begin = 0;
-  for (LinePlace here = place; next_line(place, line, begin); here = place) {
+  for (LinePosition here = position; next_line(position, line, begin); here = position) {
     const std::int64_t n = leading_number(line, 'N');
     if (n >= 0) {
       numbers_[n].push_back(here);
@@ -244,7 +244,7 @@ void ProgramUnit::index_numbers() {
   }
 }
 
-std::optional<LinePlace> ProgramUnit::find_n(std::int64_t n, std::size_t from) {
+std::optional<LinePosition> ProgramUnit::find_n(std::int64_t n, std::size_t from) {
   if (!indexed_) {
     index_numbers();
   }
@@ -252,37 +252,37 @@ std::optional<LinePlace> ProgramUnit::find_n(std::int64_t n, std::size_t from) {
   if (found == numbers_.end()) {
     return std::nullopt;
   }
-  const auto& places = found->second;
-  const auto behind = std::lower_bound(places.begin(), places.end(), from,
-                                       [](const LinePlace& place, std::size_t at) { return place.at < at; });
-  return behind == places.end() ? places.front() : *behind;
+  const auto& positions = found->second;
+  const auto behind = std::lower_bound(positions.begin(), positions.end(), from,
+                                       [](const LinePosition& position, std::size_t at) { return position.at < at; });
+  return behind == positions.end() ? positions.front() : *behind;
 }
 
 void ProgramUnit::index_ends() {
   ends_indexed_ = true;
-  LinePlace place = first;
+  LinePosition position = first;
   std::string_view line;
   std::size_t begin = 0;
-  while (next_line(place, line, begin)) {
+  while (next_line(position, line, begin)) {
     if (const int loop = end_number(line); loop > 0) {
-      ends_[loop].push_back(place);
+      ends_[loop].push_back(position);
     }
   }
 }
 
-std::optional<LinePlace> ProgramUnit::behind_end(int loop, const LinePlace& from) {
+std::optional<LinePosition> ProgramUnit::behind_end(int loop, const LinePosition& from) {
   if (!ends_indexed_) {
     index_ends();
   }
-  const auto& places = ends_[loop];
-  // Places lie behind their END: the one of a line that begins at `from` or later.
-  const auto found = std::upper_bound(places.begin(), places.end(), from.at,
-                                      [](std::size_t at, const LinePlace& place) { return at < place.at; });
-  return found == places.end() ? std::nullopt : std::optional(*found);
+  const auto& positions = ends_[loop];
+  // Positions lie behind their END: the one of a line that begins at `from` or later.
+  const auto found = std::upper_bound(positions.begin(), positions.end(), from.at,
+                                      [](std::size_t at, const LinePosition& position) { return at < position.at; });
+  return found == positions.end() ? std::nullopt : std::optional(*found);
 }
 
 void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uint32_t file) {
-  const auto unit_at = [&](const LinePlace& first, std::int64_t number) {
+  const auto unit_at = [&](const LinePosition& first, std::int64_t number) {
     auto unit = std::make_unique<ProgramUnit>();
     unit->number = number;
     unit->file = file;
@@ -305,7 +305,7 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
     units_.push_back(std::move(unit));
   };
   ProgramHeads heads(text, frame);
-  LinePlace here = unit->first;
+  LinePosition here = unit->first;
   while (const auto head = heads.next()) {
     here.line += static_cast<std::uint32_t>(std::count(text.begin() + static_cast<std::ptrdiff_t>(here.at),
                                                        text.begin() + static_cast<std::ptrdiff_t>(head->begin), '\n'));

@@ -32,8 +32,8 @@ inline constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 /// with CR alone, a '%' at the start without one at the end.
 [[nodiscard]] TapeFrame find_frame(const std::string& text);
 
-/// A place in a text: offset of a line's first byte and the line's number.
-struct LinePlace {
+/// A position in a text: offset of a line's first byte and the line's number.
+struct LinePosition {
   std::size_t at = 0;
   std::uint32_t line = 1;
 };
@@ -47,24 +47,24 @@ struct ProgramUnit {
   std::string name;          ///< "<NAME>" with its brackets; empty: none
   bool called = false;       ///< by another one
   const std::string* text = nullptr;
-  LinePlace first;
+  LinePosition first;
   std::size_t end = 0;
 
-  /// The next line from `place`, without its line end; `place` moves behind it. False at the end.
-  bool next_line(LinePlace& place, std::string_view& line, std::size_t& begin) const noexcept;
+  /// The next line from `position`, without its line end; `position` moves behind it. False at the end.
+  bool next_line(LinePosition& position, std::string_view& line, std::size_t& begin) const noexcept;
   /// The line that carries sequence number N, searched from `from` on, then from the start, as the control does.
-  [[nodiscard]] std::optional<LinePlace> find_n(std::int64_t n, std::size_t from);
+  [[nodiscard]] std::optional<LinePosition> find_n(std::int64_t n, std::size_t from);
   /// Behind the END of a loop, searched from `from` on.
-  [[nodiscard]] std::optional<LinePlace> behind_end(int loop, const LinePlace& from);
+  [[nodiscard]] std::optional<LinePosition> behind_end(int loop, const LinePosition& from);
 
  private:
   void index_numbers();
   void index_ends();
 
   bool indexed_ = false;
-  std::unordered_map<std::int64_t, std::vector<LinePlace>> numbers_;
+  std::unordered_map<std::int64_t, std::vector<LinePosition>> numbers_;
   bool ends_indexed_ = false;
-  std::map<int, std::vector<LinePlace>> ends_;  ///< behind each END of a loop number
+  std::map<int, std::vector<LinePosition>> ends_;  ///< behind each END of a loop number
 };
 
 class ProgramStore {

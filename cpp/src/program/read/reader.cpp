@@ -181,7 +181,7 @@ std::string Reader::call_stack() const {
     const std::string& file = program_.files[caller.unit->file];
     stack += fmt::format("; called by {} line {}{}",
                          caller.unit->number >= 0 ? fmt::format("O{}", caller.unit->number) : "the main program",
-                         caller.place.line - 1, file.empty() ? "" : " of " + file);
+                         caller.next.line - 1, file.empty() ? "" : " of " + file);
   }
   return stack;
 }
@@ -291,11 +291,11 @@ bool Reader::step() {
   Frame& frame = frames_.back();
   std::string_view text;
   std::size_t begin = 0;
-  here_ = frame.place;
+  here_ = frame.next;
   if (interpreter_.ended()) {
     return false;
   }
-  const bool goes_on = frame.unit->next_line(frame.place, text, begin);
+  const bool goes_on = frame.unit->next_line(frame.next, text, begin);
   if (goes_on) {
     origin_ = {here_.line, frame.unit->file};
   } else if (frames_.size() == 1) {
@@ -307,7 +307,7 @@ bool Reader::step() {
     leave();
     return true;
   }
-  line(text, begin, frame.place.at);
+  line(text, begin, frame.next.at);
   return true;
 }
 

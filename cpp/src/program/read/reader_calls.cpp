@@ -332,7 +332,7 @@ bool Reader::enter(const MacroArguments& arguments, bool macro, std::uint32_t co
   }
   Frame frame;
   frame.unit = unit;
-  frame.place = unit->first;
+  frame.next = unit->first;
   frame.macro = macro;
   frame.repeats = arguments.repeats;
   frame.arguments = arguments;
@@ -349,7 +349,7 @@ void Reader::leave() {
     if (frame.macro) {
       variables_.push_level(frame.arguments.locals, here_.line, 1);
     }
-    frame.place = frame.unit->first;
+    frame.next = frame.unit->first;
     frame.loops.clear();
     return;
   }

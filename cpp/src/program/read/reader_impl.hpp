@@ -69,12 +69,12 @@ class Reader {
  private:
   struct Loop {
     int number = 0;
-    LinePlace start;      ///< the line of WHILE or DO
+    LinePosition start;   ///< the line of WHILE or DO
     std::size_t end = 0;  ///< offset behind END
   };
   struct Frame {
     ProgramUnit* unit = nullptr;
-    LinePlace place;  ///< the next line
+    LinePosition next;  ///< the next line
     std::vector<Loop> loops;
     bool macro = false;        ///< has its own local variables
     bool modal = false;        ///< called by G66
@@ -135,7 +135,7 @@ class Reader {
   void keep_for_control(std::string_view statement, int target);
   void conditional_lasting(std::string_view text, const MacroStatement& statement);
   void jump(std::int64_t n, std::uint32_t column);
-  void loop_start(std::string_view text, const MacroStatement& statement, const LinePlace& here);
+  void loop_start(std::string_view text, const MacroStatement& statement, const LinePosition& here);
   void loop_end(const MacroStatement& statement);
   [[nodiscard]] std::string with_values(std::string_view text);
   [[nodiscard]] WordFormat word_format() const;
@@ -160,7 +160,7 @@ class Reader {
   std::vector<Frame> frames_;
   std::vector<ModalCall> modal_calls_;
   LineOrigin origin_;
-  LinePlace here_;  ///< the line that is executed
+  LinePosition here_;  ///< the line that is executed
   bool framed_ = false;
   bool moved_ = false;  ///< the line that is executed moves an axis
   std::uint64_t steps_;

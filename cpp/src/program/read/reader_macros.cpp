@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "base/text.hpp"
 #include "program/macro/macro_expression.hpp"
 #include "program/read/reader_impl.hpp"
+#include "program/text/characters.hpp"
 #include "program/text/number_scan.hpp"
 #include "shapegcode/error.hpp"
 
@@ -223,18 +223,19 @@ void Reader::conditional_lasting(std::string_view text, const MacroStatement& st
 
 void Reader::jump(std::int64_t n, std::uint32_t column) {
   Frame& frame = frames_.back();
-  const auto place = frame.unit->find_n(n, frame.place.at);
-  if (!place) {
+  const auto position = frame.unit->find_n(n, frame.next.at);
+  if (!position) {
     alarm(78, fmt::format("sequence number N{} is not in the program", n), column);
   }
-  frame.place = *place;
+  frame.next = *position;
   // A jump out of a loop ends it.
-  std::erase_if(frame.loops, [&](const Loop& loop) { return place->at < loop.start.at || place->at >= loop.end; });
+  std::erase_if(frame.loops,
+                [&](const Loop& loop) { return position->at < loop.start.at || position->at >= loop.end; });
 }
 
-void Reader::loop_start(std::string_view text, const MacroStatement& statement, const LinePlace& here) {
+void Reader::loop_start(std::string_view text, const MacroStatement& statement, const LinePosition& here) {
   Frame& frame = frames_.back();
-  const auto behind = frame.unit->behind_end(statement.loop, frame.place);
+  const auto behind = frame.unit->behind_end(statement.loop, frame.next);
   if (!behind) {
     alarm(124, fmt::format("DO{} has no END{}", statement.loop, statement.loop));
   }
@@ -248,7 +249,7 @@ void Reader::loop_start(std::string_view text, const MacroStatement& statement, 
     enters = evaluate_condition(text, i, here_.line, variables_);
   }
   if (!enters) {
-    frame.place = *behind;
+    frame.next = *behind;
     return;
   }
   frame.loops.push_back({statement.loop, here, behind->at});
@@ -262,7 +263,7 @@ void Reader::loop_end(const MacroStatement& statement) {
   if (frame.loops.empty()) {
     alarm(124, fmt::format("END{} without its DO{}", statement.loop, statement.loop));
   }
-  frame.place = frame.loops.back().start;
+  frame.next = frame.loops.back().start;
   frame.loops.pop_back();
 }
 

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "base/text.hpp"
+#include "program/text/characters.hpp"
 #include "program/text/number_scan.hpp"
 #include "shapegcode/error.hpp"
 

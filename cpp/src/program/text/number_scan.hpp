@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "base/text.hpp"
+#include "program/text/characters.hpp"
 
 namespace shapegcode {
 

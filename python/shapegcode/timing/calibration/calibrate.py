@@ -313,7 +313,7 @@ _MIN_HOLD_S = 2.0
 _READING_S = 0.35  # what two readings may hide
 
 
-def _predicted_starts(run: ObservedRun, model: _core.ControllerModel) -> FloatArray:
+def _predicted_starts(run: ObservedRun, model: _core.FanucModel) -> FloatArray:
     """(line_count + 2,) When each line begins at the overrides of the run, s; the last entry is the end."""
     starts_at = starts_of(model)
     starts = starts_at(run, 1.0).copy()

@@ -53,7 +53,7 @@ class _Span:
 
 def whole_model(
     machine: Machine, motion: MotionFit, values: dict[str, float], last_tool_in_spindle: bool
-) -> _core.ControllerModel:
+) -> _core.FanucModel:
     """The controller with motion and functions."""
     model = motion.model(machine)
     model.program_start_s = values.get("start", 0.0)

@@ -13,7 +13,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import controller_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.timing.calibration.observed import IntArray, ObservedRun, seen_arc_acceleration
 
 
@@ -117,10 +117,10 @@ class MotionFit:
     values: dict[str, float]  # of its parameters by name, in mm, s and rad
     rapid_mm_per_s: float  # rapid rate of every axis; NaN: the machine's
 
-    def model(self, machine: Machine) -> _core.ControllerModel:
+    def model(self, machine: Machine) -> _core.FanucModel:
         """The controller that the family and its numbers describe."""
         family, values, rapid_mm_per_s = self.family, self.values, self.rapid_mm_per_s
-        model = controller_model(machine)
+        model = fanuc_model(machine)
         limits = _core.MotionLimits()
         limits.law = getattr(_core.AccelerationLaw, family.law)
         xy, z = values.get("acceleration_xy", _OFF), values.get("acceleration_z", _OFF)
@@ -228,7 +228,7 @@ def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
     return found
 
 
-def starts_of(model: _core.ControllerModel) -> Callable[[ObservedRun, float], FloatArray]:
+def starts_of(model: _core.FanucModel) -> Callable[[ObservedRun, float], FloatArray]:
     """When each line begins on a model, by run and feed override: (line_count + 2,), the last is the program's end.
 
     Simulated once for each program and its overrides.
@@ -248,13 +248,13 @@ def starts_of(model: _core.ControllerModel) -> Callable[[ObservedRun, float], Fl
     return starts
 
 
-def section_residuals(sections: Sequence[SeenSection], model: _core.ControllerModel) -> list[FloatArray]:
+def section_residuals(sections: Sequence[SeenSection], model: _core.FanucModel) -> list[FloatArray]:
     """What was seen minus what the model says, in s, for each reading of each section."""
     starts = starts_of(model)
     return [section.time_s - starts(section.run, section.feed_override)[section.line] for section in sections]
 
 
-def misfit(sections: Sequence[SeenSection], model: _core.ControllerModel) -> float:
+def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
     """How badly a model keeps the time of sections: every program counts alike, outliers (holds) count to a limit."""
     square: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))
     count: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))

@@ -20,7 +20,7 @@ from shapegcode.io.record import FloatArray
 from shapegcode.io.run_tracks import RunLog, Signal
 from shapegcode.io.units import find_unit
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import controller_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program
 from shapegcode.timing.calibration.runs_file import RunEntry
 
@@ -47,7 +47,7 @@ class TimedProgram:
     function: npt.NDArray[np.bool_]  # (line_count + 2,) whether it holds M, S or T words, or a way that is not known
     sections: tuple[tuple[int, int], ...]  # (first line, last line) of the stretches without functions
 
-    def starts(self, model: _core.ControllerModel) -> FloatArray:
+    def starts(self, model: _core.FanucModel) -> FloatArray:
         """When the lines begin on a model."""
         timed = _core.time_program(self.program.core, model, True)
         found = np.full(self.line_count + 2, np.nan)
@@ -295,7 +295,7 @@ def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine)
         # The dial may be turned for a moment, at the start mostly: what held longest counts.
         rapid_override = held_longest(log.rapid_override, log.duration_s) or math.nan
     run = ObservedRun(timed, log, entry, time_s, line, stretches, rapid_override, unit, tuple(notes))
-    starts = timed.starts(controller_model(machine))  # by the machine's own limits, before anything is learned
+    starts = timed.starts(fanuc_model(machine))  # by the machine's own limits, before anything is learned
     whole = _is_whole(run, starts, notes)
     _require_same(run, starts)
     return replace(run, whole=whole, notes=tuple(notes))

@@ -145,9 +145,9 @@ struct SpindleTime {
   double seconds = 0.0;
 };
 
-/// Everything that decides how long a program takes on a controller, and what its acceleration does to the path.
+/// Everything that decides how long a program takes on a FANUC control, and what its acceleration does to the path.
 /// Plain values; the numbers in the comments are FANUC parameters.
-struct ControllerModel {
+struct FanucModel {
   double period_s = 0.001;  ///< interpolation period T_I
   BlockEnd block_end = BlockEnd::ceil;
 
@@ -191,26 +191,26 @@ struct ControllerModel {
 };
 
 /// The same controller while shaped blocks run: block by block at their feed, without look-ahead.
-[[nodiscard]] ControllerModel for_shaped_blocks(const ControllerModel& model);
+[[nodiscard]] FanucModel for_shaped_blocks(const FanucModel& model);
 
 /// Throws Error(argument) on a value that no controller can have; the message names it.
-void check(const ControllerModel& model);
+void check(const FanucModel& model);
 
 /// Filters behind interpolation in order: none, one or two (acceleration after interpolation, or 1769 in look-ahead).
-[[nodiscard]] std::vector<Fir> acceleration_filters(const ControllerModel& model);
+[[nodiscard]] std::vector<Fir> acceleration_filters(const FanucModel& model);
 
 /// Periods that filters add to a run of set-points: as many as their cascade has taps (A for one moving average of A
 /// periods); 0 without filters.
 [[nodiscard]] int filter_periods(const std::vector<Fir>& filters) noexcept;
 
 /// Feed of a cutting block in mm/s: programmed feed times override, no axis above its largest feed.
-[[nodiscard]] double controlled_feed_mm_per_s(const Segment& segment, const ControllerModel& model) noexcept;
+[[nodiscard]] double controlled_feed_mm_per_s(const Segment& segment, const FanucModel& model) noexcept;
 
 /// Time of a run of overlapping cutting blocks (paper 004, section 2.2): sum of ceil(l / (F T_I)) T_I (or of l / F
 /// under `carry`) plus the length of the acceleration filters. Blocks without length take no time. Lengths in mm, feeds
 /// in mm/s, taken as they are (no override). Throws Error(argument) on unequal sizes or a feed <= 0.
 [[nodiscard]] double block_overlap_time_s(std::span<const double> lengths_mm, std::span<const double> feeds_mm_per_s,
-                                          const ControllerModel& model);
+                                          const FanucModel& model);
 
 /// Shape of one rapid in whole interpolation periods, per axis: the way is run off evenly in `travel` periods and
 /// smoothed by a moving average over `ramp` and one over `bell` periods, so it takes the sum of the three. A short
@@ -226,25 +226,25 @@ struct RapidShape {
 /// Paper 004, eq. 6 to 16, with rates and accelerations per axis: linear v = min_i(1420_i L/d_i) and
 /// a = min_i(1420_i/1620_i L/d_i); non-linear each axis for itself. Axes without travel have 0 periods. Throws
 /// Error(argument) on a rapid of more than 1e8 periods.
-[[nodiscard]] RapidShape rapid_shape(const Vector3& travel_mm, const ControllerModel& model);
+[[nodiscard]] RapidShape rapid_shape(const Vector3& travel_mm, const FanucModel& model);
 
 /// Time of a rapid from rest to rest without the wait for in-position; 0 without travel.
-[[nodiscard]] double rapid_time_s(const Vector3& travel_mm, const ControllerModel& model);
+[[nodiscard]] double rapid_time_s(const Vector3& travel_mm, const FanucModel& model);
 
 /// Wait for in-position behind a rapid. `measured`: the largest constant of an axis that moves. `servo_lag`: closed
 /// form of the position error e' = (1 - a) x' - K e (gain K, feed-forward a) at the end of the command, which decays to
 /// the width w in ln(e / w) / K; whole periods.
-[[nodiscard]] double in_position_wait_s(const Vector3& travel_mm, const ControllerModel& model);
+[[nodiscard]] double in_position_wait_s(const Vector3& travel_mm, const FanucModel& model);
 
 /// The same behind any command: `error_mm` is what the servo loop lags at its end, `moved` the axes that moved.
 [[nodiscard]] double in_position_wait_s(const Vector3& error_mm, const std::array<bool, axis_count>& moved,
-                                        const ControllerModel& model);
+                                        const FanucModel& model);
 
 /// Set-points of a rapid, one per period, the start first. Its periods are found by trial, not by the closed form.
 class RapidPlayer {
  public:
   /// Throws Error(argument) on a model that `check` refuses.
-  RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model);
+  RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model);
   /// Next set-point, X, Y and Z; false once the end was given.
   bool step(std::span<double> out) noexcept { return step_into(out, *this); }
   bool step(Vector3& position) noexcept;
@@ -265,6 +265,6 @@ class RapidPlayer {
 };
 
 /// All set-points of a rapid, (n, 3).
-[[nodiscard]] Samples rapid_samples(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model);
+[[nodiscard]] Samples rapid_samples(const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model);
 
 }  // namespace shapegcode

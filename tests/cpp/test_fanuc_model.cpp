@@ -3,13 +3,13 @@
 #include <array>
 #include <vector>
 
-#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
+#include "shapegcode/fanuc_model.hpp"
 
 using namespace shapegcode;
 
 TEST_CASE("controller: filters of each kind of motion, and how many periods they add") {
-  ControllerModel model;
+  FanucModel model;
   model.motion = MotionKind::after_interpolation;
   model.time_constant_s = 0.05;
   CHECK(filter_periods(acceleration_filters(model)) == 50);
@@ -26,7 +26,7 @@ TEST_CASE("controller: filters of each kind of motion, and how many periods they
 }
 
 TEST_CASE("controller: block overlap after paper 004, by hand") {
-  ControllerModel model;
+  FanucModel model;
   model.motion = MotionKind::after_interpolation;
   // 10.5 ms -> 11, 10 ms exactly, 0.2 ms -> 1, none; and 50 ms.
   const std::array<double, 4> lengths = {0.105, 1.0, 0.02, 0.0};
@@ -41,7 +41,7 @@ TEST_CASE("controller: block overlap after paper 004, by hand") {
 }
 
 TEST_CASE("controller: override and largest feeds of the axes") {
-  ControllerModel model;
+  FanucModel model;
   model.feed_override = 1.5;
   const Segment line = make_line({0, 0, 0}, {30, 40, 0}, 100.0);
   CHECK(controlled_feed_mm_per_s(line, model) == doctest::Approx(150.0));
@@ -52,7 +52,7 @@ TEST_CASE("controller: override and largest feeds of the axes") {
 }
 
 TEST_CASE("controller: a filter or rapid of more periods than can be counted is refused, unchecked models too") {
-  ControllerModel model;
+  FanucModel model;
   model.look_ahead_filter_time_constant_s = 1e20;
   CHECK_THROWS_WITH_AS(static_cast<void>(acceleration_filters(model)),
                        "a filter takes 1e+23 periods, at most 10000000 are possible", Error);

@@ -1,12 +1,10 @@
-#include "shapegcode/control.hpp"
+#include "shapegcode/fanuc_model.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/format.h>
-
 #include "base/checks.hpp"
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
 #include "shapegcode/motion.hpp"
 
 namespace shapegcode {
@@ -41,8 +39,8 @@ void require_ascending(const char* name, const std::vector<SpindleTime>& table) 
 
 }  // namespace
 
-ControllerModel for_shaped_blocks(const ControllerModel& model) {
-  ControllerModel shaped = model;
+FanucModel for_shaped_blocks(const FanucModel& model) {
+  FanucModel shaped = model;
   shaped.motion = MotionKind::after_interpolation;
   shaped.filter_shape = model.shaped_filter_shape;
   shaped.time_constant_s = model.shaped_time_constant_s;
@@ -51,7 +49,7 @@ ControllerModel for_shaped_blocks(const ControllerModel& model) {
   return shaped;
 }
 
-void check(const ControllerModel& model) {
+void check(const FanucModel& model) {
   require(model.period_s >= 1e-5 && model.period_s <= 1.0, "interpolation period", model.period_s, "s", "1e-5 to 1 s");
   require_ramp("acceleration time constant", model.time_constant_s);
   require_ramp("bell time", model.bell_time_s);
@@ -85,7 +83,7 @@ void check(const ControllerModel& model) {
   }
 }
 
-std::vector<Fir> acceleration_filters(const ControllerModel& model) {
+std::vector<Fir> acceleration_filters(const FanucModel& model) {
   std::vector<Fir> filters;
   if (model.motion == MotionKind::look_ahead) {
     add_average(filters, model.look_ahead_filter_time_constant_s, model.period_s);
@@ -106,21 +104,21 @@ int filter_periods(const std::vector<Fir>& filters) noexcept {
   return periods;
 }
 
-double controlled_feed_mm_per_s(const Segment& segment, const ControllerModel& model) noexcept {
+double controlled_feed_mm_per_s(const Segment& segment, const FanucModel& model) noexcept {
   return std::min(segment.feed_mm_per_s * model.feed_override, axis_feed_limit(segment, model.limits));
 }
 
 double block_overlap_time_s(std::span<const double> lengths_mm, std::span<const double> feeds_mm_per_s,
-                            const ControllerModel& model) {
+                            const FanucModel& model) {
   check(model);
   if (lengths_mm.size() != feeds_mm_per_s.size()) {
-    throw Error(ErrorKind::argument, fmt::format("{} lengths but {} feeds", lengths_mm.size(), feeds_mm_per_s.size()));
+    detail::refuse("{} lengths but {} feeds", lengths_mm.size(), feeds_mm_per_s.size());
   }
   double periods = 0.0;
   for (std::size_t i = 0; i < lengths_mm.size(); ++i) {
     if (!(lengths_mm[i] >= 0.0) || !(feeds_mm_per_s[i] > 0.0)) {
-      throw Error(ErrorKind::argument, fmt::format("block {} has length {} mm and feed {} mm/s, must be >= 0 and > 0",
-                                                   i, lengths_mm[i], feeds_mm_per_s[i]));
+      detail::refuse("block {} has length {} mm and feed {} mm/s, must be >= 0 and > 0", i, lengths_mm[i],
+                     feeds_mm_per_s[i]);
     }
     periods += block_periods(lengths_mm[i], feeds_mm_per_s[i], model.period_s, model.block_end);
   }
