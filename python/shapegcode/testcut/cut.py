@@ -294,6 +294,8 @@ def read_test_cut(path: str | Path) -> TestCut:
     return cut
 
 
+# --- edges: heights count from the wall of the measuring pass, outwards -----------------------------------------------
+
 _GRID_MM = 0.004
 _CHORD_MM = 1e-4
 _MOVED = 9  # increments

@@ -247,6 +247,8 @@ class ForceModel:
         return np.column_stack(columns)
 
 
+# --- the coefficients: power laws about the middle of the chips, where factor and exponent do not disturb each other --
+
 MIN_CHIP_RATIO = 1.5  # The thickest mean chip over the thinnest; below it exponents are not told apart from factors
 MIN_FEED_RATIO = 1.3  # The same of the feeds, for edge forces
 _ROUNDS = 6

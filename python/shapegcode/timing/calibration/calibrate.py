@@ -15,17 +15,21 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.timing.calibration.functions import FunctionFit, fit_functions, m_codes, spindle_rows, whole_model
 from shapegcode.timing.calibration.motion import (
     FAMILIES,
+    FunctionFit,
     LookAhead,
     MotionFit,
+    fit_functions,
     fit_motion,
+    m_codes,
     misfit,
     parameter_intervals,
     section_residuals,
     sections_of,
+    spindle_rows,
     starts_of,
+    whole_model,
 )
 from shapegcode.timing.calibration.observed import (
     ObservedRun,
