@@ -8,7 +8,7 @@ makes polygons of it.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
@@ -21,40 +21,35 @@ Point = tuple[Float, Float]
 Ring = Annotated[tuple[Point, ...], Field(min_length=3)]
 
 
-def _ascends(table: TomlTable, *names: str) -> None:
-    for name in names:
-        low, high = getattr(table, name)
-        if low >= high:
-            raise KeyProblem(name, (low, high), "the smaller number comes first, and the two must differ")
+class Upright(TomlTable):
+    """A shape with ranges along the axes."""
+
+    @model_validator(mode="after")
+    def _ascend(self) -> Self:
+        for name in ("x_mm", "y_mm", "z_mm"):
+            low, high = getattr(self, name, (0.0, 1.0))
+            if low >= high:
+                raise KeyProblem(name, (low, high), "the smaller number comes first, and the two must differ")
+        return self
 
 
-class Box(TomlTable):
+class Box(Upright):
     """A block."""
 
     x_mm: Range = key("from ... to along X")
     y_mm: Range = key("from ... to along Y")
     z_mm: Range = key("bottom and top")
 
-    @model_validator(mode="after")
-    def _ordered(self) -> Box:
-        _ascends(self, "x_mm", "y_mm", "z_mm")
-        return self
 
-
-class Polygon(TomlTable):
+class Polygon(Upright):
     """A prism over a polygon."""
 
     points_mm: Ring = key("corners [x, y] in order, three or more; the last is joined to the first")
     holes_mm: tuple[Ring, ...] = key("holes that go through, each as its corners", default=())
     z_mm: Range = key("bottom and top")
 
-    @model_validator(mode="after")
-    def _ordered(self) -> Polygon:
-        _ascends(self, "z_mm")
-        return self
 
-
-class Allowance(TomlTable):
+class Allowance(Upright):
     """What roughing left on the walls that this program finishes."""
 
     allowance_mm: Positive = key("thickness that is left on the walls")
@@ -77,11 +72,6 @@ class Allowance(TomlTable):
         default=0.0,
     )
     lead_out_mm: NonNegative = key("length of the travel behind the wall's end, likewise", default=0.0)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Allowance:
-        _ascends(self, "z_mm")
-        return self
 
 
 class Solid(TomlTable):

@@ -6,13 +6,30 @@ import json
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, Strict, field_validator
+from pydantic import AfterValidator, Field, Strict, field_validator
 
 from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTable, key
 
 _OFFSET_NAME = re.compile(r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}")
-_NUMBER_NAME = re.compile(r"[1-9][0-9]{0,7}")
-_G_NAME = re.compile(r"[1-9][0-9]{0,3}(\.[1-9])?")
+
+
+def _named(pattern: str, wrong: str) -> AfterValidator:
+    """Refuse a table with a name that does not have the form."""
+
+    def check(table: dict[str, Any]) -> dict[str, Any]:
+        for name in table:
+            if not re.fullmatch(pattern, name):
+                raise ValueError(f"{json.dumps(name)} {wrong}")
+        return table
+
+    return AfterValidator(check)
+
+
+_NUMBERED = _named("[1-9][0-9]{0,7}", 'is no number; names are whole numbers, for example "1"')
+_G_CODED = _named(r"[1-9][0-9]{0,3}(\.[1-9])?", 'is no G code; names are for example "120" or "120.1"')
+_RETAINED = _named("[5-9][0-9]{2}", 'is no variable that the control keeps: "500" ... "999"')
+_Lengths = Annotated[dict[str, Float], _NUMBERED]
+_Programs = dict[str, Annotated[int, Strict(), Field(ge=1, le=99_999_999)]]
 
 
 class Input(TomlTable):
@@ -40,14 +57,14 @@ class Input(TomlTable):
         unit="mm",
         default={},
     )
-    tool_radius_mm: dict[str, Float] = key(
+    tool_radius_mm: _Lengths = key(
         'cutter radius by offset number D, for programs with G41 or G42 that are expanded: { "1" = 5.0 }', default={}
     )
-    tool_radius_wear_mm: dict[str, Float] = key("wear of the radius by offset number D", default={})
-    tool_length_mm: dict[str, Float] = key(
+    tool_radius_wear_mm: _Lengths = key("wear of the radius by offset number D", default={})
+    tool_length_mm: _Lengths = key(
         "tool length by offset number H; with it the Z travel of a tool length change is known", default={}
     )
-    tool_length_wear_mm: dict[str, Float] = key("wear of the length by offset number H", default={})
+    tool_length_wear_mm: _Lengths = key("wear of the length by offset number H", default={})
     compensation: Literal["refuse", "expand", "keep"] = key(
         'what `convert` does with cutter compensation G41/G42. "refuse": says so and stops; "expand": shapes the tool '
         'path of the radius given here: the offset in the control no longer acts; "keep": leaves these moves as they '
@@ -81,7 +98,7 @@ class Input(TomlTable):
         "true, and nothing is shaped whose state depends on it",
         default="unknown",
     )
-    variables: dict[str, Float] = key(
+    variables: Annotated[dict[str, Float], _RETAINED] = key(
         'values of the variables that the control keeps, #500 ... #999, for macros that read them: { "500" = 12.5 }',
         default={},
     )
@@ -97,13 +114,13 @@ class Input(TomlTable):
         default=(9000, 9999),
         assumed=True,
     )
-    g_macros: dict[str, Annotated[int, Strict(), Field(ge=1, le=99_999_999)]] = key(
+    g_macros: Annotated[_Programs, _G_CODED] = key(
         'G codes that call a macro like G65: { "120" = 9010 }', fanuc="6050 ... 6059", default={}
     )
-    m_macros: dict[str, Annotated[int, Strict(), Field(ge=1, le=99_999_999)]] = key(
+    m_macros: Annotated[_Programs, _NUMBERED] = key(
         'M codes that call a macro like G65: { "200" = 9020 }', fanuc="6080 ... 6089", default={}
     )
-    m_subprograms: dict[str, Annotated[int, Strict(), Field(ge=1, le=99_999_999)]] = key(
+    m_subprograms: Annotated[_Programs, _NUMBERED] = key(
         'M codes that call a subprogram like M98: { "6" = 9001 }', fanuc="6071 ... 6079", default={}
     )
     tool_program: Annotated[int, Strict(), Field(ge=0, le=99_999_999)] = key(
@@ -120,29 +137,3 @@ class Input(TomlTable):
             if not _OFFSET_NAME.fullmatch(name):
                 raise ValueError(f'{name} is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"')
         return offsets
-
-    @field_validator(
-        "tool_radius_mm", "tool_radius_wear_mm", "tool_length_mm", "tool_length_wear_mm", "m_macros", "m_subprograms"
-    )
-    @classmethod
-    def _numbers(cls, table: dict[str, Any]) -> dict[str, Any]:
-        for name in table:
-            if not _NUMBER_NAME.fullmatch(name):
-                raise ValueError(f'{json.dumps(name)} is no number; names are whole numbers, for example "1"')
-        return table
-
-    @field_validator("g_macros")
-    @classmethod
-    def _g_codes(cls, table: dict[str, Any]) -> dict[str, Any]:
-        for name in table:
-            if not _G_NAME.fullmatch(name):
-                raise ValueError(f'{json.dumps(name)} is no G code; names are for example "120" or "120.1"')
-        return table
-
-    @field_validator("variables")
-    @classmethod
-    def _retained(cls, table: dict[str, Any]) -> dict[str, Any]:
-        for name in table:
-            if not (_NUMBER_NAME.fullmatch(name) and 500 <= int(name) <= 999):
-                raise ValueError(f'{json.dumps(name)} is no variable that the control keeps: "500" ... "999"')
-        return table

@@ -116,12 +116,12 @@ class Trace:
 
 FloatArray = npt.NDArray[np.float64]
 
-_AXIS_NAMES = "XYZ"
+AXIS_NAMES = "XYZ"
 _WIDTHS = (2.4, 0.9, 0.9, 0.9)
 _MAX_POINTS = 4000
-_MOVES_MM = 1e-9
+MOVES_MM = 1e-9
 # A deflection below this is none.
-_SHOWN_MM = 5e-5
+SHOWN_MM = 5e-5
 _FLAT = 0.06  # of an axis in µm or mm/min
 
 
@@ -176,7 +176,7 @@ def plot_feed(views: Sequence[View], ax: Axes | None = None, *, part: str = "") 
     """
     _check_views(views)
     moving = _moving_axes([trace for view in views for trace in view.traces])
-    names = ["path feed\nin mm/min", *(f"{_AXIS_NAMES[axis]} speed\nin mm/min" for axis in moving)]
+    names = ["path feed\nin mm/min", *(f"{AXIS_NAMES[axis]} speed\nin mm/min" for axis in moving)]
     columns = _columns(ax, views, names, 1.7, "Feed of the command", part)
     for view, panels in zip(views, columns, strict=True):
         for number, trace in enumerate(view.traces):
@@ -217,13 +217,13 @@ def plot_vibration(views: Sequence[View], ax: Axes | None = None, *, part: str =
     traces = [trace for view in views for trace in view.traces]
     moving = _moving_axes(traces)
     swing_mm = np.max([np.abs(trace.deflection_mm).max(axis=0) for trace in traces], axis=0)
-    swinging = [axis for axis in moving if swing_mm[axis] >= _SHOWN_MM]
-    still = [_AXIS_NAMES[axis] for axis in moving if axis not in swinging]
+    swinging = [axis for axis in moving if swing_mm[axis] >= SHOWN_MM]
+    still = [AXIS_NAMES[axis] for axis in moving if axis not in swinging]
     shown = swinging or moving[:1]
     said = ["Vibration"]
     said += ["dashed: the command has come to rest"] if any(trace.stops for trace in traces) else []
-    said += [f"{', '.join(still)}: rigid (below {_SHOWN_MM * 1e3:g} µm)"] if still else []
-    names = [f"{_AXIS_NAMES[axis]} table − command\nin µm" for axis in shown]
+    said += [f"{', '.join(still)}: rigid (below {SHOWN_MM * 1e3:g} µm)"] if still else []
+    names = [f"{AXIS_NAMES[axis]} table − command\nin µm" for axis in shown]
     columns = _columns(ax, views, names, 2.2, "; ".join(said), part)
     for view, panels in zip(views, columns, strict=True):
         for panel, axis in zip(panels, shown, strict=True):
@@ -283,7 +283,7 @@ def line_style(number: int, *, fine: bool = False) -> dict[str, Any]:
 def _moving_axes(traces: Sequence[Trace]) -> list[int]:
     """Axes that move in any trace; X where none does, so that a picture is never empty."""
     travel = np.max([np.ptp(trace.command_mm, axis=0) for trace in traces], axis=0)
-    return [axis for axis in range(3) if travel[axis] > _MOVES_MM] or [0]
+    return [axis for axis in range(3) if travel[axis] > MOVES_MM] or [0]
 
 
 def _curve(panel: Axes, number: int, label: str, times: FloatArray, values: FloatArray, *, fine: bool = False) -> None:

@@ -13,7 +13,16 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.results import plot
-from shapegcode.results.motion_plots import Trace, View, line_style, plot_feed, plot_vibration
+from shapegcode.results.motion_plots import (
+    AXIS_NAMES,
+    MOVES_MM,
+    SHOWN_MM,
+    Trace,
+    View,
+    line_style,
+    plot_feed,
+    plot_vibration,
+)
 from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
@@ -22,10 +31,6 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 Plane = Literal["XY", "ZX", "YZ"]
 
-_AXIS_NAMES = "XYZ"
-_MOVES_MM = 1e-9
-# A deflection below this is none.
-_SHOWN_MM = 5e-5
 _STRAIGHT = (
     "The path is straight: the table deviates along it only,\nwhich no drawing of the path shows. "
     "See the picture of the vibration."
@@ -93,7 +98,7 @@ def plot_path(
         ax, 1, len(widths), size_inch=(7.2 if whole is None else 10.4, 6.4), width_ratios=widths,
         title=f"Deviation of the {what} from the path, drawn ×{factor:g}", part=part,
     )[0]  # fmt: skip
-    panel, shown = panels[0], [_AXIS_NAMES.index(name) for name in plane]
+    panel, shown = panels[0], [AXIS_NAMES.index(name) for name in plane]
     panel.plot(*polyline[:, shown].T, color=plot.GREY, linewidth=3, alpha=0.55, label="programmed path")
     straight = _only_along(polyline, [deviation for *_, deviation in drawn])
     for number, (trace, along, feet, deviation) in enumerate(drawn):
@@ -179,7 +184,7 @@ def _only_along(polyline: FloatArray, deviations: Sequence[FloatArray]) -> bool:
     def across(vectors: FloatArray) -> float:
         return float(np.linalg.norm(vectors - np.outer(vectors @ direction, direction), axis=1).max())
 
-    return across(polyline - polyline[0]) < _MOVES_MM and max(map(across, deviations)) < _SHOWN_MM
+    return across(polyline - polyline[0]) < MOVES_MM and max(map(across, deviations)) < SHOWN_MM
 
 
 def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:

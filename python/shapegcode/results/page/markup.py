@@ -198,12 +198,7 @@ def _notes(notes: Notes) -> str:
 
 
 def _steps(steps: NextSteps) -> str:
-    rows = []
-    for step in steps.rows:
-        command = ""
-        if step.command:
-            command = _command(step.command)
-        rows.append(f"<li>{prose(step.text)}{command}</li>")
+    rows = (f"<li>{prose(step.text)}{_command(step.command) if step.command else ''}</li>" for step in steps.rows)
     return '<ol class="steps">' + "".join(rows) + "</ol>"
 
 
