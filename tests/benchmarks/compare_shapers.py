@@ -1,7 +1,7 @@
 """What each shaper does to the same programs, all through the conversion: the tables of docs/evidence/comparison.md.
 
 Run from the root of the repository: ``python tests/benchmarks/compare_shapers.py``. The machine is `vx500`; every
-figure is of the text that was written, read back and played, with the modes where they are and 5 and 10 % off.
+figure is of the text that was written, read back and simulated, with the modes where they are and 5 and 10 % off.
 """
 
 from __future__ import annotations
@@ -179,10 +179,10 @@ def as_programmed(program: Path) -> Outcome:
     machine = sg.Machine.load("vx500")
     read = sg.Program.read(program, machine)
     paths = [region.path for region in read.regions]
-    runs = [MachineModel(machine).play_original(path) for path in paths]
+    runs = [MachineModel(machine).simulate_original(path) for path in paths]
     return Outcome(
         "as programmed",
-        residual_um=_over_bands(machine, lambda other: (MachineModel(other).play_original(path) for path in paths)),
+        residual_um=_over_bands(machine, lambda other: (MachineModel(other).simulate_original(path) for path in paths)),
         peak_um=_largest_um(run.peak_mm for run in runs),
         command_um=1e3 * max(run.command.max_abs_mm for run in runs),
         response_um=1e3 * max(run.response.max_abs_mm for run in runs),
@@ -193,7 +193,7 @@ def as_programmed(program: Path) -> Outcome:
 
 def _residual_of(blocks: _core.Path, place: Placed, machine: sg.Machine) -> _core.PlaybackFigures:
     model = MachineModel(machine)
-    return model.play_emitted(blocks, place.region.path, contour=False, last_seconds=model.vibration_memory_s)
+    return model.simulate_emitted(blocks, place.region.path, contour=False, last_seconds=model.vibration_memory_s)
 
 
 def _over_bands(

@@ -1,7 +1,7 @@
 """Residual vibration with the feed override turned: the table of docs/howto/feed_override.md.
 
 Run from the root of the repository: ``python tests/benchmarks/feed_override.py``. The emitted text of the path of paper
-000 at 200 mm/s is played and shaken by the interpreter, player and plant of the tests, which share no code with the
+000 at 200 mm/s is simulated and shaken by the interpreter, player and plant of the tests, which share no code with the
 package.
 """
 

@@ -1,4 +1,4 @@
-"""Processor time of what a conversion spends it on: shaping, text, and the playbacks of the verdict; least of some."""
+"""Processor time of what a conversion spends it on: shaping, text, the simulations of the verdict; minimum of some."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from shapegcode import _core, cli
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import choose_grid
-from shapegcode.verdict.cases import BLOCK_ENDS, Case, CasePlayer
+from shapegcode.verdict.cases import BLOCK_ENDS, Case, CaseSimulation
 
 _WITH, _WITHOUT = "with-override-contours", "without-override-contours"
 _TEN_LINES = b"%\nO1\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\nG1X50.F3000\nY50.\nX20.\nY20.\nM30\n%\n"
@@ -65,16 +65,16 @@ def main() -> int:
     lines = _HEAD.count(b"\n")
     blocks = emitted.core.cutting_path(lines + 1, lines + text.count(b"\n"))
     tracker = least("tracker of the path", lambda: _core.ContourTracker(path))
-    least("original played", lambda: model.play_original(path, offset=offset))
+    least("original simulated", lambda: model.simulate_original(path, offset=offset))
     for rule in BLOCK_ENDS:
 
         def emitted_played(rule: _core.BlockEnd = rule) -> _core.PlaybackFigures:
-            return model.play_emitted(blocks, path, rule, offset=offset, tracker=tracker, increment_mm=1e-3)
+            return model.simulate_emitted(blocks, path, rule, offset=offset, tracker=tracker, increment_mm=1e-3)
 
-        least(f"emitted text played, {rule.name}", emitted_played)
-    least("the same, the table alone", lambda: model.play_emitted(
+        least(f"emitted text simulated, {rule.name}", emitted_played)
+    least("the same, the table alone", lambda: model.simulate_emitted(
         blocks, path, offset=offset, tracker=tracker, command_contour=False))  # fmt: skip
-    least("emitted text, planned anew", lambda: model.play_planned(blocks, path, offset=offset, tracker=tracker))
+    least("emitted text, planned anew", lambda: model.simulate_planned(blocks, path, offset=offset, tracker=tracker))
     least("time of the blocks", lambda: _core.play_duration_s(blocks, model.period_s, model.own_rule, 0.8))
     return 0
 
@@ -108,7 +108,7 @@ def _run_command(way: str, words: Sequence[str]) -> int:
     if way == _WITH:
         return cli.main(words)
     with (
-        mock.patch.object(CasePlayer, "_beside", lambda *_: False),
+        mock.patch.object(CaseSimulation, "_beside", lambda *_: False),
         mock.patch.object(Case, "needs_contour", lambda case, _target: case.override == 1.0),
     ):
         return cli.main(words)

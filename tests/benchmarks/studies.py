@@ -1,8 +1,8 @@
 """Studies: ten thousand drawn machines on the paper's path, and fifty of them one by one: docs/evidence/benchmarks.md.
 
 Run from the root of the repository: ``python tests/benchmarks/studies.py``. The peer converts the program for every
-draw, as one would without a study. The fifty are played and shaken by the interpreter, player and plant of the tests,
-which share no code with the package.
+draw, as one would without a study. The fifty are simulated by the interpreter, player and plant of the tests, which
+share no code with the package.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def emitted(conversion: sg.Conversion, original: Path) -> Path:
     return path
 
 
-def played(path: Path, original: Path, machine: sg.Machine) -> tuple[sg.CycleTime, sg.Simulation]:
+def simulated(path: Path, original: Path, machine: sg.Machine) -> tuple[sg.CycleTime, sg.Simulation]:
     return sg.cycle_time(path, machine), sg.simulate(path, machine, record_samples=0, against=original)
 
 
@@ -83,7 +83,7 @@ def test_every_command_says_what_convert_said(keys: dict[str, Any], original: Pa
     assert conversion.placed and conversion.kept, "the case needs regions of both kinds"
     path = tmp_path / "shaped.nc"
     path.write_bytes(conversion.text)
-    time, simulation = played(path, original, machine)
+    time, simulation = simulated(path, original, machine)
     tick_s = machine.controller.interpolation_period_s
     for said_s in (time.cycle_time_s, time.full_interpolation_s, simulation.cycle_time_s):
         assert said_s == pytest.approx(conversion.cycle_time_s.emitted, abs=0.01 * tick_s)
@@ -138,7 +138,7 @@ def test_what_a_control_changes_in_passing_is_no_edit(
 ) -> None:
     path = tmp_path / "punched.nc"
     path.write_bytes(change(conversion.text))
-    time, simulation = played(path, original, machine)
+    time, simulation = simulated(path, original, machine)
     assert not [warning for warning in time.warnings if "changed since" in warning]
     assert time.cycle_time_s == pytest.approx(conversion.cycle_time_s.emitted, abs=1e-9)
     assert simulation.verdict is not None

@@ -1,4 +1,4 @@
-"""Cells of docs/evidence/comparison.md by the judge, which reads, plays and measures the text by code of its own."""
+"""Cells of docs/evidence/comparison.md by the judge, which reads, simulates and measures by code of its own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Programs in the full dialect: what the package reads against what the independent judge plays."""
+"""Programs in the full dialect: what the package reads against what the independent judge simulates."""
 
 from __future__ import annotations
 

@@ -114,8 +114,10 @@ def test_quadrant_glitch_is_there_and_a_frictionless_drive_has_none() -> None:
 
 def test_table_sticks_at_rest_on_its_bristles() -> None:
     setpoints = reversals_mm(80)[:80]
-    played = _core.FeedDrive(drive(modes=[]), PERIOD_S).play(np.concatenate([setpoints, np.full(600, setpoints[-1])]))
-    rest = played[-200:]
+    simulated = _core.FeedDrive(drive(modes=[]), PERIOD_S).play(
+        np.concatenate([setpoints, np.full(600, setpoints[-1])])
+    )
+    rest = simulated[-200:]
     assert np.ptp(rest[:, 1]) < 2e-4  # mm: the bristles creep
     assert 100 < abs(rest[-1, 3]) < 450
     np.testing.assert_allclose(rest[-1, 5], rest[-1, 3], rtol=1e-3)  # the spring holds what the friction takes

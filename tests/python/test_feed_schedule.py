@@ -108,7 +108,7 @@ def test_the_feed_that_the_machine_runs_keeps_the_limit(time_constant_s: float) 
     text = CORNER.replace("S1800", "S12000").replace("F216.", "F1440.")
     result = scheduled(text, machine=machine)
     assert result.ok
-    # Played by the judge: blocks at their feed, then the moving average; speed over the time between two teeth.
+    # SimulatedCase by the judge: blocks at their feed, then the moving average; speed over the time between two teeth.
     period = 0.001
     moves = [move for move in interpret(result.text.decode()).cuts if move.end[2] < -14.0 and move.start[2] < -14.0]
     points = play(moves, period_s=period)

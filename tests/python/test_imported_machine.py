@@ -1,4 +1,4 @@
-"""A machine imported from a parameter dump, held against a playback that knows the dump and not our reading of it."""
+"""A machine imported from a parameter dump, held against a simulation that knows the dump and not our reading of it."""
 
 from __future__ import annotations
 

@@ -78,9 +78,9 @@ def test_table_like_a_measuring_report(
     for text in (
         "2 arc R20, line 6", "inside wall mm (µm off)", "18.500", "cut-width band left / right µm",
         "Ra left / right µm", "settled to 1 µm X / Y / Z ms", "next: ",
-        "part.nc: played with the controller's own motion, measured against its own path, to compare the shaped with",
+        "part.nc: simulated with the controller's own motion, measured against its own path, to compare the shaped",
         "shaped.nc: within tolerance: leaves the path by", "pictures: plots/measure-part.png, plots/measure-walls.png",
-        "shaped.nc: played block by block, as a shaped program, measured against the path of part.nc",
+        "shaped.nc: simulated block by block, as a shaped program, measured against the path of part.nc",
     ):  # fmt: skip
         assert text in said, text
     written = {file.name for file in (folder / "plots").iterdir()}

@@ -52,8 +52,8 @@ def paper_region(feed: float = 200.0) -> MeasuredRegion:
 def paper_samples(feed: float = 200.0) -> tuple[FloatArray, FloatArray, _core.Path, _core.PlaybackFigures]:
     machine = sg.Machine.load("vx500")
     path = path_program(feed, machine).regions[-1].path
-    played = MachineModel(machine).play_original(path, record_samples=10**6)
-    return played.recorded_command, played.recorded_response, path, played
+    simulated = MachineModel(machine).simulate_original(path, record_samples=10**6)
+    return simulated.recorded_command, simulated.recorded_response, path, simulated
 
 
 def found(arc: _core.ArcFigures | None) -> _core.ArcFigures:
@@ -158,15 +158,15 @@ def test_walls_are_the_edges_of_the_swept_area() -> None:
 
 
 def test_pieces_of_any_size_give_the_same_figures() -> None:
-    command, response, path, played = paper_samples()
+    command, response, path, simulated = paper_samples()
     whole, _ = fed(command, response, path, 10**6)
     pieces, _ = fed(command, response, path, 7)
     for one, other in zip(whole.sections, pieces.sections, strict=True):
         assert one.left.band_mm == other.left.band_mm
         assert one.response.rms_mm == other.response.rms_mm
         np.testing.assert_array_equal(one.peak_mm, other.peak_mm)
-    assert whole.duration_s == pytest.approx(played.duration_s)
-    assert whole.response.max_abs_mm == pytest.approx(played.response.max_abs_mm)
+    assert whole.duration_s == pytest.approx(simulated.duration_s)
+    assert whole.response.max_abs_mm == pytest.approx(simulated.response.max_abs_mm)
 
 
 MEMORY = """
@@ -192,10 +192,10 @@ def test_memory_does_not_grow_with_the_samples() -> None:
 
 def test_vibration_is_that_of_the_playback() -> None:
     figures = paper_region().figures
-    played = paper_samples()[3]
-    np.testing.assert_allclose(figures.rest.residual_mm, played.residual_mm, rtol=5e-3, atol=1e-9)
+    simulated = paper_samples()[3]
+    np.testing.assert_allclose(figures.rest.residual_mm, simulated.residual_mm, rtol=5e-3, atol=1e-9)
     peaks = np.max([section.peak_mm for section in figures.sections], axis=0)
-    np.testing.assert_allclose(peaks, played.peak_mm, rtol=0.05, atol=1e-9)
+    np.testing.assert_allclose(peaks, simulated.peak_mm, rtol=0.05, atol=1e-9)
     assert [section.rest is None for section in figures.sections] == [True, True, False]
 
 
@@ -221,14 +221,14 @@ def test_random_programs_keep_what_the_playback_says() -> None:
         text = program(moves, machine)
         measured = sg.measure(text, machine, 4.0)
         figures = measured.programs[0].regions[0].figures
-        played = MachineModel(machine).play_original(text.regions[0].path)
-        assert figures.duration_s == pytest.approx(played.duration_s)
-        assert figures.response.max_abs_mm == pytest.approx(played.response.max_abs_mm, abs=1e-6)
+        simulated = MachineModel(machine).simulate_original(text.regions[0].path)
+        assert figures.duration_s == pytest.approx(simulated.duration_s)
+        assert figures.response.max_abs_mm == pytest.approx(simulated.response.max_abs_mm, abs=1e-6)
         assert sum(section.section.length_mm for section in figures.sections) == pytest.approx(
             text.regions[0].path.length_mm
         )
         assert max(section.response.most_positive_mm for section in figures.sections) == pytest.approx(
-            played.response.most_positive_mm, abs=1e-6
+            simulated.response.most_positive_mm, abs=1e-6
         )
 
 

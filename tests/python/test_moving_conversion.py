@@ -79,11 +79,11 @@ def test_following_leaves_a_fraction_of_what_one_shaper_leaves(contour: str) -> 
     assert followed.to_dict()["shaper"]["following"]["axis"] == "z"
     was = followed.to_dict()["residual_vibration_um"]["original"]["x"]
     left = followed.to_dict()["residual_vibration_um"]["emitted"]["x"]
-    # The same program with one shaper for the nominal frequency, played by the same plant.
+    # The same program with one shaper for the nominal frequency, simulated by the same plant.
     fixed_machine = sg.Machine.from_toml(machine.to_toml().replace("frequency_over = ", "# frequency_over = ", 1))
     fixed = sg.convert(Program.from_text(zig_zag(21, 40.0), fixed_machine), fixed_machine)
     blocks = fixed.emitted.core.cutting_path(fixed.placed[0].first_line, fixed.placed[0].last_line)
-    one_left = MachineModel(machine).play_emitted(blocks, program.regions[0].path).residual_mm[0] * 1e3
+    one_left = MachineModel(machine).simulate_emitted(blocks, program.regions[0].path).residual_mm[0] * 1e3
     assert was > 20.0
     assert left < 0.01 * was
     assert left < 0.2 * one_left

@@ -173,7 +173,7 @@ def test_the_plant_solves_the_varying_equation() -> None:
     options.measure_contour = False
     options.record_samples = count + 1
     positions = np.column_stack([x, 0.0 * x, z])
-    played = _core.play_samples(positions, _core.Path([]), options).recorded_response[:, 0]
+    simulated = _core.play_samples(positions, _core.Path([]), options).recorded_response[:, 0]
 
     def slope(t: float, state: np.ndarray) -> list[float]:
         omega = 2.0 * np.pi * np.interp(np.interp(t, time, z), [0.0, 200.0, 400.0], [52.0, 46.0, 41.0])
@@ -186,7 +186,7 @@ def test_the_plant_solves_the_varying_equation() -> None:
     state, worst, largest = np.array([x[0], 0.0]), 0.0, 0.0
     for k in range(count):
         state = solve_ivp(slope, (time[k], time[k + 1]), state, rtol=1e-9, atol=1e-11).y[:, -1]
-        worst = max(worst, abs(state[0] - played[k + 1]))
+        worst = max(worst, abs(state[0] - simulated[k + 1]))
         largest = max(largest, abs(state[0] - x[k + 1]))
     assert largest > 0.3
     assert worst < 5e-5 * largest  # Z travels at up to 2.6 m/s; the error falls with the square of the tick
@@ -355,14 +355,14 @@ def test_a_zig_zag_along_z_leaves_next_to_nothing_at_its_stops() -> None:
 
 
 def test_the_verdict_sees_the_mode_that_moves() -> None:
-    """A stop at Z 400 swings at 41 Hz: the playback of a machine with a table says what one with 41 Hz says."""
+    """A stop at Z 400 swings at 41 Hz: the simulation of a machine with a table says what one with 41 Hz says."""
     machine, slow = machine_with(OVER_Z), machine_with(OVER_Z, nominal=41.0)
     plain = Machine.from_toml(slow.to_toml().replace("frequency_over =", "# frequency_over =", 1))
     path = _core.Path([_core.Segment.line([0.0, 0.0, 100.0], [30.0, 0.0, 100.0], 100.0)])
-    deep = MachineModel(machine).play_original(path, offset=(0.0, 0.0, 300.0)).residual_mm[0]
-    assert deep == pytest.approx(MachineModel(plain).play_original(path).residual_mm[0], rel=1e-4)
-    unknown = MachineModel(machine).play_original(path, offset=(0.0, 0.0, None)).residual_mm[0]
-    nominal = MachineModel(Machine.load("vx500")).play_original(path).residual_mm[0]
+    deep = MachineModel(machine).simulate_original(path, offset=(0.0, 0.0, 300.0)).residual_mm[0]
+    assert deep == pytest.approx(MachineModel(plain).simulate_original(path).residual_mm[0], rel=1e-4)
+    unknown = MachineModel(machine).simulate_original(path, offset=(0.0, 0.0, None)).residual_mm[0]
+    nominal = MachineModel(Machine.load("vx500")).simulate_original(path).residual_mm[0]
     assert unknown == nominal
     assert abs(deep - nominal) > 1e-4
 

@@ -52,8 +52,8 @@ def vx500() -> sg.Machine:
 def ideal(feed: int, ratio: float) -> tuple[Vector, _core.PlaybackFigures]:
     """The ideal command every 10 us, (n, 3), and its figures."""
     program = path_program(feed, vx500())
-    samples, played = ideal_command(program.regions[-1].path, vx500(), ratio)
-    return np.asarray(samples), played
+    samples, simulated = ideal_command(program.regions[-1].path, vx500(), ratio)
+    return np.asarray(samples), simulated
 
 
 def paper_text(feed: int) -> str:
@@ -72,11 +72,11 @@ def unshaped_residual_um(feed: int, ratio: float, period_s: float = 1e-3) -> Vec
 
 @pytest.mark.parametrize(("feed", "ratio", "percent", "added"), CONDITIONS)
 def test_orbit_error_and_time_of_the_ideal_command(feed: int, ratio: float, percent: float, added: float) -> None:
-    command, played = ideal(feed, ratio)
-    assert played.orbit_error_percent == pytest.approx([percent], abs=5e-4)
+    command, simulated = ideal(feed, ratio)
+    assert simulated.orbit_error_percent == pytest.approx([percent], abs=5e-4)
     path = path_program(feed, vx500()).regions[-1].path
     unshaped_s = _core.plan_speed(path, motion_limits(vx500())).duration_s
-    assert (played.duration_s / unshaped_s - 1.0) * 100.0 == pytest.approx(added, abs=0.1)
+    assert (simulated.duration_s / unshaped_s - 1.0) * 100.0 == pytest.approx(added, abs=0.1)
     # It leaves nothing: the paper's claim.
     assert residual_um(command, [[(46.0, 0.02)], [(131.0, 0.02)], None], 1e-5).max() < 0.02
 

@@ -431,7 +431,7 @@ def unmeasured_machine(keys: dict[str, Any], remarks: dict[str, str]) -> sg.Mach
 
 
 def replayed(judged: Judged, modes: list[list[Mode]], filter_ms: int) -> tuple[float, float, float, float]:
-    """Contour error of the table and residuals X, Y, Z, µm: the worst region, as somebody else plays the text."""
+    """Contour error of the table and residuals X, Y, Z, µm: the worst region, as somebody else simulates the text."""
     worst = np.zeros(4)
     tick = judged.machine.controller.interpolation_period_s
     for programmed, blocks, _ in judged.regions():
@@ -446,7 +446,7 @@ def replayed(judged: Judged, modes: list[list[Mode]], filter_ms: int) -> tuple[f
 
 
 def test_verdict_rests_on_a_filter_that_nobody_measured() -> None:
-    """1622 unknown: 24 ms of it would take the circle inwards, by what a second playback finds."""
+    """1622 unknown: 24 ms of it would take the circle inwards, by what a second simulation finds."""
     machine = unmeasured_machine({}, {"controller.shaped_time_constant_s": "assumed"})
     judged = convert(CIRCLE, machine)
     rows = [row for row in judged.conversion.rests_on if row.key == "controller.shaped_time_constant_s"]
@@ -518,13 +518,13 @@ def test_an_axis_that_moves_elsewhere_is_named_too() -> None:
 
 
 def test_what_it_rests_on_costs_no_more_than_the_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Motion played with its contour for unmeasured values: no more than twice the program, or a minute."""
-    played: list[float] = []
+    """Motion simulated with its contour for unmeasured values: no more than twice the program, or a minute."""
+    simulated: list[float] = []
     whole = _Region.play
 
     def counted(region: _Region, trial: Any, *, contour: bool) -> Any:
         figures = whole(region, trial, contour=contour)
-        played.append(figures.time_s if contour else 0.0)
+        simulated.append(figures.time_s if contour else 0.0)
         return figures
 
     monkeypatch.setattr(_Region, "play", counted)
@@ -532,8 +532,8 @@ def test_what_it_rests_on_costs_no_more_than_the_verdict(monkeypatch: pytest.Mon
     machine = machine_with({}).with_remarks({value.key: "assumed" for value in machine_with({}).values()})
     conversion = convert(text, machine, shape_all=True).conversion
     assert conversion.cutting_time_s.emitted > 90.0
-    assert len(played) >= 8
-    assert 0.0 < sum(played) <= 2.01 * conversion.cutting_time_s.emitted
+    assert len(simulated) >= 8
+    assert 0.0 < sum(simulated) <= 2.01 * conversion.cutting_time_s.emitted
 
 
 @pytest.mark.parametrize("twice", ["beside it", "another spelling"])

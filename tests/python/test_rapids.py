@@ -117,9 +117,9 @@ def command_between_cuts(records: list[LineRecord]) -> Vector:
                 continue
             run.append(move)
             if record.exact_stop:
-                played = play(run, period_s=PERIOD_S)
-                moved = [axis for axis, way in zip("XYZ", np.ptp(played, axis=0), strict=True) if way > 0.0]
-                points = hold(np.concatenate([points, played[1:]]), max(ARRIVAL_S[axis] for axis in moved))
+                simulated = play(run, period_s=PERIOD_S)
+                moved = [axis for axis, way in zip("XYZ", np.ptp(simulated, axis=0), strict=True) if way > 0.0]
+                points = hold(np.concatenate([points, simulated[1:]]), max(ARRIVAL_S[axis] for axis in moved))
                 run = []
     assert not run
     return points

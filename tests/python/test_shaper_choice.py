@@ -349,7 +349,7 @@ def test_candidate_periods() -> None:
     periods_s = candidate_periods(PAPER, sg.Machine.load("vx500"), 0.25)
     assert periods_s[0] == pytest.approx(0.005)
     assert periods_s == sorted(periods_s)
-    # no grid has a non-negative design so short: the finest ones that the controller plays
+    # no grid has a non-negative design so short: the finest ones that the controller simulates
     assert candidate_periods(PAPER, None, 0.003) == pytest.approx([0.001, 0.002, 0.003])
     slow = candidate_periods([ModeBand(Mode(0.5, 0.0))], None, 6.0)
     assert all(a < b for a, b in itertools.pairwise(slow))

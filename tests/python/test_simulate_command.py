@@ -113,20 +113,20 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 @pytest.mark.parametrize("motion", ["look_ahead", "after_interpolation"])
 def test_motion_takes_the_cycle_time(motion: str) -> None:
     machine = machine_with(controller={"motion": motion}, times={"tool_change_s": 2.5, "m_function_s": 0.125})
-    played = streamed(WHOLE, machine)
+    simulated = streamed(WHOLE, machine)
     time = sg.cycle_time(sg.Program.from_text(WHOLE, machine), machine, per_block=True)
-    assert played.time_s[-1] == pytest.approx(time.cycle_time_s + REST_S, abs=1e-9)
-    assert played.time_s[-1] == pytest.approx(time.full_interpolation_s + REST_S, abs=1e-9)
+    assert simulated.time_s[-1] == pytest.approx(time.cycle_time_s + REST_S, abs=1e-9)
+    assert simulated.time_s[-1] == pytest.approx(time.full_interpolation_s + REST_S, abs=1e-9)
     # What `time` says of each kind of block is what happens there.
     for name in ("rapid", "dwell", "tool_change"):
-        counted = np.count_nonzero(played.kind == KINDS.index(name)) * TICK_S
+        counted = np.count_nonzero(simulated.kind == KINDS.index(name)) * TICK_S
         assert counted == pytest.approx(sum(block.duration_s for block in time.blocks if block.kind == name), abs=1e-9)
     for block in time.blocks:
         if block.kind in ("rapid", "dwell"):
-            inside = (played.time_s > block.start_s + TICK_S / 2) & (
-                played.time_s < block.start_s + block.duration_s - TICK_S / 2
+            inside = (simulated.time_s > block.start_s + TICK_S / 2) & (
+                simulated.time_s < block.start_s + block.duration_s - TICK_S / 2
             )
-            assert set(played.line[inside]) == {block.line}
+            assert set(simulated.line[inside]) == {block.line}
 
 
 @pytest.mark.parametrize("name", ["CONTOUR_R.NC", "G17_18_19.NC", "TEST_G90.NC"])
@@ -147,12 +147,12 @@ def test_motion_of_a_real_program_takes_its_cycle_time(name: str) -> None:
 
 def test_motion_ends_where_the_program_ends_and_keeps_its_speeds() -> None:
     machine = sg.Machine.load("vx500")
-    played = streamed(WHOLE, machine)
-    assert played.command_mm[0] == pytest.approx([0.0, 0.0, 5.0])
-    assert played.command_mm[-1] == pytest.approx([90.0, 45.0, 20.0])
-    steps = np.diff(played.command_mm, axis=0) / TICK_S
-    assert played.velocity_mm_per_s[1:] == pytest.approx(steps, abs=1e-9)
-    cutting = (played.kind == KINDS.index("cutting"))[1:]
+    simulated = streamed(WHOLE, machine)
+    assert simulated.command_mm[0] == pytest.approx([0.0, 0.0, 5.0])
+    assert simulated.command_mm[-1] == pytest.approx([90.0, 45.0, 20.0])
+    steps = np.diff(simulated.command_mm, axis=0) / TICK_S
+    assert simulated.velocity_mm_per_s[1:] == pytest.approx(steps, abs=1e-9)
+    cutting = (simulated.kind == KINDS.index("cutting"))[1:]
     assert np.linalg.norm(steps[cutting], axis=1).max() == pytest.approx(100.0, rel=1e-6)
     rapids = [axis.rapid_mm_per_min / 60.0 for axis in machine.axes.as_tuple()]
     assert (np.abs(steps).max(axis=0) <= np.array(rapids) * (1 + 1e-9)).all()
@@ -164,8 +164,8 @@ def test_shaped_program_moves_block_by_block() -> None:
     emitted = sg.Program.from_text(conversion.text, machine, source="emitted")
     # Cutting blocks at their feed, and what the filter adds to each region.
     figures = [run.figures for run in sg.simulate(emitted, machine, shaped=True, record_samples=0).regions]
-    played = streamed(conversion.text.decode(), machine, shaped=True)
-    cutting = np.count_nonzero(played.kind == KINDS.index("cutting"))
+    simulated = streamed(conversion.text.decode(), machine, shaped=True)
+    cutting = np.count_nonzero(simulated.kind == KINDS.index("cutting"))
     expected = sum(round(each.duration_s / TICK_S) for each in figures)
     # The end of a region is seen one period behind its last motion; the rest behind the program's end is cutting's too.
     assert abs(cutting - expected - round(REST_S / TICK_S)) <= len(figures) + 1
@@ -183,10 +183,10 @@ def test_csv_and_npz_hold_the_same_motion_as_the_api(folder: Path) -> None:
     assert main(["simulate", "part.nc", "-m", "vx500", "--csv", "m.csv", "--npz", "m.npz", "--json", "r.json"]) == 0
     csv, npz = read_csv(folder / "m.csv"), np.load(folder / "m.npz")
     machine = sg.Machine.load("vx500")
-    played = streamed(WHOLE, machine)
-    assert list(csv) == ["kind", *played.columns()]
+    simulated = streamed(WHOLE, machine)
+    assert list(csv) == ["kind", *simulated.columns()]
     assert set(npz) == {*csv, "kind_names"}
-    for name, column in played.columns().items():
+    for name, column in simulated.columns().items():
         assert npz[name].dtype == column.dtype
         np.testing.assert_array_equal(npz[name], column)
         np.testing.assert_array_equal(csv[name], npz[name])
@@ -271,10 +271,10 @@ def test_feed_drive_response_is_that_of_solve_ivp(folder: Path) -> None:
     command = columns["x_command_mm"][:160]
     assert np.ptp(command) > 1.0
     assert command[0] == 0.0
-    played = reference.play(reference.Drive(drive, TICK_S), command[1:], method="Radau", rtol=1e-7, atol_m=1e-11)
-    np.testing.assert_allclose(columns["x_response_mm"][1:160], played[:, 0], rtol=0.0, atol=2e-5)
-    np.testing.assert_allclose(columns["x_motor_mm"][1:160], played[:, 2], rtol=0.0, atol=2e-5)
-    np.testing.assert_allclose(columns["x_friction_force_n"][1:160], played[:, 3], rtol=0.0, atol=0.1)
+    simulated = reference.play(reference.Drive(drive, TICK_S), command[1:], method="Radau", rtol=1e-7, atol_m=1e-11)
+    np.testing.assert_allclose(columns["x_response_mm"][1:160], simulated[:, 0], rtol=0.0, atol=2e-5)
+    np.testing.assert_allclose(columns["x_motor_mm"][1:160], simulated[:, 2], rtol=0.0, atol=2e-5)
+    np.testing.assert_allclose(columns["x_friction_force_n"][1:160], simulated[:, 3], rtol=0.0, atol=0.1)
     report = json.loads((folder / "r.json").read_text())
     jsonschema.validate(report, schema(sg.Simulation))
     assert report["plant"] == "feed-drive"
@@ -397,9 +397,9 @@ def test_the_motion_is_drawn_into_the_callers_axes() -> None:
     figure.draw_without_rendering()
     assert panel.get_window_extent().y1 < places[0].get_window_extent().y0
     command, response = panel.get_lines()[:2]
-    played = streamed(SHORT, machine)
-    np.testing.assert_array_equal(command.get_ydata(), played.command_mm[:, 0])
-    np.testing.assert_array_equal(response.get_ydata(), played.response_mm[:, 0])
+    simulated = streamed(SHORT, machine)
+    np.testing.assert_array_equal(command.get_ydata(), simulated.command_mm[:, 0])
+    np.testing.assert_array_equal(response.get_ydata(), simulated.response_mm[:, 0])
 
 
 def test_a_simulation_draws_what_was_asked_for() -> None:

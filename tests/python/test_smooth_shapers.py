@@ -98,7 +98,7 @@ def test_the_taps_are_samples_of_one_polynomial(name: str, text: str, period_s: 
 @pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize(("hz", "zeta", "period_s"), [(30.0, 0.1, 0.001), (46.0, 0.02, 0.005), (46.0, 0.0, 0.004)])
 def test_a_mode_rests_after_a_smoothed_step(name: str, hz: float, zeta: float, period_s: float) -> None:
-    """SciPy plays the staircase that the blocks are; after the last tap the mode stands still."""
+    """SciPy simulates the staircase that the blocks are; after the last tap the mode stands still."""
     shaper = of(name, f"{hz}:{zeta}", period_s)
     omega = 2.0 * np.pi * hz
     a, b = np.array([[0.0, 1.0], [-(omega**2), -2.0 * zeta * omega]]), np.array([[0.0], [omega**2]])

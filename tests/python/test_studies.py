@@ -46,7 +46,7 @@ def paper_study() -> sg.MachineStudy:
 
 
 def test_quantiles_are_those_of_fifty_machines_played_one_by_one() -> None:
-    """The text is read, played and shaken by code that shares nothing with the package."""
+    """The text is read, simulated and shaken by code that shares nothing with the package."""
     conversion = sg.convert(path_program(200, VX500), VX500)
     (place,) = conversion.placed
     emitted = interpret(conversion.text.decode()).lines[place.first_line - 1 : place.last_line]

@@ -28,7 +28,7 @@ def test_residual_is_the_swing_behind_the_motor(machine: sg.Machine) -> None:
     """Against the columns of the motion in time, worked out here."""
     program = sg.Program.from_text(PART, machine)
     (region,) = program.regions
-    played = MachineModel(machine).play_original(region.path)
+    simulated = MachineModel(machine).simulate_original(region.path)
     chunks = list(sg.stream(program, machine, plant="feed-drive"))
     command, response, motor = (
         np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in ("command_mm", "response_mm", "motor_mm")
@@ -39,7 +39,7 @@ def test_residual_is_the_swing_behind_the_motor(machine: sg.Machine) -> None:
         far = np.flatnonzero(np.abs(motor[rests:, axis] - command[rests:, axis]) > width_mm)
         swing = (response - motor)[rests + (far[-1] + 1 if far.size else 0) :, axis]
         expected_um = 1e3 * np.max(np.abs(swing - swing[-200:].mean()))
-        assert 1e3 * played.residual_mm[axis] == pytest.approx(expected_um, rel=0.25, abs=0.3)
+        assert 1e3 * simulated.residual_mm[axis] == pytest.approx(expected_um, rel=0.25, abs=0.3)
 
 
 def test_the_verdict_holds_the_lag(machine: sg.Machine, tmp_path: Path) -> None:

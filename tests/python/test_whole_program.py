@@ -119,7 +119,7 @@ def test_a_cut_left_unchanged_that_misses_a_limit_is_in_the_first_three_lines() 
 
 def test_whole_program_figures_are_the_independent_players() -> None:
     """Shaped cuts and cuts left unchanged, by an interpreter, a player and a plant that share no code with ours."""
-    # Without acceleration ramps before interpolation an original is what the player plays: block by block, smoothed.
+    # Without acceleration ramps before interpolation an original is simulated block by block, smoothed.
     machine = machine_with({"controller.motion": "after_interpolation", "controller.time_constant_s": 0.024,
                             "controller.block_end": "carry", "tolerance.contour_um": 60.0})  # fmt: skip
     text = part(SQUARE, SLOW, SQUARE)

@@ -122,7 +122,7 @@ def test_an_uncertain_damping_has_its_cases(stated: dict[str, float], names: lis
 
 
 def test_less_damping_is_the_worse_end() -> None:
-    """Both ends of the damping leave the same to first order, and the lower end more: so it alone is played."""
+    """Both ends of the damping leave the same to first order, and the lower end more: so it alone is simulated."""
     worst = {-1.0: 0.0, 1.0: 0.0}
     families = ["zv", "mzv", "ei", "non-negative"]
     for design in choose_shaper(["46:0.02±2%", "131:0.02±1%"], periods_s=[0.005], families=families).designs:

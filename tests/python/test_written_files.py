@@ -281,17 +281,17 @@ assert main(["time", "p.nc", "-m", "vx500"]) == 0
 
 def test_a_solver_that_another_thread_took_is_made_anew() -> None:
     """Between looking and taking another thread may take the last one: here at every look."""
-    from shapegcode.shaping import linear_program
+    from shapegcode.shaping import cutting_planes
 
     class Taken(list[object]):
         def __bool__(self) -> bool:
             return True
 
-    before = linear_program._FREE
-    linear_program._FREE = Taken()  # type: ignore[assignment]
+    before = cutting_planes._FREE
+    cutting_planes._FREE = Taken()  # type: ignore[assignment]
     try:
-        program = linear_program.LinearProgram(np.zeros(1), np.ones(1), (np.ones((1, 1)), np.ones(1)))
+        program = cutting_planes.LinearProgram(np.zeros(1), np.ones(1), (np.ones((1, 1)), np.ones(1)))
         program.set_cost(np.ones(1))
         assert program.solve() == pytest.approx([1.0])
     finally:
-        linear_program._FREE = before
+        cutting_planes._FREE = before

@@ -15,7 +15,7 @@ from shapegcode._core import ProgramError
 from shapegcode.checking.result import Check, Finding, FindingCounts, SerialLine, ShortBlocks, ShortRun, StarvedRun
 from shapegcode.checking.runs import BlockTable, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
 from shapegcode.program.operating import no_room
@@ -105,7 +105,7 @@ def check_text(
     too_long = len(data) > machine.controller.max_program_bytes  # and no more of it may have been read
     short: ShortBlocks | None = None
     dnc: SerialLine | None = None
-    played: PlayedPrograms | None = None
+    simulated: SimulatedPrograms | None = None
     try:
         program = Program.from_text(
             data, machine, source=source, program_number=program_number, collect_alarms=not too_long, folder=folder
@@ -128,7 +128,7 @@ def check_text(
         found += _feed_findings(program, table)
         found += _low_feed_findings(program, machine)
         if not program.core.alarms:
-            played = PlayedPrograms(program, machine, labels=("program", ""))
+            simulated = SimulatedPrograms(program, machine, labels=("program", ""))
         short = _short_blocks(program, machine, table)
         found += _short_findings(program, machine, table.runs)
         if machine.controller.dnc_baud > 0:
@@ -145,7 +145,7 @@ def check_text(
         machine.controller.program_memory_bytes,
         short,
         dnc,
-        played=played,
+        simulated=simulated,
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.program.operating import no_room
 from shapegcode.results.json import hidden
 from shapegcode.results.page.model import Figure
@@ -176,7 +176,7 @@ class Check(Result):
         memory_bytes: of the control.
         short_blocks: blocks that last less than the block time; None: the program was not read.
         dnc: the serial line; None: not drip fed, or not read.
-        played: the program, to play it for a page; None: the control refuses something in it.
+        simulated: the program, to play it for a page; None: the control refuses something in it.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "refused": bool}
@@ -190,7 +190,7 @@ class Check(Result):
     memory_bytes: int
     short_blocks: ShortBlocks | None
     dnc: SerialLine | None
-    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
+    simulated: SimulatedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def refused(self) -> bool:

@@ -203,7 +203,7 @@ def _write_origins(name: str) -> None:
 
 
 def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescription:
-    """With the values that nobody measured, by what they do to a program."""
+    """With the values that were not measured, by what they do to a program."""
 
     from shapegcode.conversion.convert import convert
     from shapegcode.conversion.open_axes import open_axes
@@ -223,7 +223,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
             rows = open_axes(args.input, machine)
             said = (
                 "no axis has a vibration mode, so there is nothing to shape for: each that may have one was given a "
-                "usual one, and played the program as it is"
+                "usual one, and simulated the program as it is"
                 if rows
                 else "every axis is said to be rigid, so there is nothing to shape for"
             )

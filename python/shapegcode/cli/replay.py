@@ -16,7 +16,7 @@ from shapegcode.cli import COMMANDS, parser_of
 from shapegcode.cli.options import load_machine, overridden
 from shapegcode.cli.runner import MACHINES
 from shapegcode.machine import Machine
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.program.compensation import read_for_conversion
 from shapegcode.results.json import Made, MadeFile, file_hash
@@ -60,9 +60,9 @@ def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
     )
 
 
-def played_again(
+def simulated_again(
     made: Made, found: Mapping[tuple[str, str], Path], report: Mapping[str, Any]
-) -> tuple[PlayedPrograms | None, str]:
+) -> tuple[SimulatedPrograms | None, str]:
     """Read the programs and the machine of a run again, with the options that it was run with."""
 
     if made.result not in _WITH_MOTION or not made.command or "program_address" in report:
@@ -97,7 +97,7 @@ def _typed(command: str) -> argparse.Namespace | None:
 
 def _read_again(
     made: Made, found: Mapping[tuple[str, str], Path], args: argparse.Namespace, plant: str
-) -> PlayedPrograms | None:
+) -> SimulatedPrograms | None:
     inputs = [place for (role, _), place in found.items() if role in ("input", "inputs")]
     if not inputs:
         return None
@@ -113,7 +113,7 @@ def _read_again(
         labels = (inputs[0].name, made_of_it.name if made_of_it is not None else "")
     emitted = None if made_of_it is None else Program.read(made_of_it, machine)
     plant = machine.verdict.plant if conversion else plant
-    return PlayedPrograms(original, machine, emitted, labels=labels, plant=plant)
+    return SimulatedPrograms(original, machine, emitted, labels=labels, plant=plant)
 
 
 def _machine(args: argparse.Namespace, found: Mapping[tuple[str, str], Path]) -> Machine:

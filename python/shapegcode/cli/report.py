@@ -69,7 +69,7 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
     """The page of a result, and the result's class; empty: this version cannot read it."""
 
     from shapegcode._core import ArgumentError
-    from shapegcode.cli.replay import changes, played_again
+    from shapegcode.cli.replay import changes, simulated_again
     from shapegcode.results.json import this_version
     from shapegcode.results.outcome import NotKeptError
     from shapegcode.results.page.default import raw_page
@@ -80,9 +80,9 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
         problems = [] if made.by == this_version() else [f"made by {made.by}; this page by {this_version()}"]
         found, changed = changes(made, source.parent)
         problems += changed
-        played, why = (None, "") if changed else played_again(made, found, report)
+        simulated, why = (None, "") if changed else simulated_again(made, found, report)
         problems += [why] if why else []
-        result = revived(report, {"played": played})
+        result = revived(report, {"simulated": simulated})
     except ArgumentError as error:
         if not isinstance(report.get("made"), dict):
             raise ArgumentError(f"{source}: {error}") from None

@@ -64,7 +64,7 @@ def _called(several: Gathered, machine: Machine) -> set[int]:
         except ProgramError:
             continue  # its own run says why
         called |= {*program.core.called, *(each.index for each in program.kept_calls)} - {place.index}
-    # Programs that call each other in a ring are done all the same.
+    # Programs that call each other in a ring are done nevertheless.
     return called if len(called) < len(several.places) else set()
 
 

@@ -51,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--lines",
         metavar="A-B",
         type=line_range,
-        help="motion in time of these lines alone, as `shapegcode expand` numbers them; the program is played from its "
-        "start in any case",
+        help="motion in time of these lines alone, as `shapegcode expand` numbers them; the program is simulated from "
+        "its start in any case",
     )
     add_plots_argument(
         parser,
@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Play one program."""
+    """Simulate one program."""
 
     from shapegcode.model.shaped_program import shaped_note
     from shapegcode.program import Program

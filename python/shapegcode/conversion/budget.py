@@ -260,19 +260,19 @@ class Spending:
         """Choose regions that must be left unchanged; False if the text fits."""
         self._before = self._before or _needs(grid, written)
         loads = written.loads
-        played = dict(zip(loads, verdicts, strict=True))
+        simulated = dict(zip(loads, verdicts, strict=True))
         chosen = {index: reason for index, load in loads.items() if (reason := self.budget.too_fast(load))}
         for index, reason in chosen.items():
             if not self._keepable[index]:
                 raise self._impossible(index, reason)
         if self._longer:
             at = f"at a block period of {grid.block_period_s * 1e3:g} ms"
-            missed = (index for index in loads if played[index].misses and self._keepable[index])
-            chosen = {index: f"{played[index].misses[0]}, {at}" for index in missed} | chosen
+            missed = (index for index in loads if simulated[index].misses and self._keepable[index])
+            chosen = {index: f"{simulated[index].misses[0]}, {at}" for index in missed} | chosen
         size = written.size - sum(loads[index].extra_bytes for index in chosen)
-        chosen |= self._too_large(size, {k: load for k, load in loads.items() if k not in chosen}, played)
+        chosen |= self._too_large(size, {k: load for k, load in loads.items() if k not in chosen}, simulated)
         for index, reason in chosen.items():
-            region = played[index]
+            region = simulated[index]
             self.given_up[index] = GivenUp(
                 region.lines, reason, region.residual_vibration_um.original, loads[index].extra_bytes
             )
@@ -312,7 +312,7 @@ class Spending:
         return math.fsum(weights[index] for index in slow), len(slow), -round(grid.duration_s / self._tick_s)
 
     def _too_large(
-        self, size: int, loads: Mapping[int, TransferLoad], played: Mapping[int, RegionVerdict]
+        self, size: int, loads: Mapping[int, TransferLoad], simulated: Mapping[int, RegionVerdict]
     ) -> dict[int, str]:
         """Regions to keep so that the text fits: least gain per byte first."""
         limit = self.budget.max_bytes
@@ -320,7 +320,7 @@ class Spending:
             if limit is not None and not loads and self._program.core.size > limit:
                 raise self._too_large_error(self._program.core.size)
             return {}
-        gain = {index: self._gain(index, played[index]) for index in loads}
+        gain = {index: self._gain(index, simulated[index]) for index in loads}
         costly = [index for index, load in loads.items() if load.extra_bytes > 0 and self._keepable[index]]
         # Where the gain is negative, more of it per byte would be less: such regions go first, the worst before all.
         order = sorted(costly, key=lambda k: (gain[k] / (loads[k].extra_bytes if gain[k] > 0.0 else 1.0), k))

@@ -21,11 +21,11 @@ def open_axes(program: Program | str | Path, machine: Machine) -> tuple[RestsOn,
         for letter in unknown
         for key, value in ((f"axes.{letter}.rigid", False), (f"axes.{letter}.modes", unknown[letter].modes))
     }
-    played = simulate(program, machine.with_values(assumed) if assumed else machine, record_samples=0)
+    simulated = simulate(program, machine.with_values(assumed) if assumed else machine, record_samples=0)
     rows = [
         RestsOn(
             axis.value.key, "none", "assumed", axis.moved, f"residual vibration {letter.upper()}", 0.0,
-            getattr(played.residual_vibration_um, letter), machine.tolerance.residual_floor_um,
+            getattr(simulated.residual_vibration_um, letter), machine.tolerance.residual_floor_um,
         )
         for letter, axis in unknown.items()
     ]  # fmt: skip

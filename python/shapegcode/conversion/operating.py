@@ -20,7 +20,7 @@ from shapegcode.model.modes import slowest_mode
 from shapegcode.program import Program
 from shapegcode.program.operating import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK, no_room
 from shapegcode.results.table import Column, Table
-from shapegcode.verdict.figures import Placed, PlayedFigures
+from shapegcode.verdict.figures import Placed, ProgramFigures
 
 _NAMED_LINES = 4
 _SHOWN_POINTS = 12
@@ -48,7 +48,7 @@ def at_the_control(
     emitted: Program,
     placed: Sequence[Placed],
     loads: Mapping[int, TransferLoad],
-    figures: PlayedFigures,
+    figures: ProgramFigures,
     model: MachineModel,
     block_period_s: float,
     restarts: Sequence[CutRestarts],
@@ -129,14 +129,14 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
     return f"{needs}; the program switches no mode: contour control with look-ahead (G05.1Q1, G08P1) must be off"
 
 
-def _at_other_overrides(figures: PlayedFigures) -> Iterator[str]:
+def _at_other_overrides(figures: ProgramFigures) -> Iterator[str]:
     turned = [case for case in figures.cases if case.override != 1.0 and case.mode is None]
     worst = max(turned, key=lambda each: max(each.residual_um), default=None)
     if worst is not None:
         yield f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of vibration stay"
 
 
-def _single_block(emitted: Program, placed: Sequence[Placed], figures: PlayedFigures, model: MachineModel) -> str:
+def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFigures, model: MachineModel) -> str:
     """What single block does to the cut that vibrates most: its blocks simulated one by one, each from rest to rest."""
     index = max(range(len(placed)), key=lambda each: max(figures.regions[each].residual_vibration_um.original))
     place, region = placed[index], figures.regions[index]
@@ -155,8 +155,8 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: PlayedFig
     mark_um = 0.0
     for one in sorted(int(each) for each in fastest):
         block = _core.Path([blocks[one]])
-        played = model.play_emitted(block, block, contour=False, offset=offset)
-        mark_um = max(mark_um, float(np.max([played.peak_mm, played.residual_mm])) * 1e3)
+        simulated = model.simulate_emitted(block, block, contour=False, offset=offset)
+        mark_um = max(mark_um, float(np.max([simulated.peak_mm, simulated.residual_mm])) * 1e3)
     time_s = region.time_s.emitted + len(blocks) * (1.0 / _PRESSES_PER_S + model.shaped_filter.duration_s)
     lines = "{} to {}".format(*region.emitted_lines)
     return (

@@ -17,8 +17,8 @@ from shapegcode.conversion.recommendation import (
     filter_advice,
     most_to_gain_um,
     open_axes,
-    played_warnings,
     recommend,
+    simulation_warnings,
     text_warnings,
 )
 from shapegcode.conversion.restart import restart_points
@@ -27,7 +27,7 @@ from shapegcode.conversion.result import ChangeProof, Conversion
 from shapegcode.conversion.tables import CutOutcome, outcome_of, tools_of_cuts
 from shapegcode.machine import Machine
 from shapegcode.model.modes import machine_warnings, region_range_warnings
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
@@ -37,7 +37,7 @@ from shapegcode.verdict.figures import (
     FollowingShapers,
     GridTaps,
     Placed,
-    PlayedFigures,
+    ProgramFigures,
     UsedShaper,
 )
 from shapegcode.verdict.judge import RegionFigures, rapid_vibration_um, simulate_unchanged, unshaped_regions
@@ -47,7 +47,7 @@ from shapegcode.verdict.judge import RegionFigures, rapid_vibration_um, simulate
 class JudgedProgram:
     """The whole emitted program beside its limits, its price and its original."""
 
-    figures: PlayedFigures
+    figures: ProgramFigures
     cuts: tuple[CutOutcome, ...]
     cycle_time_s: Pair[float]
     proof: ChangeProof | None
@@ -150,7 +150,7 @@ def result_of(plan: ConversionPlan, shaped: Shaped, judged: JudgedProgram) -> Co
         restart_points=restart_points(program, zip(shaped.written.placed, shaped.written.restarts, strict=True)),
         emitted=emitted,
         placed=tuple(shaped.written.placed),
-        played=PlayedPrograms(program, machine, emitted, plant=machine.verdict.plant),
+        simulated=SimulatedPrograms(program, machine, emitted, plant=machine.verdict.plant),
     )
 
 
@@ -179,7 +179,7 @@ def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, Regio
     ]
 
 
-def _cuts(plan: ConversionPlan, shaped: Shaped, figures: PlayedFigures) -> tuple[CutOutcome, ...]:
+def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tuple[CutOutcome, ...]:
     """One row for each cut."""
     tools = tools_of_cuts(plan.program)
     sizes = {
@@ -233,7 +233,7 @@ def _cycle_time_s(plan: ConversionPlan, shaped: Shaped, emitted_s: float, cuttin
     return Pair(original_s, original_s - cutting.original + cutting.emitted + added_s)
 
 
-def _warnings(plan: ConversionPlan, shaped: Shaped, figures: PlayedFigures) -> list[str]:
+def _warnings(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> list[str]:
     program, machine, written = plan.program, plan.machine, shaped.written
     warnings = [*program.warnings, *written.kept_warnings, *machine_warnings(machine)]
     warnings += [plan.grid.note] if plan.grid.note else []
@@ -245,7 +245,7 @@ def _warnings(plan: ConversionPlan, shaped: Shaped, figures: PlayedFigures) -> l
     if not written.placed:
         # Where something was shaped, the sensitivity to unverified parameters names them.
         warnings += open_axes(program, machine)
-    warnings += played_warnings(program, figures, machine, is_priced=bool(plan.aims.priced))
+    warnings += simulation_warnings(program, figures, machine, is_priced=bool(plan.aims.priced))
     warnings += text_warnings(program, written.placed, figures, machine, written.size, written.blocks)
     return warnings + (shaped.rapids.warnings if shaped.rapids is not None else [])
 

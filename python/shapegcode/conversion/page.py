@@ -86,8 +86,8 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     if not conversion.nothing_shaped:
         table = before_after_table(conversion.before_after())
         yield Section("figures", "All figures, before and after", (table,), folded=True, printed=False)
-    if conversion.played is not None:
-        yield _machine(conversion.played.machine)
+    if conversion.simulated is not None:
+        yield _machine(conversion.simulated.machine)
     yield from pictures_of(conversion, ("path", "vibration"))
     if conversion.at_the_control:
         yield _sheet(conversion, made)

@@ -76,7 +76,7 @@ class ConversionPlan:
         self.model = MachineModel(machine)
         # Simulated while the shapers are designed.
         self.originals = [
-            pool.submit(self.model.play_original, region.path, offset=self.model.offset(region))
+            pool.submit(self.model.simulate_original, region.path, offset=self.model.offset(region))
             for region in program.regions
         ]
         fastest = max((region.path.fastest_feed_mm_per_s for region in program.regions), default=0.0)

@@ -9,7 +9,7 @@ from shapegcode.conversion.aims import ToleranceCurve
 from shapegcode.conversion.result import Conversion
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results import plot
-from shapegcode.results.path_plots import RECORD_SAMPLES, PlayedRegion, motion_pictures
+from shapegcode.results.path_plots import RECORD_SAMPLES, SimulatedRegion, motion_pictures
 from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def plots_of(conversion: Conversion) -> dict[str, Plot]:
     """Path, feed and vibration of the region that vibrates most after its stop, before and after."""
-    found = motion_pictures(partial(_played, conversion)) if conversion.regions else {}
+    found = motion_pictures(partial(_simulated, conversion)) if conversion.regions else {}
     if conversion.tolerance_curve is not None and len(conversion.tolerance_curve.points) > 1:
         found["tolerance"] = partial(plot_tolerance, conversion.tolerance_curve)
     return found
@@ -54,17 +54,19 @@ def plot_tolerance(curve: ToleranceCurve, ax: Axes | None = None) -> Axes:
     return panel
 
 
-def _played(conversion: Conversion) -> PlayedRegion:
+def _simulated(conversion: Conversion) -> SimulatedRegion:
     worst = max(
         range(len(conversion.regions)), key=lambda rank: max(conversion.regions[rank].residual_vibration_um.original)
     )
-    place, handle = conversion.placed[worst], conversion.played
+    place, handle = conversion.placed[worst], conversion.simulated
     assert handle is not None  # a conversion from JSON has no places either
     model = MachineModel(handle.machine)
     path, blocks = place.region.path, place.blocks(conversion.emitted)
     offset = model.offset(place.region)
     runs = {
-        "original": model.play_original(path, record_samples=RECORD_SAMPLES, offset=offset),
-        "emitted": model.play_emitted(blocks, path, record_samples=RECORD_SAMPLES, offset=offset),
+        "original": model.simulate_original(path, record_samples=RECORD_SAMPLES, offset=offset),
+        "emitted": model.simulate_emitted(blocks, path, record_samples=RECORD_SAMPLES, offset=offset),
     }
-    return PlayedRegion.of_runs(runs, path, model.period_s, lines=place.original_lines, regions=len(conversion.regions))
+    return SimulatedRegion.of_runs(
+        runs, path, model.period_s, lines=place.original_lines, regions=len(conversion.regions)
+    )

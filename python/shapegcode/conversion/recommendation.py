@@ -17,13 +17,13 @@ from shapegcode.machine.output import Tolerance
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.program.operating import no_room
-from shapegcode.verdict.figures import Placed, PlayedFigures, RegionVerdict
+from shapegcode.verdict.figures import Placed, ProgramFigures, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures
 
 
-def _figures_um(played: _core.PlaybackFigures) -> tuple[float, float]:
+def _figures_um(simulated: _core.PlaybackFigures) -> tuple[float, float]:
     """Residual vibration of the worst axis, contour error of the machine table."""
-    return float(np.max(played.residual_mm)) * 1e3, played.response.max_abs_mm * 1e3
+    return float(np.max(simulated.residual_mm)) * 1e3, simulated.response.max_abs_mm * 1e3
 
 
 def most_to_gain_um(original: _core.PlaybackFigures) -> float:
@@ -191,7 +191,7 @@ def _keeps(program: Program, machine: Machine, judge: Judge, values: dict[str, f
     model = MachineModel(machine.with_values(values))
     limit_mm, floor_mm = machine.tolerance.contour_um * 1e-3, machine.tolerance.residual_floor_um * 1e-3
     for region in program.regions:
-        run = model.play_original(region.path, offset=model.offset(region))
+        run = model.simulate_original(region.path, offset=model.offset(region))
         if getattr(run, judge.target).max_abs_mm > limit_mm or float(run.residual_mm.max()) > floor_mm:
             return False
     return True
@@ -215,7 +215,7 @@ def open_axes(program: Program, machine: Machine) -> list[str]:
     ]
 
 
-def played_warnings(program: Program, figures: PlayedFigures, machine: Machine, *, is_priced: bool) -> list[str]:
+def simulation_warnings(program: Program, figures: ProgramFigures, machine: Machine, *, is_priced: bool) -> list[str]:
     """What simulating the emitted program showed: misses, the tolerance that binds, figures made worse."""
     expanded = " expanded" if program.core.expanded else ""
     misses = [
@@ -228,7 +228,7 @@ def played_warnings(program: Program, figures: PlayedFigures, machine: Machine, 
 
 
 def text_warnings(
-    program: Program, placed: Sequence[Placed], figures: PlayedFigures, machine: Machine, size: int, blocks: int
+    program: Program, placed: Sequence[Placed], figures: ProgramFigures, machine: Machine, size: int, blocks: int
 ) -> list[str]:
     """What the control must be told or cannot do with the emitted text."""
     fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
@@ -240,7 +240,7 @@ def text_warnings(
     ]
 
 
-def _worse(figures: PlayedFigures) -> list[str]:
+def _worse(figures: ProgramFigures) -> list[str]:
     """Figures that the conversion made noticeably worse, within tolerance or not."""
     pairs = [
         (f"{name} {axis.upper()}", both.original[axis], both.emitted[axis])
@@ -259,7 +259,7 @@ def _worse(figures: PlayedFigures) -> list[str]:
     ]
 
 
-def _binding(figures: PlayedFigures, tolerance: Tolerance, rounding_um: float, *, is_priced: bool) -> Iterator[str]:
+def _binding(figures: ProgramFigures, tolerance: Tolerance, rounding_um: float, *, is_priced: bool) -> Iterator[str]:
     """Which tolerance a conversion left, by how much, and what would be feasible; nothing where all were kept."""
     contour = max((region.contour_error_um for region in figures.regions), default=0.0)
     if contour > tolerance.contour_um:

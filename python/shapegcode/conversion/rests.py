@@ -64,7 +64,7 @@ class RestsOn:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A value, what it is moved to in words, and how the region is then played.
+    """A value, what it is moved to in words, and how the region is then simulated.
 
     `moves_command`: the set-points are others too, not the table alone.
     """
@@ -78,7 +78,7 @@ class _Trial:
 
 
 Begun = Mapping[tuple[str, str], "Future[CaseFigures]"]
-"""Playbacks under way, by the value and what it is moved to."""
+"""Simulations under way, by the value and what it is moved to."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class _Region:
         """The figures with a value moved; without the contour they come from the end of the region alone."""
         model, path = MachineModel(trial.machine), self.place.region.path
         contour = contour and self.needs_contour(trial)
-        run = model.play_emitted(
+        run = model.simulate_emitted(
             self.place.blocks(self.emitted), path, shift=trial.shift, only=trial.only,
             offset=model.offset(self.place.region), contour=contour,
             command_contour=self.judge.target == "command", response_contour=self.judge.target == "response",
@@ -138,7 +138,7 @@ def _name(trial: _Trial) -> tuple[str, str]:
 def rests_on(
     judge: Judge,
     machine: Machine,
-    played: Sequence[tuple[Placed, RegionFigures, _core.ContourTracker | None]],
+    simulated: Sequence[tuple[Placed, RegionFigures, _core.ContourTracker | None]],
     emitted: Program,
     deciding_lines: tuple[int, int],
     pool: Executor,
@@ -146,7 +146,7 @@ def rests_on(
     on_step: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> tuple[tuple[RestsOn, ...], int]:
     """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit."""
-    regions = [(_Region(place, emitted, judge, tracker), figures) for place, figures, tracker in played]
+    regions = [(_Region(place, emitted, judge, tracker), figures) for place, figures, tracker in simulated]
     deciding, decided = next(pair for pair in regions if pair[0].place.original_lines == deciding_lines)
     moving = deciding.moving
     trials = [(deciding, decided, trial) for trial in _trials(machine, moving)]
@@ -303,10 +303,10 @@ def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
 def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[RestsOn]:
     """What was simulated anyway and does not count: the other rule of block timing, look-ahead on, an underrun."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
-    for case, played in zip(region.judge.cases, figures.cases, strict=True):
+    for case, simulated in zip(region.judge.cases, figures.cases, strict=True):
         key, said = _key_of(case)
-        if not case.counts and key in unmeasured and played is not None:
-            yield _rests(unmeasured[key], said, region.before(figures), judge_region(played, region.limits(figures)))
+        if not case.counts and key in unmeasured and simulated is not None:
+            yield _rests(unmeasured[key], said, region.before(figures), judge_region(simulated, region.limits(figures)))
 
 
 def _key_of(case: Case) -> tuple[str, str]:

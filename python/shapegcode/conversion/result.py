@@ -23,7 +23,7 @@ from shapegcode.conversion.tables import (
     percent,
     rests_table,
 )
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.figures import CONTOURS, ContourError
 from shapegcode.results.json import Made, exact, hidden, sparse
@@ -31,7 +31,7 @@ from shapegcode.results.page.model import Light, Page, Section
 from shapegcode.results.result import Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table
 from shapegcode.verdict.cases import case_table
-from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, PlayedFigures, UsedShaper
+from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, ProgramFigures, UsedShaper
 
 _VIBRATIONS = {"residual_vibration_um": "residual vibration", "peak_vibration_um": "peak vibration"}
 _LEAST_SHOWN_UM = 0.05
@@ -56,7 +56,7 @@ class ChangeProof:
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
-class Conversion(PlayedFigures, Result):
+class Conversion(ProgramFigures, Result):
     """A program, shaped: the emitted program, and what simulating it beside the original showed.
 
     Attributes:
@@ -88,7 +88,7 @@ class Conversion(PlayedFigures, Result):
         restart_points: blocks inside of shaped cuts at which the control can begin.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
-        played: a handle and no data: both programs and the machine, to simulate them again for a picture or a page.
+        simulated: a handle and no data: both programs and the machine, to simulate them again for a picture or a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool, "shaped_cuts_within": bool}
@@ -121,7 +121,7 @@ class Conversion(PlayedFigures, Result):
     restart_points: tuple[RestartPoint, ...] = ()
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
-    played: PlayedPrograms | None = field(default=None, compare=False, metadata=hidden())
+    simulated: SimulatedPrograms | None = field(default=None, compare=False, metadata=hidden())
 
     __eq__ = Result.__eq__
     __hash__ = Result.__hash__
@@ -130,9 +130,9 @@ class Conversion(PlayedFigures, Result):
     def methods(self) -> tuple[str, ...]:
         """Published methods behind shaper, blocks, controller and proof."""
         found = [f"shaper {self.shaper.family}"]
-        if self.played is not None:
-            found += self.played.methods
-            if self.regions and self.played.machine.emission.rounding == "vibration":
+        if self.simulated is not None:
+            found += self.simulated.methods
+            if self.regions and self.simulated.machine.emission.rounding == "vibration":
                 found.append("rounding of block ends")
         return (*found, "comparison of programs") if self.proof is not None else tuple(found)
 

@@ -60,7 +60,7 @@ class Mover(Protocol):
 
 
 class OrdinaryMotion:
-    """The controller's own motion, as it plays an ordinary program."""
+    """The controller's own motion, as it simulates an ordinary program."""
 
     def __init__(self, machine: Machine) -> None:
         self._controller = MachineModel(machine).ordinary
@@ -79,7 +79,7 @@ class OrdinaryMotion:
 def travel_emitted(
     blocks: _core.Path, path: _core.Path, machine: Machine, stations_mm: Vector, window_s: float
 ) -> Travelled:
-    """Travel of shaped blocks as the controller plays them, along the programmed path; else as `Mover.travel`."""
+    """Travel of shaped blocks as the controller simulates them, along the programmed path; else as `Mover.travel`."""
     model = MachineModel(machine)
     return Travelled.of(
         _core.travel_blocks(blocks, path, model.own_rule, stations_mm, model.period_s, model.shaped.filters, window_s)

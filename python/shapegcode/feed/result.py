@@ -11,7 +11,7 @@ from typing import Any
 from shapegcode.feed.load import FeedTraces, PathLoad, WallMaps, feed_traces, wall_maps
 from shapegcode.feed.plan import FeedPlan
 from shapegcode.feed.survey import Survey
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.json import hidden
 from shapegcode.results.page.model import Figure, Page
@@ -183,7 +183,7 @@ class FeedSchedule(Result):
         survey: what the tool meets.
         plans: the feeds of each region that may change; None for the others.
         loads: along each region; None where nothing is known.
-        played: the program before and after, to play both for a page.
+        simulated: the program before and after, to play both for a page.
     """
 
     program: str
@@ -206,12 +206,12 @@ class FeedSchedule(Result):
     survey: Survey = field(metadata=hidden())
     plans: tuple[FeedPlan | None, ...] = field(metadata=hidden())
     loads: tuple[PathLoad | None, ...] = field(metadata=hidden())
-    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
+    simulated: SimulatedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def methods(self) -> tuple[str, ...]:
         """Published methods of the force and of the controller."""
-        return ("cutting force", *(() if self.played is None else self.played.methods))
+        return ("cutting force", *(() if self.simulated is None else self.simulated.methods))
 
     @property
     def misses(self) -> tuple[str, ...]:
@@ -267,7 +267,7 @@ class FeedSchedule(Result):
             The page, as data.
 
         Raises:
-            MachineError, NumericError: a program cannot be played.
+            MachineError, NumericError: a program cannot be simulated.
         """
         page = super().page(**options)
         if page.scene is None or self.from_json:

@@ -32,7 +32,7 @@ from shapegcode.feed.result import (
 from shapegcode.feed.survey import COMMENT, Survey, SurveyedMove, SurveyedRegion, survey
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.results.result import Pair
 
@@ -266,7 +266,7 @@ def feed_figures(
         survey=surveyed,
         plans=tuple(plans),
         loads=tuple(loads),
-        played=PlayedPrograms(program, machine, written),
+        simulated=SimulatedPrograms(program, machine, written),
     )
 
 

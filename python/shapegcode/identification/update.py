@@ -137,7 +137,7 @@ def update_modes(
 
 
 def _unknown(machine: Machine) -> Iterator[str]:
-    """A note on axes of which nobody knows whether they have a mode."""
+    """A note on axes of which it is not known whether they have a mode."""
     names = [
         name for name, axis in zip("XYZ", machine.axes.as_tuple(), strict=True) if not axis.modes and not axis.rigid
     ]
@@ -151,7 +151,7 @@ _ORIGIN = re.compile(r"^(from [^:]*|assumed|not known|not measured)")
 
 
 def open_modes(machine: Machine, measured: str | None) -> dict[str, str]:
-    """Modes of the other axes that nobody measured on this machine, and over which nobody decided."""
+    """Modes of the other axes that were not measured on this machine, and over which nobody decided."""
     found: dict[str, list[str]] = {}
     for value in machine.values():
         parts = value.key.split(".")

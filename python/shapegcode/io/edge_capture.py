@@ -209,8 +209,8 @@ class EdgeCapture:
         """Position of an axis without the jumps of whole turns with which a control keeps a rotary axis small.
 
         A step of more than half a turn within one cycle is taken as such a jump where whole turns less it goes on as
-        the steps before: no axis moves that fast (90 m/s, 15 000 rpm at 2 ms). Behind a gap nobody knows how many turns
-        were made: there it starts anew with the value of the file. Command and actual position are straightened with
+        the steps before: no axis moves that fast (90 m/s, 15 000 rpm at 2 ms). How many turns a gap holds
+        is not known: behind it the value is that of the file again. Command and actual position are straightened with
         the same turns, so that their difference stays.
 
         Args:

@@ -99,7 +99,7 @@ _SIGNALS: tuple[Role, ...] = (
     "block", "sequence", "feed", "tool", "spindle", "feed_override", "rapid_override", "runtime", *_AXES,
 )  # fmt: skip
 _COUNTS: frozenset[Role] = frozenset({"block", "sequence"})
-#: What was set before the start still holds; of feed and block nobody knows after so long.
+#: What was set before the start still holds; of feed and block nothing is known after so long.
 _KEPT: frozenset[Role] = frozenset({"tool", "spindle", "feed_override", "rapid_override"})
 #: A status is polled: what came so shortly before it belongs to the run.
 _LEAD_IN_S = 1.0

@@ -263,7 +263,7 @@ class Controller(TomlTable):
     )
     max_program_s: Annotated[Positive, Field(le=1e9)] = key(
         "time that a program may take at its feeds, with rapids and dwells: a slip of F or of a dwell is refused at "
-        "its line instead of being played for hours",
+        "its line instead of being simulated for hours",
         default=100_000.0,
     )
 

@@ -20,7 +20,7 @@ _Keyed = TypeVar("_Keyed", "KeyValue", "DifferentValue")
 
 @dataclass(frozen=True)
 class OpenValue:
-    """A value that nobody measured on the machine, and what it would do to a program.
+    """A value that was not measured on the machine, and what it would do to a program.
 
     Attributes:
         key: dotted name.
@@ -47,7 +47,7 @@ class MachineDescription(Result):
         machine: the tables of the machine file, defaults as well.
         keys: every value by its dotted key, in the order of the file.
         warnings: that its origins are read from comments, as older files have them.
-        program: for which the values that nobody measured were ranked; None: for none.
+        program: for which the values that were not measured were ranked; None: for none.
         matters: those of them that move its verdict, the furthest first.
         source: file of the machine, or its name, where that is known.
     """

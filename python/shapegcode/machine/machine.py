@@ -247,7 +247,7 @@ class Machine(TomlTable):
 
         Args:
             modes: by axis ("x", "y", "z"): natural frequencies in Hz (damping ratio 0.02 assumed) or modes, one or
-                several; an axis without an entry counts as rigid as long as nobody knows better.
+                several; an axis without an entry counts as rigid until more is known.
             name: of the machine.
             max_feed_mm_per_min: largest cutting feed of an axis, mm/min.
             rapid_mm_per_min: rapid traverse of an axis, mm/min.

@@ -29,9 +29,9 @@ class Emission(TomlTable):
     override: Literal["ask", "any", "lock"] = key(
         'what is done about the feed override while shaped moves run. "ask": the header asks for 100 %, but for a '
         'verdict.override_percent that states more, where it is as "any"; "lock": '
-        "lock_lines switch the dial off before each shaped stretch, unlock_lines switch it on again behind it; "
-        '"any": blocks of one duration, on which the dial changes the speed and little else (more text, and a block '
-        "period that suits the dial)",
+        "lock_lines switch the feed override off before each shaped cut, unlock_lines switch it on again behind it; "
+        '"any": blocks of one duration, of which the override changes the speed and little else (more text, and a '
+        "block period that suits other overrides)",
         default="ask",
     )
     lock_lines: tuple[Text, ...] = key(
@@ -115,7 +115,7 @@ class Emission(TomlTable):
 
     @property
     def prefill_lines(self) -> tuple[str, ...]:
-        """The dwell before each shaped stretch, as a line; none where there is none."""
+        """The dwell before each shaped cut, as a line; none where there is none."""
         return (f"G04P{round(self.prefill_dwell_s * 1e3)}",) if self.prefill_dwell_s > 0.0 else ()
 
     @property
@@ -225,7 +225,7 @@ ANY_PRICE = {"price.program_time_percent": 1e6, "price.cut_time_percent": 1e6}
 
 
 class Verdict(TomlTable):
-    """The stated band: which of the cases that are played decide. All are shown; 100 % override always counts."""
+    """The stated band: which of the cases that are simulated decide. All are shown; 100 % override always counts."""
 
     plant: Literal["modal", "feed-drive"] = key(
         'what stands behind the command: "modal": the modes behind an ideal servo, so that servo lag is no part of the '

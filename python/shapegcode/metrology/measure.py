@@ -1,6 +1,6 @@
 """Virtual metrology: what the response of the machine would measure on the part, section by section of the path.
 
-Programs are played as the controller would, and the response is measured against the programmed path: vibration,
+Programs are simulated as the controller would, and the response is measured against the programmed path: vibration,
 contour, radius, the walls that a round tool leaves, their roughness. The tool is a disc that removes what it sweeps:
 cutting forces, the tool's deflection and the marks of its teeth are not in it.
 """
@@ -21,7 +21,7 @@ from shapegcode.metrology.figures import MeasuredSection, WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
@@ -57,7 +57,7 @@ def measure(
 ) -> Measurement:
     """Measure one program, or several side by side.
 
-    Regions that shapegcode shaped, as the program's header says, are played block by block at their feed, all others
+    Regions that shapegcode shaped, as the program's header says, are simulated block by block at their feed, all others
     with the controller's own motion.
 
     Args:
@@ -141,15 +141,15 @@ def measure(
         roughness_lambda_s_mm=lambda_s_mm,
         contour_tolerance_um=limit_um,
         programs=tuple(measured),
-        played=_played(several, machine, plant),
+        simulated=_simulated(several, machine, plant),
     )
 
 
-def _played(programs: Sequence[Program], machine: Machine, plant: str) -> PlayedPrograms:
+def _simulated(programs: Sequence[Program], machine: Machine, plant: str) -> SimulatedPrograms:
     """The first two programs, under the names of their files."""
     names = [Path(program.source).name for program in programs]
     second = programs[1] if len(programs) > 1 else None
-    return PlayedPrograms(programs[0], machine, second, labels=(names[0], names[-1]), plant=plant)
+    return SimulatedPrograms(programs[0], machine, second, labels=(names[0], names[-1]), plant=plant)
 
 
 def _judged(programs: Sequence[tuple[str, bool, str]]) -> list[bool]:
@@ -243,7 +243,7 @@ def measure_samples(
 def _measured_regions(
     jobs: Iterable[Job], machine: Machine, plant: str, options: _core.MetrologyOptions, on_done: Callable[[], None]
 ) -> Iterator[MeasuredRegion]:
-    """Every region of a program, played and measured."""
+    """Every region of a program, simulated and measured."""
     kept = 0
     for number, job in enumerate(jobs, start=1):
         samples = _samples(job, machine, plant)
@@ -293,8 +293,8 @@ def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArra
         # The position loop takes the lag off as exp(-gain t): to a millionth, as the vibration.
         memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
     rest_s = min(memory_s, _LONGEST_REST_S)
-    options = model.options(plant=plant, offset=model.offset(job.played))
-    stream = model.playing(shaped=job.played.shaped).stream(job.played.path, options, rest_s)
+    options = model.options(plant=plant, offset=model.offset(job.simulated))
+    stream = model.playing(shaped=job.simulated.shaped).stream(job.simulated.path, options, rest_s)
     while len(chunk := stream.read(_CHUNK_SAMPLES)) > 0:
         yield chunk.command_mm, chunk.response_mm
 
@@ -306,7 +306,7 @@ class Job:
     `joined_mm`: runs shorter than this are one curve, because there were too many of them; 0: as everywhere.
     """
 
-    played: _core.Region
+    simulated: _core.Region
     nominal: _core.Region
     path: _core.Path
     sections: list[_core.PathSection]
@@ -319,7 +319,7 @@ def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequenc
     own_blocks = program.shaped_regions > 0 and nominal is program
     joined = 1.0 if lines is not None else _joined(pairs, machine, own_blocks=own_blocks)
     jobs = []
-    for played, region in pairs:
+    for simulated, region in pairs:
         path = region.path
         if lines is None:
             short_mm = joined * _short_mm(path, machine, own_blocks=own_blocks)
@@ -328,7 +328,7 @@ def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequenc
             short_mm = 0.0
             sections = _core.line_sections(path, [(min(a, _LAST_LINE), min(b, _LAST_LINE)) for a, b in lines])
         if sections:
-            jobs.append(Job(played, region, path, sections, short_mm if joined > 1.0 else 0.0))
+            jobs.append(Job(simulated, region, path, sections, short_mm if joined > 1.0 else 0.0))
     if lines is not None and not jobs:
         names = ", ".join(f"{first}-{last}" for first, last in lines)
         raise _core.ArgumentError(f"{nominal.source}: no cutting move in lines {names}")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from shapegcode import _core
 from shapegcode.metrology.figures import FittedCircle, MeasuredArc, MeasuredSection, SidedError, WallDeviation
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.results.figures import Tracks, largest_xyz_um
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result, Xyz
@@ -278,7 +278,7 @@ class MeasuredProgram:
 
     Attributes:
         program: its name.
-        shaped: played as one that shapegcode wrote: block by block at its feed.
+        shaped: simulated as one that shapegcode wrote: block by block at its feed.
         measured_against: name of the program whose path is the nominal one; its own name for its own path.
         ok: the response stays within the tolerance of the path; None: it is not judged.
         cutting_time_s: of all regions, until the set-points rest.
@@ -338,15 +338,15 @@ class MeasuredProgram:
 
     @property
     def how(self) -> str:
-        """How it was played, and against which path it was measured."""
-        played = "block by block, as a shaped program" if self.shaped else "with the controller's own motion"
+        """How it was simulated, and against which path it was measured."""
+        simulated = "block by block, as a shaped program" if self.shaped else "with the controller's own motion"
         own = self.measured_against == self.program
         path = "its own path" if own else f"the path of {self.measured_against}"
         judged = ""
         if self.ok is None:
             judged = ", which is not the programmed one" if self.shaped else ", to compare the shaped with"
             judged += ": not judged"
-        return f"{self.program}: played {played}, measured against {path}{judged}"
+        return f"{self.program}: simulated {simulated}, measured against {path}{judged}"
 
     def verdict(self, limit_um: float) -> str:
         """By how much it keeps the tolerance or does not, and where."""
@@ -382,7 +382,7 @@ class Measurement(Result):
         roughness_lambda_s_mm: short-wave cut-off; 0: none.
         contour_tolerance_um: of the machine file (`tolerance.contour_um`).
         programs: in the order in which they were given.
-        played: the first two of them, to play them again for a page.
+        simulated: the first two of them, to simulate them again for a page.
     """
 
     machine: str
@@ -394,13 +394,13 @@ class Measurement(Result):
     roughness_lambda_s_mm: float
     contour_tolerance_um: float
     programs: tuple[MeasuredProgram, ...]
-    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
+    simulated: SimulatedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def methods(self) -> tuple[str, ...]:
         """Published methods of the controller, the plant and the fit of arcs."""
         has_arcs = any(section.arc is not None for program in self.programs for section in program.sections)
-        return (*(("circle fit",) if has_arcs else ()), *(() if self.played is None else self.played.methods))
+        return (*(("circle fit",) if has_arcs else ()), *(() if self.simulated is None else self.simulated.methods))
 
     @property
     def ok(self) -> bool:

@@ -1,7 +1,7 @@
 """A machine as the core simulates it: made once from the machine file, and asked by everything that simulates.
 
 Whether the look-ahead plans the speed along a path or the path is simulated block by block is decided here and nowhere
-else (`PlayingController`).
+else (`SimulatedController`).
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class OwnFilter:
         return (self.time_constant_s + self.bell_time_s) / 4.0
 
 
-class PlayingController:
+class SimulatedController:
     """A controller that makes a motion of paths: planned by its look-ahead, or block by block.
 
     Args:
@@ -235,16 +235,16 @@ class MachineModel:
         return hash(self.machine)
 
     @cached_property
-    def ordinary(self) -> PlayingController:
+    def ordinary(self) -> SimulatedController:
         """The controller as it simulates an ordinary program."""
-        return PlayingController(fanuc_model(self.machine))
+        return SimulatedController(fanuc_model(self.machine))
 
     @cached_property
-    def shaped(self) -> PlayingController:
+    def shaped(self) -> SimulatedController:
         """The controller as it simulates shaped blocks: one by one, without look-ahead."""
         model = _core.for_shaped_blocks(fanuc_model(self.machine))
         model.block_end = self.own_rule
-        return PlayingController(model)
+        return SimulatedController(model)
 
     @cached_property
     def shaped_filter(self) -> OwnFilter:
@@ -257,7 +257,7 @@ class MachineModel:
             sum(each.duration_samples + 1 for each in filters) * self.period_s,
         )
 
-    def playing(self, *, shaped: bool) -> PlayingController:
+    def playing(self, *, shaped: bool) -> SimulatedController:
         """One of the two: `shaped` for a program that shapegcode wrote."""
         return self.shaped if shaped else self.ordinary
 
@@ -327,7 +327,7 @@ class MachineModel:
             options.arrived_mm = min(self.machine.controller.in_position_width_um.as_tuple()) * 1e-3
         return options
 
-    def play_original(
+    def simulate_original(
         self,
         path: _core.Path,
         *,
@@ -343,10 +343,10 @@ class MachineModel:
         options.record_samples = record_samples
         controller = self.ordinary
         if override != 1.0:
-            controller = PlayingController(fanuc_model(self.machine), override)
+            controller = SimulatedController(fanuc_model(self.machine), override)
         return controller.play(path, options, against=against)
 
-    def play_rapid(
+    def simulate_rapid(
         self, start_mm: FloatArray, end_mm: FloatArray, options: _core.PlaybackOptions
     ) -> _core.PlaybackFigures:
         """A rapid as the control makes it, from rest to rest, without its contour."""
@@ -355,7 +355,7 @@ class MachineModel:
         still = _core.Path([_core.Segment.line(start_mm, start_mm, 1.0)])
         return _core.play_samples(np.asfortranarray(samples), still, options)
 
-    def play_emitted(
+    def simulate_emitted(
         self,
         blocks: _core.Path,
         path: _core.Path,
@@ -395,7 +395,7 @@ class MachineModel:
             options.starved_memory_s = memory_s + self.shaped_filter.duration_s if memory_s > 0.0 else 0.0
         return _core.play_blocks(blocks, path, block_end or self.own_rule, override, options)
 
-    def play_planned(
+    def simulate_planned(
         self,
         blocks: _core.Path,
         path: _core.Path,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class PlayedPrograms:
+class SimulatedPrograms:
     """A program, and the one that was made of it.
 
     Attributes:

@@ -137,8 +137,8 @@ def stream(
     offsets, known = _offsets(program, model)
     options = model.options(plant=plant, offset=known)
     controller = fanuc_model(machine, shaped=shaped)
-    played = _core.PlayedStream.of_program(program.core, controller, options, offsets, REST_S)
-    return _chunks(played, model.period_s, lines, chunk_samples)
+    simulated = _core.PlayedStream.of_program(program.core, controller, options, offsets, REST_S)
+    return _chunks(simulated, model.period_s, lines, chunk_samples)
 
 
 def _offsets(program: Program, model: MachineModel) -> tuple[list[FloatArray], Offset]:
@@ -159,12 +159,12 @@ def _check_lines(program: Program, lines: tuple[int, int]) -> None:
 
 
 def _chunks(
-    played: _core.PlayedStream, period_s: float, lines: tuple[int, int] | None, chunk_samples: int
+    simulated: _core.PlayedStream, period_s: float, lines: tuple[int, int] | None, chunk_samples: int
 ) -> Iterator[Chunk]:
     rate_hz = 1.0 / period_s
     # A whole rate divides exactly: 9 / 1000 is 0.009, 9 * 0.001 is not.
     rate_hz = round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-6 else rate_hz
-    while len(read := played.read(chunk_samples)):
+    while len(read := simulated.read(chunk_samples)):
         sample = np.arange(read.first_sample, read.first_sample + len(read), dtype=np.int64)
         line = read.line
         driven = len(read.motor_mm) > 0

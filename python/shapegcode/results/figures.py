@@ -1,4 +1,4 @@
-"""Figures of playbacks as results state them: per axis, in µm."""
+"""Figures of simulations as results state them: per axis, in µm."""
 
 from __future__ import annotations
 

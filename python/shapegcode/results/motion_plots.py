@@ -1,4 +1,4 @@
-"""Played motion over time, one plot per question: how fast, how much vibration; `path_plots` has the path.
+"""Simulated motion over time, one plot per question: how fast, how much vibration; `path_plots` has the path.
 
 They are functions of data: of traces of any motion, measured ones too. The first trace, usually the original program,
 is the wider line, so that it shows beneath the others.

@@ -41,7 +41,7 @@ _CUT = "The table rounds corners off: there each side is drawn up to the bisecto
 _CORNER_RAD = 0.3
 # The two sides of a corner are drawn further apart than that share of the picture: no line joins them.
 _APART = 0.01
-# A drawn curve so many times as long as its path swings.
+# A drawn curve so many times as long as its path oscillates.
 _SWINGS = 4.0
 
 
@@ -158,7 +158,7 @@ def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apar
 
 
 def _style(number: int, curve: FloatArray, polyline: FloatArray) -> dict[str, Any]:
-    """Colour and width of a curve; one that swings to and fro is finer, so that its swings do not run together."""
+    """Colour and width of a curve; one that oscillates is finer, so that its cycles do not run together."""
     swings = float(np.nansum(np.linalg.norm(np.diff(curve, axis=0), axis=1)))
     way = float(np.linalg.norm(np.diff(polyline, axis=0), axis=1).sum())
     style = line_style(number)
@@ -312,7 +312,7 @@ def polyline_of(path: _core.Path) -> FloatArray:
 
 
 RECORD_SAMPLES = 1_000_000
-"""That a playback keeps for pictures, at most."""
+"""That a simulation keeps for pictures, at most."""
 
 # A longer region shows its worst place and its stop.
 _WHOLE_S = 10.0
@@ -322,7 +322,7 @@ _BEFORE_STOP_S = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class PlayedRegion:
+class SimulatedRegion:
     """What the pictures of a region draw."""
 
     traces: tuple[Trace, ...]  # one or more, for example of the original and of the emitted program
@@ -338,8 +338,8 @@ class PlayedRegion:
         *,
         lines: tuple[int, int],
         regions: int,
-    ) -> PlayedRegion:
-        """The region that vibrates most, as the core played it."""
+    ) -> SimulatedRegion:
+        """The region that vibrates most, as the core simulated it."""
         traces = tuple(_trace(label, run, period_s) for label, run in runs.items())
         said = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
         if not traces[0].stops:
@@ -360,9 +360,9 @@ def _trace(label: str, run: _core.PlaybackFigures, period_s: float) -> Trace:
     )
 
 
-def motion_pictures(played: Callable[[], PlayedRegion]) -> dict[str, Plot]:
+def motion_pictures(simulated: Callable[[], SimulatedRegion]) -> dict[str, Plot]:
     """Path, feed and vibration of a region, by name."""
-    scene = functools.cache(lambda: _Scene.of(played()))
+    scene = functools.cache(lambda: _Scene.of(simulated()))
 
     def path(ax: Axes | None = None) -> Axes:
         s = scene()
@@ -390,21 +390,21 @@ class _Scene:
     whole_mm: FloatArray | None = None  # the whole path where that is a piece of it, (k, 3)
 
     @classmethod
-    def of(cls, played: PlayedRegion) -> _Scene:
+    def of(cls, simulated: SimulatedRegion) -> _Scene:
         """All of a short region; of a long one the worst place and, if it is there, the stop."""
-        traces, programmed = played.traces, polyline_of(played.path)
+        traces, programmed = simulated.traces, polyline_of(simulated.path)
         if max(len(trace.command_mm) * trace.period_s for trace in traces) <= _WHOLE_S:
-            return cls((View(traces),), played.part, traces, played.part, programmed)
-        worst = _worst_place(traces, programmed, played.path)
+            return cls((View(traces),), simulated.part, traces, simulated.part, programmed)
+        worst = _worst_place(traces, programmed, simulated.path)
         at = f"at {worst.time_s:.2f} s"
         around = f"{2 * _AROUND_S:g} s around the worst place of the {traces[0].label} ({at})"
         views = [View(worst.traces, f"the worst place, {at}", "time from the worst place in s")]
         if all(trace.stops for trace in traces):
             stop = tuple(trace.part(trace.rest_s - _BEFORE_STOP_S, math.inf, trace.rest_s) for trace in traces)
             views.append(View(stop, f"the stop, at {traces[0].rest_s:.2f} s", "time from the stop in s"))
-        near_part = "; ".join(filter(None, (played.part, around)))
-        whole = played.path.polyline(COARSE_STEP_RAD)
-        return cls(tuple(views), played.part, worst.traces, near_part, worst.piece, whole)
+        near_part = "; ".join(filter(None, (simulated.part, around)))
+        whole = simulated.path.polyline(COARSE_STEP_RAD)
+        return cls(tuple(views), simulated.part, worst.traces, near_part, worst.piece, whole)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ class ReportPage:
         source: JSON that it was made of.
         page: file that was written.
         result: class of the result; empty: it could not be read back.
-        motion: the programs were found unchanged and played again.
+        motion: the programs were found unchanged and simulated again.
         problems: what is not as it should be; they stand on the page too.
     """
 

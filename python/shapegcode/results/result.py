@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from shapegcode.results.page.model import Figure, Light, Page, Script, Section
     from shapegcode.results.page.scene import Scene
 
-__all__ = ["Pair", "Playable", "Plot", "Result", "Xyz"]
+__all__ = ["Pair", "Plot", "Result", "Simulatable", "Xyz"]
 
 _UNITS = {
     "_mm_per_min": "mm/min", "_mm_per_s2": "mm/s²", "_mm_per_s": "mm/s", "_percent": "%", "_um": "µm", "_mm": "mm",
@@ -31,11 +31,11 @@ _UNITS = {
 _AXES = ("x", "y", "z")
 
 
-class Playable(Protocol):
-    """What can be played again for a page: a program, or two of them, on a machine."""
+class Simulatable(Protocol):
+    """What can be simulated again for a page: a program, or two of them, on a machine."""
 
     def scene(self, on_progress: Callable[[float], None] = ...) -> Scene | None:
-        """Play it."""
+        """Simulate it."""
 
 
 class Result(Outcome):
@@ -59,8 +59,8 @@ class Result(Outcome):
         return entries_of(self.methods)
 
     @property
-    def played(self) -> Playable | None:
-        """What was played, to play it again for a page; a result of programs has a field of this name."""
+    def simulated(self) -> Simulatable | None:
+        """What was simulated, to play it again for a page; a result of programs has a field of this name."""
         return None
 
     @property
@@ -116,17 +116,17 @@ class Result(Outcome):
             The page, as data.
 
         Raises:
-            MachineError, NumericError: a program cannot be played.
+            MachineError, NumericError: a program cannot be simulated.
         """
         from shapegcode.results.page.default import page_of
 
-        played = self.played if motion else None
+        simulated = self.simulated if motion else None
         return page_of(
             self,
             title=self.page_title,
             light=self.light,
             sections=self.page_sections(made),
-            scene=None if played is None else played.scene(on_progress),
+            scene=None if simulated is None else simulated.scene(on_progress),
             made=made,
             problems=problems,
         )
@@ -143,7 +143,7 @@ class Result(Outcome):
 
         Raises:
             ArgumentError: another word for `script`.
-            MachineError, NumericError: a program cannot be played.
+            MachineError, NumericError: a program cannot be simulated.
             OSError: a file cannot be written.
         """
         from shapegcode.results.page.html import save

@@ -1,9 +1,9 @@
 """Designs of shapers, and the choice among them.
 
-What is to be cancelled: `bands`. The families, one row each: `registry`, with their `solvers`, `grid_search` (on a
-sample grid), `grid_designs` (exact there) and `robust` (within a limit over bands); what one is worth: `designs`. The
-choice: `comparison` designs every family and recommends one by `ranking` in a `result`. For a conversion:
-`block_period` chooses the period, `grid` the shaper on it for a machine, `track` those that follow moving modes.
+What is to be cancelled, and what a design for it is worth: `bands`. The families, one row each: `registry`, with their
+`solvers`, `grid_search` (on a sample grid), `grid_designs` (exact there) and `robust` (within a limit over bands). The
+choice: `comparison` designs every family and recommends one by `ranking` in a `result`. For a conversion: `grid`
+chooses the block period and the shaper on it for a machine, `track` those that follow moving modes.
 
 Their names can be taken from here too, each loaded on first use.
 """
@@ -13,8 +13,7 @@ from importlib.util import find_spec
 from typing import Any
 
 _MODULES = (
-    "bands", "designs", "registry", "robust", "block_period", "ranking", "result", "comparison", "track", "grid",
-    "plots",
+    "bands", "registry", "robust", "ranking", "result", "comparison", "track", "grid", "plots",
 )  # fmt: skip
 
 

@@ -493,8 +493,8 @@ def dial_vibration_um(block_period_s: float, shaper: _core.Shaper, model: Machin
             ]
         )
         for ratio in model.machine.dial_positions:
-            played = model.play_emitted(blocks, path, override=ratio, contour=False)
-            worst_mm = max(worst_mm, float(played.residual_mm.max()))
+            simulated = model.simulate_emitted(blocks, path, override=ratio, contour=False)
+            worst_mm = max(worst_mm, float(simulated.residual_mm.max()))
     return worst_mm * 1e3
 
 

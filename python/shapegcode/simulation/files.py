@@ -21,7 +21,7 @@ _COPY_BYTES = 1 << 20
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same motion gives the same bytes
 
 
-class PlayedFile(Protocol):
+class MotionFile(Protocol):
     """A file that a motion is written to."""
 
     def write(self, chunk: Chunk) -> None:
@@ -88,7 +88,7 @@ def _header(stream: object, dtype: np.dtype[np.generic], shape: tuple[int, ...])
 
 
 @contextlib.contextmanager
-def csv_file(path: str | Path) -> Iterator[PlayedFile]:
+def csv_file(path: str | Path) -> Iterator[MotionFile]:
     """A CSV file with the names of its columns in the first line; ``-`` is standard output.
 
     Columns: `kind` in words, then those of `Chunk.columns`; numbers as the shortest text that reads back the same.
@@ -102,7 +102,7 @@ def csv_file(path: str | Path) -> Iterator[PlayedFile]:
 
 
 @contextlib.contextmanager
-def npz_file(path: str | Path) -> Iterator[PlayedFile]:
+def npz_file(path: str | Path) -> Iterator[MotionFile]:
     """A NumPy archive with one array per column: those of `Chunk.columns`, `kind` and what its numbers mean.
 
     Until it is complete its columns take as much room again in the same folder.

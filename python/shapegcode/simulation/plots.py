@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.results import plot
-from shapegcode.results.path_plots import RECORD_SAMPLES, PlayedRegion, motion_pictures
+from shapegcode.results.path_plots import RECORD_SAMPLES, SimulatedRegion, motion_pictures
 from shapegcode.results.result import Plot
 from shapegcode.simulation.result import Motion, Simulation
 
@@ -43,10 +43,10 @@ def plots_of(simulation: Simulation) -> dict[str, Plot]:
     return found
 
 
-def _worst_region(simulation: Simulation) -> PlayedRegion:
+def _worst_region(simulation: Simulation) -> SimulatedRegion:
     run = max(simulation.regions, key=lambda each: max(each.residual_vibration_um))
     runs = {"program": run.replay(RECORD_SAMPLES)}
-    return PlayedRegion.of_runs(runs, run.path, run.period_s, lines=run.lines, regions=len(simulation.regions))
+    return SimulatedRegion.of_runs(runs, run.path, run.period_s, lines=run.lines, regions=len(simulation.regions))
 
 
 def plot_motion(motion: Motion, ax: Axes | None = None) -> Axes:

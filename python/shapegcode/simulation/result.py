@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.results.figures import CONTOURS, ContourError, Tracks
 from shapegcode.results.json import hidden, sparse
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result, Xyz
 from shapegcode.results.table import Column, Table, xyz_columns
 from shapegcode.verdict.cases import case_table
-from shapegcode.verdict.figures import PlayedFigures
+from shapegcode.verdict.figures import ProgramFigures
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -28,7 +28,7 @@ _NAMES = {"modal": ("residual vibration", "peak vibration"), "feed-drive": ("err
 
 @dataclass(frozen=True, eq=False)
 class RegionRun:
-    """One cutting region played.
+    """One cutting region simulated.
 
     Attributes:
         lines: first and last of the program, from 1.
@@ -168,7 +168,7 @@ class Simulation(Result):
             `convert` judges what it writes.
         motion: the whole program in time; None: not asked for.
         warnings: of the program and of the machine.
-        played: the program, to simulate it again for a page.
+        simulated: the program, to simulate it again for a page.
     """
 
     program: str
@@ -189,14 +189,14 @@ class Simulation(Result):
     regions: tuple[RegionRun, ...]
     warnings: tuple[str, ...]
     of_shaped: ShapedFigures | None = None
-    verdict: PlayedFigures | None = field(default=None, metadata=sparse())
+    verdict: ProgramFigures | None = field(default=None, metadata=sparse())
     motion: Motion | None = field(default=None, metadata=sparse())
-    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
+    simulated: SimulatedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def methods(self) -> tuple[str, ...]:
         """Published methods of the controller and the plant."""
-        return () if self.played is None else self.played.methods
+        return () if self.simulated is None else self.simulated.methods
 
     @property
     def ok(self) -> bool:
@@ -220,7 +220,7 @@ class Simulation(Result):
         )
 
     @staticmethod
-    def _judged_answer(verdict: PlayedFigures) -> str:
+    def _judged_answer(verdict: ProgramFigures) -> str:
         """The figures of `convert`, and the worst cut that misses a limit."""
         out = [cut for cut in verdict.all_cuts if cut.misses]
         residual = verdict.residual_vibration_um

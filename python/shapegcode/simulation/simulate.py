@@ -14,7 +14,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import Offset, machine_warnings, region_range_warnings
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
@@ -81,7 +81,7 @@ def simulate(
         nominal = {mine.first_line: other.path for mine, other in pairs if not mine.path.moves_as(other.path)}
         verdict = judge_program(program, against, machine, shaped=shaped)
     runs: list[RegionRun] = []
-    played: list[_core.PlaybackFigures] = []
+    simulated: list[_core.PlaybackFigures] = []
     of_shaped: list[_core.PlaybackFigures] = []
     for done, region in enumerate(program.regions, start=1):
         as_shaped = region.shaped if shaped is None else shaped
@@ -104,7 +104,7 @@ def simulate(
                 replay=replay,
             )
         )
-        played += figures
+        simulated += figures
         of_shaped += figures if as_shaped and not region.was_rapid else []
         on_progress(done, len(program.regions))
     own = [run.figures for run in runs]
@@ -120,14 +120,14 @@ def simulate(
         measured_against=(against or program).source,
         cycle_time_s=_core.time_program(program.core, fanuc_model(machine, shaped=shaped)).total_s,
         cutting_time_s=cutting_s,
-        residual_vibration_um=largest_xyz_um(figures.residual_mm for figures in played),
-        peak_vibration_um=largest_xyz_um(figures.peak_mm for figures in played),
-        settling_time_s=_settling_s(played, band_um),
+        residual_vibration_um=largest_xyz_um(figures.residual_mm for figures in simulated),
+        peak_vibration_um=largest_xyz_um(figures.peak_mm for figures in simulated),
+        settling_time_s=_settling_s(simulated, band_um),
         settling_band_um=band_um,
         settling_limit_s=limit_s,
         contour_error_um=Tracks(
-            ContourError.of(figures.command for figures in played),
-            ContourError.of(figures.response for figures in played),
+            ContourError.of(figures.command for figures in simulated),
+            ContourError.of(figures.response for figures in simulated),
         ),
         orbit_error_percent=tuple(error for figures in own for error in figures.orbit_error_percent),
         response_orbit_error_percent=tuple(error for figures in own for error in figures.response_orbit_error_percent),
@@ -135,7 +135,7 @@ def simulate(
         verdict=verdict,
         regions=tuple(runs),
         warnings=tuple(warnings),
-        played=PlayedPrograms(program, machine, labels=("program", ""), plant=plant),
+        simulated=SimulatedPrograms(program, machine, labels=("program", ""), plant=plant),
     )
 
 
@@ -198,17 +198,17 @@ def play_motion(
     return recorder.result(program.source, lines=lines, every=every, **names)
 
 
-def _shaped_figures(runs: Sequence[RegionRun], played: Sequence[_core.PlaybackFigures]) -> ShapedFigures | None:
+def _shaped_figures(runs: Sequence[RegionRun], simulated: Sequence[_core.PlaybackFigures]) -> ShapedFigures | None:
     if not runs:
         return None
     return ShapedFigures(
         regions=len(runs),
         cutting_time_s=math.fsum(run.time_s for run in runs),
-        residual_vibration_um=largest_xyz_um(figures.residual_mm for figures in played),
-        peak_vibration_um=largest_xyz_um(figures.peak_mm for figures in played),
+        residual_vibration_um=largest_xyz_um(figures.residual_mm for figures in simulated),
+        peak_vibration_um=largest_xyz_um(figures.peak_mm for figures in simulated),
         contour_error_um=Tracks(
-            ContourError.of(figures.command for figures in played),
-            ContourError.of(figures.response for figures in played),
+            ContourError.of(figures.command for figures in simulated),
+            ContourError.of(figures.response for figures in simulated),
         ),
     )
 
@@ -240,8 +240,8 @@ def _rest_s(model: MachineModel, plant: str) -> float:
     return min(max(model.vibration_memory_s, _SHORTEST_REST_S), _LONGEST_REST_S)
 
 
-def _settling_s(played: Iterable[_core.PlaybackFigures], band_um: float) -> Xyz[float | None]:
+def _settling_s(simulated: Iterable[_core.PlaybackFigures], band_um: float) -> Xyz[float | None]:
     """Longest settling time of each axis; None where it does not settle, or no band is given."""
-    rows = [figures.settling_s for figures in played]
+    rows = [figures.settling_s for figures in simulated]
     longest = np.max(rows, axis=0) if rows else np.zeros(3)
     return Xyz(*(float(value) if band_um > 0.0 and math.isfinite(value) else None for value in longest))

@@ -1,1 +1,1 @@
-"""What a machine that is not known exactly does to a program: drawn machines, quantiles, what decides."""
+"""What a machine that is not known exactly does to a program: sampled machines, quantiles, what decides."""

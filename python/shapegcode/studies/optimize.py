@@ -28,7 +28,7 @@ from shapegcode.studies.result import Candidate, ChosenValue, Optimum
 from shapegcode.studies.study import check_ends, check_probability, within
 from shapegcode.studies.varied import MAX_DRAWS, Vary, check_keys, drawn, drawn_machine, listed, varied_values
 
-USUAL_DRAWS = 256  # Machines on which a choice is played, if nothing else is said
+USUAL_DRAWS = 256  # Machines on which a choice is simulated, if nothing else is said
 USUAL_CONVERSIONS = 300  # Conversions at most, if nothing else is said
 
 _FRESH = 4  # times as many draws confirm a choice: the best of many has had luck
@@ -57,10 +57,10 @@ def optimize(
     Args:
         program: what is converted, or its file.
         machine: as its file has it; its tolerances are those that count, whatever tolerance is aimed at.
-        vary: what the machine that plays may differ in, as for `study`.
+        vary: what the machine that simulates may differ in, as for `study`.
         choose: values to choose from, by key; None: see `shapegcode.studies.optimize.usual_choices`.
         probability: of staying within tolerance.
-        n: machines on which a choice is played; four times as many fresh ones confirm it.
+        n: machines on which a choice is simulated; four times as many fresh ones confirm it.
         most: conversions at most.
         seed: the same one gives the same result.
         shape_all: see `convert`.
@@ -160,7 +160,7 @@ class _Choosing:
         shares = np.array(play_all(replay, DrawsJob(self._machine.name, rows, numbers, (SHARE,), times=False), None))
         return float(within(shares).mean())
 
-    def played(self, ranks: Ranks) -> Candidate:
+    def simulated(self, ranks: Ranks) -> Candidate:
         """A candidate with its probability; it is confirmed where that is enough."""
         found = self.converted(ranks)
         if found.time_s is not None and found.within is None:
@@ -178,12 +178,12 @@ class _Choosing:
         return found.time_s if share >= self._probability else _UNLIKELY_S * (1.0 + self._probability - share)
 
     def best(self) -> Candidate | None:
-        """The shortest that is likely enough; of the others only those are played that are shorter."""
+        """The shortest that is likely enough; of the others only those are simulated that are shorter."""
         order = sorted(
             (ranks for ranks, each in self.candidates.items() if each.time_s is not None),
             key=lambda ranks: (self.candidates[ranks].time_s, ranks),
         )
-        candidates = map(self.played, order)
+        candidates = map(self.simulated, order)
         return next((each for each in candidates if (each.checked or 0.0) >= self._probability), None)
 
     def as_it_is(self) -> Candidate | None:

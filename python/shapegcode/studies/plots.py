@@ -83,7 +83,7 @@ def plot_choices(found: Optimum, ax: Axes | None = None) -> Axes:
         share = row.checked if row.checked is not None else row.within
         longer_ms = 1e3 * (time_s - times_s[0])
         panel.barh(place, longer_ms, height=0.6, color=plot.COLOURS[1] if row == found.best else plot.COLOURS[5])
-        said = f"{time_s:.3f} s, " + ("not played" if share is None else f"within tolerance on {share * 100:.1f} %")
+        said = f"{time_s:.3f} s, " + ("not simulated" if share is None else f"within tolerance on {share * 100:.1f} %")
         panel.annotate(
             said, (longer_ms, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8,
             fontweight="bold" if row == found.best else "normal",

@@ -57,7 +57,7 @@ def checked_measures(measure: Sequence[str]) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class _PlayedPart:
+class _SimulatedPart:
     """A shaped region: what was programmed, what was emitted, what it is judged by."""
 
     region: _core.Region
@@ -67,7 +67,7 @@ class _PlayedPart:
 
 
 class Replay:
-    """A text that was converted for a machine, ready to be played on others."""
+    """A text that was converted for a machine, ready to be simulated on others."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class Replay:
         self.time_s = time_s
         regions = [original.regions[index] for index, _, _ in parts]
         self._parts = [
-            _PlayedPart(region, emitted.core.cutting_path(first, last), _core.ContourTracker(region.path), limit)
+            _SimulatedPart(region, emitted.core.cutting_path(first, last), _core.ContourTracker(region.path), limit)
             for region, (_, first, last), limit in zip(regions, parts, limits, strict=True)
         ]
         # What the text takes beyond what its own blocks say, such as where no header marks them.
@@ -111,8 +111,8 @@ class Replay:
         judge, ranks = Judge(judging), {id(region): index for index, region in enumerate(original.regions)}
         limits = []
         for place in found.placed:
-            played = judging.play_original(place.region.path, offset=judging.offset(place.region))
-            limits.append(judge.limits(RegionFigures(played, (), (), 0), place))
+            simulated = judging.simulate_original(place.region.path, offset=judging.offset(place.region))
+            limits.append(judge.limits(RegionFigures(simulated, (), (), 0), place))
         places = [(ranks[id(place.region)], place.first_line, place.last_line) for place in found.placed]
         return cls(machine, original, found.emitted, places, limits, found.cycle_time_s.emitted)
 
@@ -136,7 +136,7 @@ class Replay:
     def play(
         self, machine: Machine, wanted: Collection[str], *, override: float = _FULL, times: bool = True
     ) -> dict[str, float]:
-        """Play the text."""
+        """Simulate the text."""
         model = MachineModel(machine)
         found = dict.fromkeys(wanted, 0.0)
         for part in self._parts:
@@ -153,14 +153,14 @@ class Replay:
         return float(_core.time_program(self._emitted.core, controller).total_s) + self._beyond_s
 
     def _of_region(
-        self, part: _PlayedPart, model: MachineModel, wanted: Collection[str], override: float
+        self, part: _SimulatedPart, model: MachineModel, wanted: Collection[str], override: float
     ) -> dict[str, float]:
         path, offset = part.region.path, model.offset(part.region)
         contour = not CONTOURS.isdisjoint(wanted)
         command = contour and (part.limits.target == "command" or "command_um" in wanted)
-        # What swings at the end was excited shortly before.
+        # What oscillates at the end was excited shortly before.
         last_s = model.vibration_memory_s if _WHOLE_RUN.isdisjoint(wanted) else 0.0
-        run = model.play_emitted(
+        run = model.simulate_emitted(
             part.blocks, path, override=override, offset=offset, tracker=part.tracker, contour=contour,
             command_contour=command, last_seconds=last_s,
         )  # fmt: skip
@@ -180,13 +180,13 @@ class Replay:
             SHARE: max(each.share for each in judged),
         }
         if "original_residual_um" in wanted or "original_contour_um" in wanted:
-            was = model.play_original(path, offset=offset)
+            was = model.simulate_original(path, offset=offset)
             measured["original_residual_um"] = float(was.residual_mm.max()) * 1e3
             measured["original_contour_um"] = was.response.max_abs_mm * 1e3
         return {name: value for name, value in measured.items() if name in wanted}
 
 
-OVERRIDE = "times.feed_override_percent"  # Where it is varied, the blocks are played at it
+OVERRIDE = "times.feed_override_percent"  # Where it is varied, the blocks are simulated at it
 
 _AT_ONCE = 64  # draws of a task at most: long enough to be worth one
 _PLAYED_S = 900.0  # of motion in a task: short enough to tell how far it is, and to be stopped
@@ -198,13 +198,13 @@ class DrawsJob:
     """Some draws of one text."""
 
     name: str  # of the machine, in messages
-    rows: tuple[Mapping[str, object], ...]  # values of the machine that plays, by key, a row for each draw
+    rows: tuple[Mapping[str, object], ...]  # values of the machine that simulates, by key, a row for each draw
     draws: tuple[int, ...]  # their numbers
     wanted: tuple[str, ...]  # what is measured
     times: bool  # see `Replay.play`
 
     def play(self, replay: Replay) -> list[list[float]]:
-        """Play them."""
+        """Simulate them."""
         found = []
         for row, draw in zip(self.rows, self.draws, strict=True):
             machine = drawn_machine(replay.machine, row, f"{self.name}, draw {draw}")
@@ -224,7 +224,7 @@ class DrawsJob:
 def play_all(
     replay: Replay, job: DrawsJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
 ) -> list[list[float]]:
-    """Play the draws of one text."""
+    """Simulate the draws of one text."""
     parts = list(job.parts(replay.time_s))
     found: list[list[float]] = []
     threads = ThreadPoolExecutor(cores())

@@ -111,7 +111,7 @@ def _with_error(value: float | None, error: float | None) -> str:
 
 @dataclass(frozen=True)
 class RefusedDraws:
-    """Draws that could not be played, because there is no text for them.
+    """Draws that could not be simulated, because there is no text for them.
 
     Attributes:
         values: that the converter was given, in words.
@@ -169,7 +169,7 @@ class MachineStudy(Result):
         machine: that was varied.
         sampling: "sobol", "lhs" or "grid".
         seed: of the draws.
-        n: draws that were played.
+        n: draws that were simulated.
         conversions: texts that were made for them.
         varied: what was varied.
         within: share of the draws that stay within every limit.
@@ -292,7 +292,7 @@ class MachineStudy(Result):
         ]  # fmt: skip
         if self.refused:
             why = (Column("values", text=True), Column("draws"), Column("why", text=True))
-            tables.append(Table("not played", why, self.refused))
+            tables.append(Table("not simulated", why, self.refused))
         return tables
 
     def plots(self) -> Mapping[str, Plot]:
@@ -380,8 +380,8 @@ class Candidate:
     Attributes:
         values: what was chosen.
         time_s: cycle time; None: there is no text.
-        within: share of the draws that stay within tolerance; None: not played, as there is a shorter one.
-        checked: the same of fresh draws, four times as many; None: not played.
+        within: share of the draws that stay within tolerance; None: not simulated, as there is a shorter one.
+        checked: the same of fresh draws, four times as many; None: not simulated.
         why: there is no text.
     """
 
@@ -405,7 +405,7 @@ class Optimum(Result):
         program: its name.
         machine: that was varied.
         probability: of staying within tolerance that was asked for.
-        draws: machines on which a candidate is played; four times as many fresh ones confirm it.
+        draws: machines on which a candidate is simulated; four times as many fresh ones confirm it.
         best: the candidate; None: none is likely enough.
         as_it_is: the machine file without a choice; None: it has no text.
         candidates: all that were converted, the shortest first.

@@ -42,15 +42,16 @@ def study(
     scheduler: Cluster | str | None = None,
     on_progress: Progress = lambda _stage, _share: None,
 ) -> MachineStudy:
-    """Play a program on machines whose values are drawn, and say how likely it stays within tolerance.
+    """Simulate a program on machines whose values are drawn, and say how likely it stays within tolerance.
 
-    The text is converted once, for the machine file. A mode, a drive, a filter, a time of `vary` is that of the machine
-    that plays it. A value that only the converter reads, or one that is `known`, gives a text for each of its values.
+    The program is converted once, for the machine file. A mode, a drive, a filter, a time of `vary` is that of the
+    machine on which it is simulated. A value that only the converter reads, or one that is `known`,
+    gives a program for each.
 
     >>> sg.study("part.nc", machine, {"axes.x.modes.1.frequency_hz": sg.normal(46, 2)}, n=10_000)
 
     Args:
-        program: what is played, or its file.
+        program: what is simulated, or its file.
         machine: as its file has it.
         vary: what each key is drawn from: `normal`, `lognormal`, `uniform`, or a list of values. Modes count from 1.
         n: how many draws.
@@ -67,7 +68,7 @@ def study(
         Quantiles, probability, what decides; `to_xarray()` has every draw.
 
     Raises:
-        ArgumentError: nothing to vary, n below 1, another sampling or measure, or nothing that could be played.
+        ArgumentError: nothing to vary, n below 1, another sampling or measure, or nothing that could be simulated.
         MachineError: a key that there is none, or a draw that a machine file could not have: key, value, limit.
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.

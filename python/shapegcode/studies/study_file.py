@@ -146,7 +146,7 @@ Measure = Annotated[Text, Field(json_schema_extra={"enum": list(MEASURES)})]
 
 
 class StudyFile(TomlTable):
-    """What is played on which machines."""
+    """What is simulated on which machines."""
 
     program: Text = key("the program, beside this file")
     machine: Text | None = key(

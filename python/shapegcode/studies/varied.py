@@ -1,7 +1,7 @@
 """Which values are varied: what each is drawn from, and whether the converter knows of it.
 
-A text is converted for the machine file. What is varied then is the machine that plays it: its modes, drives, filters,
-times. A value that only the converter reads, such as `shaping.family`, needs another text.
+A program is converted for the machine file. What is varied then is the machine on which it is simulated: its modes,
+drives, filters, times. A value that only the converter reads, such as `shaping.family`, needs another program.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Distribution:
     """What a value is drawn from."""
 
     # the program is converted for each value; False: it is converted for the value of the machine file, and only
-    # the machine that plays it has the other one; None: False where a machine may differ from its file
+    # the machine that simulates it has the other one; None: False where a machine may differ from its file
     known: bool | None = None
 
     def at(self, shares: Unit) -> list[object]:
@@ -230,8 +230,8 @@ def _spread(sd: float | None, percent: float | None, whole: float) -> float:
 Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]
 """What each key is drawn from."""
 
-# A machine may differ from its file in these, and they are read when blocks are played.
-_PLAYED = re.compile(
+# A machine may differ from its file in these, and they are read when blocks are simulated.
+_SIMULATED = re.compile(
     r"axes\.[xyz]\.(modes|rigid|drive\..+|rapid_mm_per_min)"
     r"|axes\.[xyz]\.modes\.\d+\.(frequency_hz|damping_ratio|participation|frequency_over(\..+)?)"
     r"|controller\.(interpolation_period_s|block_end|shaped_\w+|(position_gain_per_s|feed_forward_ratio)(\.[xyz])?)"
@@ -250,7 +250,7 @@ class Varied:
 
     key: str  # dotted name
     distribution: Distribution  # of the values
-    known: bool  # the converter knows each value; else only the machine that plays the text has it
+    known: bool  # the converter knows each value; else only the machine that simulates the text has it
     value: str  # what the file says, as TOML
     unit: str  # of the values
 
@@ -283,10 +283,10 @@ def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
         wrong = missing_row(machine, key) or ("" if at or _OPTIONAL.match(key) else "no such key")
         if wrong:
             raise MachineError(machine.name, (Problem(key, "", wrong),))
-        played = _PLAYED.fullmatch(key) is not None
-        if drawn.known is False and not played:
+        simulated = _SIMULATED.fullmatch(key) is not None
+        if drawn.known is False and not simulated:
             raise ArgumentError(f"vary: {key}: known = false: only the converter reads it, so that it must be known")
-        known = not played if drawn.known is None else drawn.known
+        known = not simulated if drawn.known is None else drawn.known
         found.append(Varied(key, drawn, known, at.value if at else "not set", at.unit if at else ""))
     return tuple(found)
 
@@ -295,7 +295,7 @@ def drawn_machine(machine: Machine, values: Mapping[str, object], source: str) -
     """A machine with drawn values."""
     if not values:
         return machine
-    # A control that ticks otherwise plays the same blocks; whether their period is a multiple is the converter's care.
+    # A control of another period executes the same blocks; that their period is a multiple is the converter's care.
     freed = {"emission.block_period_s": None} if _TICK in values and "emission.block_period_s" not in values else {}
     return machine.with_values({**freed, **values}, source=source)
 

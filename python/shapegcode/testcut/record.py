@@ -359,7 +359,7 @@ class Revolutions:
     torque_nm: FloatArray | None  # (n,) mean torque; None: not recorded
     resultant_n: FloatArray  # (n,) mean magnitude
     peak_n: FloatArray  # (n,) largest magnitude
-    # (n,) whether the force swings more than its mean lets expect from the rest of the pass
+    # (n,) whether the force oscillates more than its mean lets expect from the rest of the pass
     chatter: npt.NDArray[np.bool_]
     # the feed between entry and exit, as the record shows it; of a pass with changing feeds the first one
     feed_mm_per_min: float
@@ -391,7 +391,7 @@ def revolutions(record: PlacedRecord) -> Revolutions:
 
 
 def _swings(x: FloatArray, uneven: FloatArray, resultant: FloatArray) -> npt.NDArray[np.bool_]:
-    """Where the force within a revolution swings more, for its mean, than in the rest of the pass."""
+    """Where the force within a revolution oscillates more, for its mean, than in the rest of the pass."""
     if len(uneven) < _MIN_REVOLUTIONS:
         return np.zeros(len(uneven), dtype=bool)
     share = uneven / np.maximum(resultant, 1e-300)

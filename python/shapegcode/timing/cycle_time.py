@@ -1,8 +1,8 @@
 """How long a program takes on a machine, and where the time goes: in closed form, and by giving every set-point.
 
 The closed form costs one formula per block: of Lee, Ro, Song and Oh, 2022 (paper 004) for acceleration after
-interpolation, of the planner in look-ahead. The full interpolation plays the same program sample by sample and is the
-check of it.
+interpolation, of the planner in look-ahead. The full interpolation simulates the same program sample by sample, and is
+the check of it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.operating import OVERRIDE_LOCKED
@@ -46,7 +46,7 @@ def cycle_time(
 
     Args:
         program: what to time, or its file.
-        machine: whose controller plays it.
+        machine: whose controller simulates it.
         per_block: give `CycleTime.blocks` too.
         full: check the closed form by full interpolation.
         feed_override: scales every programmed feed; None: at which the shop usually runs
@@ -93,7 +93,7 @@ def cycle_time(
             *(why for _, why in shaped_warnings(program, machine)),
             *_locked(program, feed_override),
         ),
-        played=PlayedPrograms(program, machine, labels=("program", "")),
+        simulated=SimulatedPrograms(program, machine, labels=("program", "")),
     )
 
 

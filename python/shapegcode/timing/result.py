@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from shapegcode.model.playable import PlayedPrograms
+from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.results.json import hidden
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result
@@ -148,7 +148,7 @@ class CycleTime(TimeParts, Result):
         blocks: per block, in order; empty unless asked for.
         shaped_regions: how many of the regions are shaped blocks, as the program's header says; 0: it has none.
         warnings: what the reader noticed; why the verdict in a header of shapegcode does not hold here.
-        played: the program, to play it again for a page.
+        simulated: the program, to play it again for a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "difference_percent": float | None}
@@ -162,7 +162,7 @@ class CycleTime(TimeParts, Result):
     blocks: tuple[BlockTime, ...]
     shaped_regions: int
     warnings: tuple[str, ...]
-    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
+    simulated: SimulatedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     __eq__ = Result.__eq__
     __hash__ = Result.__hash__
@@ -170,7 +170,7 @@ class CycleTime(TimeParts, Result):
     @property
     def methods(self) -> tuple[str, ...]:
         """Published methods of the controller and the plant."""
-        return () if self.played is None else self.played.methods
+        return () if self.simulated is None else self.simulated.methods
 
     @property
     def difference_percent(self) -> float | None:

@@ -208,8 +208,8 @@ def region_misses(
 ) -> list[tuple[str, Judged]]:
     """Every figure of a cut that leaves its limit in a condition that counts: the worst condition of each, in words."""
     worst: dict[str, tuple[Judged, Case]] = {}
-    for case, played in zip(cases, figures, strict=True):
-        for judged in judge_region(played, limits) if case.counts and played is not None else ():
+    for case, simulated in zip(cases, figures, strict=True):
+        for judged in judge_region(simulated, limits) if case.counts and simulated is not None else ():
             if judged.figure not in worst or judged.value_um > worst[judged.figure][0].value_um:
                 worst[judged.figure] = (judged, case)
     return [
@@ -280,7 +280,7 @@ BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 
 
 @dataclass(frozen=True)
-class Played:
+class SimulatedCase:
     """An operating condition that was simulated.
 
     Attributes:
@@ -294,7 +294,7 @@ class Played:
 
 
 @dataclass(frozen=True)
-class CasePlayer:
+class CaseSimulation:
     """Simulates one emitted region; every method is a task of its own.
 
     Attributes:
@@ -320,7 +320,7 @@ class CasePlayer:
     def nominal(self, rule: _core.BlockEnd) -> _core.PlaybackFigures:
         """Blocks at 100 %; under the controller's own rule also with an empty buffer where a stop excites most."""
         own = rule == self.model.own_rule
-        return self.model.play_emitted(
+        return self.model.simulate_emitted(
             self.blocks, self.path, rule, offset=self.offset,
             other_overrides=[case.override for case in self.cases if self._beside(case)] if own else (),
             starved_blocks=_core.fastest_block_ends(self.blocks) if own else (),
@@ -332,7 +332,7 @@ class CasePlayer:
         wanted = any(case.look_ahead for case in self.cases)
         if not wanted:
             return None
-        return self.model.play_planned(self.blocks, self.path, offset=self.offset, tracker=self.tracker)
+        return self.model.simulate_planned(self.blocks, self.path, offset=self.offset, tracker=self.tracker)
 
     def _beside(self, case: Case) -> bool:
         """Whether the contour of a case is measured beside the nominal run."""
@@ -350,12 +350,12 @@ class CasePlayer:
         whole = [[case] for case in others if self._whole(case)]
         return [*whole, [case for case in others if not self._whole(case)]]
 
-    def others(self, cases: Sequence[Case]) -> dict[str, Played]:
+    def others(self, cases: Sequence[Case]) -> dict[str, SimulatedCase]:
         """A group of them by the name of their case."""
-        played = {}
+        simulated = {}
         for case in cases:
             whole = self._whole(case)
-            run = self.model.play_emitted(
+            run = self.model.simulate_emitted(
                 self.blocks, self.path, override=case.override, shift=case.shift,
                 only=None if case.mode == ALL_MODES else case.mode, offset=self.offset, contour=whole,
                 command_contour=case.override != 1.0,
@@ -365,8 +365,8 @@ class CasePlayer:
             if not whole and case.override != 1.0:
                 # That at 100 % is taken off it: worked out here, where others need not wait for it.
                 cut_s = self._cut_s(case.override) - self._own_cut_s
-            played[case.name] = Played(run, cut_s)
-        return played
+            simulated[case.name] = SimulatedCase(run, cut_s)
+        return simulated
 
     def _cut_s(self, override: float) -> float:
         """How long all blocks take at a feed override, before any filter."""
@@ -380,7 +380,7 @@ class CasePlayer:
         self,
         nominal: Sequence[_core.PlaybackFigures],
         planned: _core.PlaybackFigures | None,
-        others: Mapping[str, Played],
+        others: Mapping[str, SimulatedCase],
     ) -> tuple[CaseFigures, ...]:
         """One entry per case, of what the tasks gave."""
         by_rule = {rule.name: run for rule, run in zip(BLOCK_ENDS, nominal, strict=True)}
@@ -396,14 +396,14 @@ class CasePlayer:
                 figures.append(case_figures(run))
         return tuple(figures)
 
-    def _other(self, case: Case, played: Played, own: _core.PlaybackFigures) -> CaseFigures:
-        run, whole = played.run, self._whole(case)
+    def _other(self, case: Case, simulated: SimulatedCase, own: _core.PlaybackFigures) -> CaseFigures:
+        run, whole = simulated.run, self._whole(case)
         if case.override == 1.0:  # the set-points are those of the nominal case, only the table is another
             response = Deviation.of([run.response]) if whole else None
             return CaseFigures(run.residual_mm, Deviation.of([own.command]), response, own.duration_s)
         if whole:
             return case_figures(run)
-        time_s = own.duration_s + played.cut_s
+        time_s = own.duration_s + simulated.cut_s
         if not self._beside(case):
             return CaseFigures(run.residual_mm, None, None, time_s)
         largest = next(each for each in own.other_overrides if each.override_ratio == case.override)

@@ -282,7 +282,7 @@ class RegionVerdict:
 
 
 @dataclass(frozen=True, repr=False)
-class PlayedFigures:
+class ProgramFigures:
     """Every cut of a program, as programmed and as emitted, shaped or left unchanged.
 
     Emitted figures of shaped cuts are the worse of both rules of block timing.

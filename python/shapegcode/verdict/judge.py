@@ -27,9 +27,9 @@ from shapegcode.verdict.cases import (
     BLOCK_ENDS,
     Case,
     CaseFigures,
-    CasePlayer,
-    Played,
+    CaseSimulation,
     RegionLimits,
+    SimulatedCase,
     Target,
     case_figures,
     judge_region,
@@ -42,7 +42,7 @@ from shapegcode.verdict.figures import (
     FrequencyResidual,
     OverrideResidual,
     Placed,
-    PlayedFigures,
+    ProgramFigures,
     RegionVerdict,
     worst_counted,
 )
@@ -88,7 +88,7 @@ class RegionFigures:
 
 
 @dataclass(frozen=True)
-class Playing:
+class PendingSimulations:
     """The simulations of one emitted region under way.
 
     Attributes:
@@ -99,10 +99,10 @@ class Playing:
         slowed: blocks that the look-ahead limits would slow.
     """
 
-    player: CasePlayer
+    player: CaseSimulation
     nominal: Sequence[Future[_core.PlaybackFigures]]
     planned: Future[_core.PlaybackFigures | None]
-    others: Sequence[Future[dict[str, Played]]]
+    others: Sequence[Future[dict[str, SimulatedCase]]]
     slowed: Future[int]
 
 
@@ -138,12 +138,12 @@ class Judge:
 
     def begin(
         self, emitted: Program, placed: Sequence[Placed], trackers: Iterable[_core.ContourTracker], pool: Executor
-    ) -> list[Playing]:
+    ) -> list[PendingSimulations]:
         """Begin to play every emitted region."""
         limits = self._model.limits()
         running = []
         for place, tracker in zip(placed, trackers, strict=True):
-            player = CasePlayer(
+            player = CaseSimulation(
                 place.blocks(emitted), place.region.path, self._model, self.cases, self.target,
                 self._model.offset(place.region), tracker,
                 least_increment_mm(self._machine, place.region.exit.units),
@@ -155,12 +155,12 @@ class Judge:
                 _core.count_slowed_blocks, player.blocks, limits.corner_speed_difference_mm_per_s,
                 limits.max_feed_mm_per_s,
             )  # fmt: skip
-            running.append(Playing(player, runs, planned, rest, slowed))
+            running.append(PendingSimulations(player, runs, planned, rest, slowed))
         return running
 
     def figures(
         self,
-        running: Sequence[Playing],
+        running: Sequence[PendingSimulations],
         originals: Sequence[Future[_core.PlaybackFigures]],
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
@@ -188,9 +188,9 @@ class Judge:
         Without those that a lower feed is no remedy for: look-ahead left on, a buffer underrun.
         """
         deviations = [
-            played.command if self.target == "command" else played.response
-            for case, played in zip(self.cases, figures.cases, strict=True)
-            if played is not None
+            simulated.command if self.target == "command" else simulated.response
+            for case, simulated in zip(self.cases, figures.cases, strict=True)
+            if simulated is not None
             and case.counts
             and not case.look_ahead
             and case.starved_s == 0.0
@@ -212,7 +212,7 @@ class Judge:
         placed: Sequence[Placed],
         block_period_s: float,
         rapid_vibration_um: Pair[Xyz[float]],
-    ) -> PlayedFigures:
+    ) -> ProgramFigures:
         """The figures of all cuts; see `verdicts`."""
         emitted = [run for region in figures for run in region.emitted]
         originals = [region.original for region in figures]
@@ -220,7 +220,7 @@ class Judge:
         cases = self._case_verdicts(figures, placed)
         excesses = [region.feed_excess for region in figures if region.feed_excess is not None]
         verdicts = self.verdicts(figures, placed, block_period_s)
-        return PlayedFigures(
+        return ProgramFigures(
             residual_vibration_um=Pair(
                 largest_xyz_um(run.residual_mm for run in originals), largest_xyz_um(run.residual_mm for run in emitted)
             ),
@@ -318,15 +318,15 @@ class Judge:
                 if (found := region.cases[rank]) is not None
             ]
             if rows:
-                played, within, lines = [row[0] for row in rows], [row[1] for row in rows], [row[2] for row in rows]
-                verdict = case_verdict(case, played, within, lines, side)
+                simulated, within, lines = [row[0] for row in rows], [row[1] for row in rows], [row[2] for row in rows]
+                verdict = case_verdict(case, simulated, within, lines, side)
                 verdicts.append(verdict if len(rows) == len(figures) else replace(verdict, time_s=None))
         return tuple(verdicts)
 
 
 def case_verdict(
     case: Case,
-    played: Sequence[CaseFigures],
+    simulated: Sequence[CaseFigures],
     limits: Sequence[RegionLimits],
     lines: Sequence[tuple[int, int]],
     material_side: str | None,
@@ -334,11 +334,11 @@ def case_verdict(
     """All regions in one case."""
     judged = [
         (each, where)
-        for where, run, limit in zip(lines, played, limits, strict=True)
+        for where, run, limit in zip(lines, simulated, limits, strict=True)
         for each in judge_region(run, limit)
     ]
     worst, where = max(judged, key=lambda pair: pair[0].share)
-    tracks = _largest(run.command for run in played), _largest(run.response for run in played)
+    tracks = _largest(run.command for run in simulated), _largest(run.response for run in simulated)
     sides: dict[str, Tracks[float | None]] = {}
     if material_side is not None:
         both = [None if found is None else found.gouge_and_excess_um(material_side) for found in tracks]
@@ -355,9 +355,9 @@ def case_verdict(
         look_ahead=case.look_ahead,
         starved_ms=case.starved_s * 1e3,
         counts=case.counts,
-        residual_um=largest_xyz_um(run.residual_mm for run in played),
+        residual_um=largest_xyz_um(run.residual_mm for run in simulated),
         contour_error_um=Tracks(*(None if found is None else found.largest_mm * 1e3 for found in tracks)),
-        time_s=sum(run.time_s for run in played),
+        time_s=sum(run.time_s for run in simulated),
         within=not worst.is_missed,
         figure=worst.figure,
         value_um=worst.value_um,
@@ -396,7 +396,7 @@ Vector = npt.NDArray[np.float64]
 
 def judge_program(
     emitted: Program, original: Program, machine: Machine, *, shaped: bool | None = None
-) -> PlayedFigures:
+) -> ProgramFigures:
     """An emitted program judged in the operating conditions that count, as `convert` judges its own."""
     model = MachineModel(machine)
     judge = Judge(model, [case for case in stated_cases(machine) if case.counts or case.nominal])
@@ -405,7 +405,8 @@ def judge_program(
     placed = [Placed(region, mine.first_line, mine.last_line, mine.path) for mine, region in pairs]
     with ThreadPoolExecutor(max_workers=cores()) as pool:
         originals = [
-            pool.submit(model.play_original, place.region.path, offset=model.offset(place.region)) for place in placed
+            pool.submit(model.simulate_original, place.region.path, offset=model.offset(place.region))
+            for place in placed
         ]
 
         def of(wanted: bool, rows: Sequence[T]) -> list[T]:
@@ -433,7 +434,7 @@ def simulate_unchanged(
     """
     path, offset = mine.path, model.offset(region)
     same = path.moves_as(region.path)
-    run = original if same else model.play_original(path, against=region.path, offset=offset)
+    run = original if same else model.simulate_original(path, against=region.path, offset=offset)
 
     def figures(case: Case) -> CaseFigures | None:
         if case.override == 1.0 and case.mode is None:
@@ -442,7 +443,7 @@ def simulate_unchanged(
             return None
         only = None if case.mode == ALL_MODES else case.mode
         return case_figures(
-            model.play_original(
+            model.simulate_original(
                 path, against=None if same else region.path, override=case.override, shift=case.shift, only=only,
                 offset=offset,
             )
@@ -457,9 +458,9 @@ def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
     for start_mm, end_mm in _rapids_before_cuts(program):
         key = tuple(np.round(end_mm - start_mm, 9))
         if key not in found:
-            found[key] = model.play_rapid(start_mm, end_mm, model.verdict_options()).residual_mm
+            found[key] = model.simulate_rapid(start_mm, end_mm, model.verdict_options()).residual_mm
     shaped = [
-        model.play_emitted(region.path, region.path, rule, contour=False, offset=model.offset(region)).residual_mm
+        model.simulate_emitted(region.path, region.path, rule, contour=False, offset=model.offset(region)).residual_mm
         for region in program.regions
         if region.was_rapid
         for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry)

@@ -64,7 +64,7 @@ class OpenGap:
             if isinstance(step, float) or step.region is None or timing.settling_s <= 0.0:
                 continue
             if clock_s - end_s < plant.longest_memory_s:
-                original = pool.submit(plant.play_original, step)
+                original = pool.submit(plant.simulate_original, step)
                 self.choices.append(Choice(step, step.region, timing, original))
                 self._at.append(at)
 
@@ -158,10 +158,10 @@ def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_
     hold = math.ceil(min(needed, _LONGEST_WAIT_S) / options.period_s)
     held = np.concatenate([command_mm, np.repeat(command_mm[-1:], hold, axis=0)])
     options.record_samples = len(held)
-    played = _core.play_samples(np.asfortranarray(held), still, options)
-    apart = np.abs(played.recorded_response - played.recorded_command).max(axis=1)
+    simulated = _core.play_samples(np.asfortranarray(held), still, options)
+    apart = np.abs(simulated.recorded_response - simulated.recorded_command).max(axis=1)
     outside = np.flatnonzero(apart > band_mm)
-    rest = round(played.duration_s / options.period_s)
+    rest = round(simulated.duration_s / options.period_s)
     return max(0.0, float(outside[-1] + 1 - rest) * options.period_s) if len(outside) else 0.0
 
 
@@ -198,9 +198,9 @@ class RapidPlant:
         self._known[key] = timing
         return timing
 
-    def play_original(self, rapid: Rapid) -> _core.PlaybackFigures:
+    def simulate_original(self, rapid: Rapid) -> _core.PlaybackFigures:
         """The rapid's figures beside which those of the replacement stand."""
-        return self._playing.play_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
+        return self._playing.simulate_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
 
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
         """The replacement as the text has it: the slower of both rules of block end; `stops_s`: dwells before it."""
@@ -209,7 +209,7 @@ class RapidPlant:
         runs = []
         for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry):
             least = 2 + math.ceil(2.0 * blocks.programmed_time_s / period) + self._filter_periods()
-            figures = self._playing.play_emitted(
+            figures = self._playing.simulate_emitted(
                 blocks, region.path, rule, contour=False, record_samples=least, offset=offset
             )
             count = round(figures.duration_s / period) + 1

@@ -2,7 +2,7 @@
 
 What is compared is the time until the table has settled, not the time until the axes have arrived: behind a G00 the
 control waits for in-position, but the modes ring on. A rapid is replaced where that costs more than the lower feed, the
-shaper and the exact stop of the replacement. The text that holds the replacements is read back and played.
+shaper and the exact stop of the replacement. The text that holds the replacements is read back and simulated.
 """
 
 from __future__ import annotations
@@ -173,9 +173,9 @@ class _RapidShaper:
         originals = [choice.original for choice in choices]
         figures = self.judge.measure(emitted, spliced.moves, originals, self.pool)
         verdicts = self.judge.verdicts(figures, spliced.moves, self.grid.block_period_s)
-        for choice, timing, played, verdict in zip(choices, running, figures, verdicts, strict=True):
+        for choice, timing, simulated, verdict in zip(choices, running, figures, verdicts, strict=True):
             choice.after = timing.result()
-            choice.slowed_blocks = played.slowed_blocks
+            choice.slowed_blocks = simulated.slowed_blocks
             choice.verdict = verdict
 
 
