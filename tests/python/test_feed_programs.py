@@ -139,3 +139,12 @@ def test_a_schedule_of_its_own_output_changes_little() -> None:
     times = [result.cycle_time_s.emitted for result in (first, again)]
     assert times[1] == pytest.approx(times[0], rel=0.01)
     assert again.ok
+
+
+def test_a_shaped_program_gets_no_other_feeds() -> None:
+    machine = sg.Machine.load("vx500")
+    original = HEAD + "G01 X50. F5000.\nY20.\nX0.\n" + TAIL
+    shaped = sg.convert(original, machine, shape_all=True).text.decode()
+    tool = sg.Tool.from_toml(TOOL.format(number="", flutes=20.0, overhang=32.0, feed=""))
+    with pytest.raises(sg.ProgramError, match="1:1: shaped by shapegcode already"):
+        sg.schedule_feed(shaped, machine, tool, sg.Stock.from_toml(BOX))

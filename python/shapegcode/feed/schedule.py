@@ -34,6 +34,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
+from shapegcode.program.compensation import program_for_conversion
 from shapegcode.results.result import Pair
 
 MARGIN = 0.015  # Share of each limit that a schedule leaves free: for what model and position of the load are off by
@@ -73,7 +74,7 @@ def schedule_feed(
         The text with its new feeds, and time, force and load before and after.
 
     Raises:
-        ProgramError: the program cannot be read.
+        ProgramError: the program cannot be read, or was shaped already.
         ArgumentError: a value outside its range, no tool, no cutting move.
         StockError: the stock does not suit the program.
         RoundTripError: the written text would not be equivalent: a defect of shapegcode.
@@ -81,6 +82,12 @@ def schedule_feed(
     Source: this project; the force model and feeds that follow the force are those of Kim and Ko, 2001 (paper 001).
     """
     machine = Machine.of(machine)
+    program = program_for_conversion(program, machine)
+    if program.stamp is not None:
+        raise _core.ProgramError(
+            f"{program.source}:1:1: shaped by shapegcode already (its header says so), and other feeds would undo it: "
+            "take the original; convert --feed-schedule does both"
+        )
 
     def swept(done: int, total: int) -> None:
         on_progress(_SWEEPING * done / max(total, 1))
