@@ -388,8 +388,8 @@ std::uint32_t RegionShaper::stops() const noexcept { return state_->stops_; }
 
 std::vector<PlannedTolerance> plan_tolerances(const std::shared_ptr<const Path>& path, const Fir& shaper,
                                               const ShapingOptions& options, std::span<const double> tolerances_mm) {
-  constexpr float none = std::numeric_limits<float>::infinity();
-  SpeedCaps caps{std::vector<float>(path->size(), none), std::vector<float>(path->size(), none)};
+  constexpr float unlimited = std::numeric_limits<float>::infinity();
+  SpeedCaps caps{std::vector<float>(path->size(), unlimited), std::vector<float>(path->size(), unlimited)};
   std::vector<PlannedTolerance> planned;
   planned.reserve(tolerances_mm.size());
   ShapingOptions each = options;
