@@ -141,6 +141,21 @@ runpy.run_module("shapegcode", run_name="__main__")
     assert not (folder / "o.nc").exists()
 
 
+def test_ctrl_c_ends_what_does_not_end_by_itself(folder: Path) -> None:
+    """A thread that waits for what never comes: Python would wait for it at its end."""
+    code = """
+import signal, sys, threading
+from shapegcode import cli
+cli._MAX_STOP_S = 1.0
+threading.Thread(target=threading.Event().wait).start()
+cli._run = lambda _words: signal.raise_signal(signal.SIGINT)
+sys.exit(cli.main())
+"""
+    done = command(folder, python=("-c", code))
+    sound(done, "shapegcode: stopped", code=130)
+    assert done.said.count("stopped") == 1
+
+
 def _interrupted(folder: Path, number: int, after_s: float) -> subprocess.CompletedProcess[str]:
     words = ("convert", "p.nc", *M, "-o", "o.nc", "--json", "o.json", "--html", "o.html")
     code = "print('begun', flush=True)\nfrom shapegcode.__main__ import main\nimport sys\nsys.exit(main())"

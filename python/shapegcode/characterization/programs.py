@@ -178,7 +178,7 @@ _Length = Annotated[Float, Field(ge=-1e5, le=1e5)]
 _Feed = Annotated[Float, Field(ge=0, le=1e6)]
 _Dwell = Annotated[Float, Field(ge=0, le=1e4)]
 _Time = Annotated[Positive, Field(lt=86_400)]
-_PROGRAM = r"O(\d{1,8})\.nc$"
+_PROGRAM = r"^O(\d{1,8})\.nc$"
 
 
 class _PartTable(InlineTable):

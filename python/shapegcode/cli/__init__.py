@@ -26,6 +26,7 @@ from typing import Any
 from shapegcode.cli.arguments import CommandParser
 
 _DEBUG = "--debug"
+_MAX_STOP_S = 15.0  # after Ctrl-C
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _WITH_REST = "batch"
 """Behind -- it takes words for the command that it runs."""
@@ -173,14 +174,23 @@ class _Interrupts:
     """Whether Ctrl-C came: a module that is being loaded may make another error of it."""
 
     def __init__(self, of_process: bool) -> None:
-        self.came = False
+        self.came = self.told = False
         self._mine = of_process and signal.getsignal(signal.SIGINT) is signal.default_int_handler
         if self._mine:
             signal.signal(signal.SIGINT, self._handle)
 
     def _handle(self, _number: int, _frame: object) -> None:
+        if not self.came and hasattr(signal, "setitimer"):
+            # It may fall between the steps of a lock, or into a long simulation: then nothing ends by itself.
+            signal.signal(signal.SIGALRM, self._stop_now)
+            signal.setitimer(signal.ITIMER_REAL, _MAX_STOP_S)
         self.came = True
         raise KeyboardInterrupt
+
+    def _stop_now(self, _number: int, _frame: object) -> None:
+        if not self.told:
+            os.write(2, b"shapegcode: stopped\n")
+        os._exit(ExitCode.INTERRUPTED)
 
     def end(self) -> None:
         """The work is done: how this process ends is no longer to be changed."""
@@ -209,6 +219,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BaseException as error:  # a compiled module may make a panic of Ctrl-C, which is no Exception
         if ctrl_c.came or isinstance(error, KeyboardInterrupt):
             print("shapegcode: stopped", file=sys.stderr)
+            ctrl_c.told = True
             return ExitCode.INTERRUPTED
         if _DEBUG in words or not isinstance(error, Exception) or not _expected(error):
             raise

@@ -477,11 +477,14 @@ def _gaps(rows: Rows, cycle_s: float) -> tuple[EdgeGap, ...]:
     )
 
 
+_AXIS_DIGITS = 4  # an axis number has two at most
+
+
 def _axes(signals: tuple[tuple[str, str], ...]) -> tuple[EdgeAxis, ...]:
     found: dict[int, tuple[str, list[str]]] = {}
     for address, label in signals:
         name, bar, number = address.partition("|")
-        if bar and number.isdigit():
+        if bar and number.isdecimal() and len(number) <= _AXIS_DIGITS:
             found.setdefault(int(number), (label or number, []))[1].append(name)
     return tuple(EdgeAxis(number, label, tuple(names)) for number, (label, names) in sorted(found.items()))
 

@@ -91,6 +91,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
     if '"' in line:
+        line = line.replace("\r", " ")  # which ends lines for the reader
         row = next(iter(csv.reader([line], delimiter=delimiter, skipinitialspace=True)), [])
         return [cell.strip() for cell in row]
     return [cell.strip() for cell in line.split(delimiter)]
