@@ -109,6 +109,7 @@ def convert(
         shaped = keep_what_pays(plan, settle(plan))
         if machine.shaping.rapids:
             shaped = shape_rapids(plan, shaped)
+        shaped = _as_it_was(plan, shaped)
         return result_of(plan, shaped, judge(plan, shaped))
     finally:
         pool.shutdown(cancel_futures=True)
@@ -238,8 +239,6 @@ def keep_what_pays(plan: ConversionPlan, shaped: Shaped) -> Shaped:
         chosen = plan.chosen
         plan.leave_everything("")
         shaped = _rewritten(plan, shaped, chosen)
-    if not shaped.written.placed and not plan.machine.shaping.rapids:
-        shaped = _as_it_was(plan, shaped)
     return shaped
 
 
@@ -266,8 +265,9 @@ def _rewritten(plan: ConversionPlan, shaped: Shaped, before: Sequence[int]) -> S
 
 
 def _as_it_was(plan: ConversionPlan, shaped: Shaped) -> Shaped:
-    """The file as it was given, if it was one program: not what it was expanded into."""
-    if plan.program.number is not None:
+    """Where nothing was shaped the file as it was given, if it was one program: not what it was expanded into."""
+    rapids_shaped = shaped.rapids is not None and shaped.rapids.outcome.shaped > 0
+    if shaped.written.placed or rapids_shaped or plan.program.number is not None:
         return shaped
     return replace(shaped, written=replace(shaped.written, size=plan.program.size), emitted=plan.program)
 
@@ -279,8 +279,7 @@ def shape_rapids(plan: ConversionPlan, shaped: Shaped) -> Shaped:
     found = shape.shape_rapids(shaped.emitted, shaped.written.placed, plan.model, plan.grid, plan.pool, plan.budget)
     found = _within_price(plan, shaped, found)
     written = replace(shaped.written, size=found.emitted.size, placed=found.placed)
-    shaped = replace(shaped, written=written, emitted=found.emitted, rapids=found)
-    return shaped if written.placed or found.outcome.shaped else _as_it_was(plan, shaped)
+    return replace(shaped, written=written, emitted=found.emitted, rapids=found)
 
 
 def _within_price(plan: ConversionPlan, shaped: Shaped, rapids: ShapedRapids) -> ShapedRapids:

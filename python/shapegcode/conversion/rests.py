@@ -1,4 +1,4 @@
-"""What a verdict rests on: values that were not measured on this machine, by how far each moves it.
+"""Sensitivity of a verdict to unverified parameters: by how far each moves the deciding figure.
 
 The deciding region, the one that comes nearest to a limit, is simulated again with each value moved by its stated
 uncertainty, or by what is usual where none is stated. That takes no more simulations than the verdict itself.

@@ -79,7 +79,7 @@ def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
 
 
 def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
-    """The values that were not measured on this machine and that the verdict rests on."""
+    """The sensitivity to unverified parameters as a table."""
     columns = (
         Column("key", left=True),
         Column("assumed → tested", value=_moved, text=True),
