@@ -275,7 +275,7 @@ def at_a_terminal(folder: Path, *words: str) -> str:
     child, terminal = pty.fork()
     if child == 0:
         os.chdir(folder)
-        os.environ |= {"PYTHONPATH": str(ROOT / "python"), "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1"}
+        os.environ |= {"TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1"}
         os.execv(sys.executable, [sys.executable, "-m", "shapegcode", *words])
     shown, pressed = "", 0
     while True:
