@@ -187,6 +187,7 @@ class Identification(Result):
             without a model.
         mass_check: where the model has one mode.
         reason: why there is no mode; empty: there is.
+        doubt: why the modes should not be used although there are some; empty: they may.
         machine_file: where the modes were put; null: nowhere.
         warnings: what the user should know of the records and of the result.
         notes: what was left out of the files and the like.
@@ -215,6 +216,7 @@ class Identification(Result):
     noise_rms: float | None = None
     mass_check: MassCheck | None = None
     reason: str = ""
+    doubt: str = ""
     machine_file: MachineFile | None = None
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
