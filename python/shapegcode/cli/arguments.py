@@ -268,7 +268,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "calculation": (
         "plant", "no_full", "look_ahead", "drive", "continuous", "family", "objective", "negative", "taps", "speed",
-        "radius", "modes", "most_modes", "frequencies", "ignore_force", "start", "station", "cutoff", "lambda_s",
+        "radius", "modes", "max_modes", "frequencies", "ignore_force", "start", "station", "cutoff", "lambda_s",
     ),
     "modes that were not measured on this machine": ("keep_modes", "rigid"),
     "what a file does not say": (

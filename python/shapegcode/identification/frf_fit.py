@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from shapegcode.identification.lines import (
     steady_sines,
     weighted,
 )
-from shapegcode.identification.modal_fit import Lines, ModalFit, mode_columns
+from shapegcode.identification.modal_fit import Lines, ModalFit
 from shapegcode.identification.modal_search import (
     Candidate,
     Starts,
@@ -54,6 +53,8 @@ _VERY_CLEAR = 6.0  # evidence beyond that for a mode without a peak of its own o
 _STABLE = 0.34  # share of the orders that have the pole of a mode
 _LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % left unexplained, within so many half-power widths
 _TURNED = 1.0  # tan of the phase of a residue: beyond it hammer and sensor are not at the same point
+_ACCEPTED_PERCENT = 50.0  # a damping ratio less certain than this is refused
+_MAX_MODES, _IN_WINDOW = 40, 24  # of a structure unless asked otherwise; of a window
 _NO_VIBRATION = 0.3  # damping ratio of what is background, not a mode
 _SCATTER = 0.01  # probability by noise alone of hits that differ as much
 _ENOUGH = 3.0  # independent samples a parameter of a fit that another one is held against
@@ -120,7 +121,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
         order=len(modes_of(found.windows)),
         fit_percent=found.fit_percent if found.modes else 0.0,
         noise_rms=float(np.sqrt(np.mean(np.abs(left) ** 2))),
-        doubt=_doubt(found),
+        doubt=doubt_of(found),
         warnings=(*dict.fromkeys(warning for each in responses for warning in each.warnings), *turned),
         notes=tuple(notes),
         responses=tuple(used),
@@ -207,11 +208,14 @@ def _of_hits(ready: Prepared, responses: Sequence[FloatArray], band_hz: tuple[fl
     return _Measured((hits.lines,), low, high, duration, 1.0 / duration, hits, force / float(np.max(force)))
 
 
-def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[_Measured, FrfModes]:
-    """Find modes in hits; what oscillates throughout is looked for once more in what a first model leaves."""
+def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[FloatArray]]:
+    """Find modes in hits, and the model's response of each record.
+
+    What oscillates throughout is looked for once more in what a first model leaves.
+    """
     measured = hits_measured(ready, sought.band_hz)
     pool, poles = candidates_of(measured.parts)
-    windows = search(measured.parts, measured.low, measured.high, sought.most_modes, pool, None)
+    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
     hits = measured.hits
     assert hits is not None
     model = _model(measured.parts, windows)[0]
@@ -227,7 +231,14 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[_Measured, FrfModes
         responses.append(response)
     if found:
         measured = _of_hits(ready, responses, sought.band_hz)
-    return measured, find(measured, sought, pool, poles, modes_of(windows))
+    found_modes = find(measured, sought, pool, poles, modes_of(windows))
+    assert measured.hits is not None
+    inside = (measured.parts[0].omega >= measured.low) & (measured.parts[0].omega < measured.high)
+    courses = measured.hits.in_time(np.where(inside, found_modes.model[0] * measured.hits.force, 0.0))
+    fitted = [np.zeros(len(each)) for each in responses]
+    for samples, start, course in zip(fitted, measured.hits.starts, courses, strict=True):
+        samples[start : start + len(course)] = course
+    return found_modes, fitted
 
 
 def find(
@@ -241,21 +252,34 @@ def find(
     parts = measured.parts
     if pool is None:
         pool, poles = candidates_of(parts)
-        windows = search(parts, measured.low, measured.high, sought.most_modes, pool, None)
+        windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, None)
         starts = modes_of(windows)
         parts = tuple(_weighed(lines, model) for lines, model in zip(parts, _model(parts, windows), strict=True))
-    windows = search(parts, measured.low, measured.high, sought.most_modes, pool, starts)
+    windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, starts)
     if measured.hits is None:
         windows = [_with_correlation(window) for window in windows]
     measured = replace(measured, parts=parts)
     modes = [mode for window in windows for mode in _modes(window, measured, pool, sought)]
     low_hz, high_hz = sought.band_hz or (0.0, np.inf)
     modes = [each for each in modes if low_hz <= each.frequency_hz.value <= high_hz]
+    modes = _strongest(modes, sought)
     model = _model(parts, windows)
     return FrfModes(
         tuple(sorted(modes, key=lambda mode: mode.frequency_hz.value)), tuple(windows), _chart(poles), tuple(model),
         _explained(measured, model), _missing_peak(measured, modes),
     )  # fmt: skip
+
+
+def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[IdentifiedMode]:
+    """As many modes as are wanted: those of the highest peaks, the others refused."""
+    supported = [mode for mode in modes if not mode.refusal and mode.mass_kg is not None]
+    if sought.modes is not None and len(supported) < sought.modes:
+        raise RecordError(f"{sought.modes} modes are asked for, and the data hold no more than {len(supported)}")
+    most = sought.modes or sought.max_modes or _MAX_MODES
+    height = {id(mode): mode.damping_ratio.value * (mode.mass_kg.value if mode.mass_kg else 1.0) for mode in supported}
+    over = {id(mode) for mode in sorted(supported, key=lambda mode: height[id(mode)])[most:]}
+    why = f"{most} modes of higher peaks were asked for"
+    return [replace(mode, refusal=why) if id(mode) in over else mode for mode in modes]
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
@@ -317,7 +341,7 @@ def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float
     return top
 
 
-def _doubt(found: FrfModes) -> str:
+def doubt_of(found: FrfModes) -> str:
     """Why the modes should not be used; empty: they may."""
     if found.missing_peak_hz is not None:
         return f"the highest peak of the response, at {found.missing_peak_hz:.4g} Hz, belongs to no supported mode"
@@ -343,9 +367,7 @@ def _chart(poles: Sequence[Pole]) -> tuple[ChartPole, ...]:
 
 
 # --- The modes of a window --------------------------------------------------------------------------------------------
-def _modes(
-    window: Window, measured: _Measured, pool: Sequence[Candidate], sought: Sought
-) -> list[IdentifiedMode]:
+def _modes(window: Window, measured: _Measured, pool: Sequence[Candidate], sought: Sought) -> list[IdentifiedMode]:
     fit = window.fit
     if fit is None or not window.inside():
         return []
@@ -387,7 +409,7 @@ def _logarithms(
     omega, zeta = float(fit.omega[index]), float(fit.zeta[index])
     base = np.array([np.log(omega), np.log(zeta), np.log(max(residue, 1e-300))])
     scale = np.array([1.0, 1.0, 1.0 / max(residue, 1e-300)])
-    covariance = known.each[0, index] * np.outer(scale, scale)
+    covariance = _misfit(fit, window.parts, index) * known.each[0, index] * np.outer(scale, scale)
     change = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]], dtype=np.float64)
     values = change @ base + np.array([-np.log(2.0 * np.pi), 0.0, 0.0, np.log(2.0), 0.0])
     half = float(stats.t.ppf(0.975, known.freedom)) * np.sqrt(np.maximum(np.diag(change @ covariance @ change.T), 0.0))
@@ -401,6 +423,17 @@ def _logarithms(
         half = np.hypot(half, error * np.array([zeta, 1.0, 1.0, 1.0, 1.0]))
         half = np.maximum(half, _scatter(window, known, index, measured, change, scale))
     return values, half
+
+
+def _misfit(fit: ModalFit, parts: Sequence[Lines], index: int) -> float:
+    """How much more the fit leaves around a mode than in the whole window, in power; 1 where it leaves less."""
+    omega, width = float(fit.omega[index]), 2.0 * float(fit.zeta[index] * fit.omega[index])
+    around, count = 0.0, 0
+    for lines, left in zip(parts, fit.left, strict=True):
+        near = np.abs(lines.omega - omega) <= max(width, 3.0 * (lines.omega[1] - lines.omega[0]))
+        around += float(np.sum(np.abs(left[near]) ** 2))
+        count += int(np.count_nonzero(near))
+    return max(1.0, around / max(count, 1) * sum(map(len, fit.left)) / max(fit.squares, 1e-300))
 
 
 def _scatter(
@@ -447,7 +480,7 @@ def _refusal(
         or _response_refusal(fit.residues[:, index])
         or _evidence_refusal(window, index, hertz, pool)
         or _local_refusal(window, omega, width)
-        or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent)
+        or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or _ACCEPTED_PERCENT)
     )
 
 
@@ -502,15 +535,15 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[C
     starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
     apart = np.abs(fit.omega - omega) > zeta * omega + fit.zeta * fit.omega
     # Where another mode lies within its width, that one must not take its part.
-    effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (40, 1e-8)
+    effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
     without = fitted(window.parts, starts, effort, complex_modes=fit.complex_modes)
     gain = np.inf if without is None else evidence_of(without, share) - evidence_of(fit, share)
-    stable = any(
-        abs(each.omega - omega) < max(each.zeta, zeta) * omega and each.share >= _STABLE for each in pool
-    )
+    stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega and each.share >= _STABLE for each in pool)
     lines, left = window.parts[0], fit.left[0]
     modelled_lines = (lines.response - left / lines.weight) * lines.s ** (1 - lines.power)
-    near = np.flatnonzero(np.abs(lines.omega - omega) <= max(_PEAK * 2.0 * zeta * omega, lines.omega[1] - lines.omega[0]))
+    near = np.flatnonzero(
+        np.abs(lines.omega - omega) <= max(_PEAK * 2.0 * zeta * omega, lines.omega[1] - lines.omega[0])
+    )
     course = np.abs(modelled_lines.real)
     peak = any(0 < i < len(course) - 1 and course[i] >= course[i - 1] and course[i] > course[i + 1] for i in near)
     needed = 0.0 if peak and stable else _VERY_CLEAR

@@ -106,13 +106,14 @@ def hits_of(usable: Sequence[Usable], responses: Sequence[FloatArray], low_hz: f
     power = np.sum(np.abs(force) ** 2, axis=0)
     noise = np.mean([(each.response_noise or 0.0) ** 2 for each in usable]) * np.sum(window**2)
     level = max(float(np.sqrt(noise)), _QUIETEST * float(np.max(np.abs(response))))
-    lags = np.exp(-2j * np.pi * np.outer(np.arange(_LAGS), np.arange(count)) / count) @ window**2
-    pulse = np.mean([np.count_nonzero(each.record.force_n) for each in usable])
+    lags = fft.fft(window**2)[:_LAGS]
+    pulse = np.mean([np.count_nonzero(np.asarray(each.record.force_n)) for each in usable])
     noise_n = np.sqrt(np.mean([(each.force_noise_n or 0.0) ** 2 for each in usable]))
-    lines = Lines(
-        sigma + 2j * np.pi * frequency[kept], np.sum(np.conj(force) * response, axis=0) / power, np.sqrt(power) / level,
-        POWERS[usable[0].record.quantity], np.zeros((len(power), 0), dtype=np.complex128), lags / lags[0],
-    )  # fmt: skip
+    plane = np.asarray(sigma + 2j * np.pi * frequency[kept], dtype=np.complex128)
+    ratio = np.sum(np.conj(force) * response, axis=0) / power
+    nothing = np.zeros((len(power), 0), dtype=np.complex128)
+    quantity = POWERS[usable[0].record.quantity]
+    lines = Lines(plane, ratio, np.sqrt(power) / level, quantity, nothing, lags / lags[0])
     error = noise_n * np.sqrt(pulse) / np.sqrt(power)
     return Hits(lines, force, response, kept, tuple(starts), count, period, sigma, error)
 
@@ -135,13 +136,9 @@ def measured_lines(each: FrequencyResponse) -> Lines:
     else:
         rough = np.abs(np.diff(each.response, 3)) ** 2 / _THIRD_DIFFERENCE
         noise = smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)), omega, quantity)
-    return weighted(
-        Lines(
-            1j * omega, each.response, np.ones(len(omega)), quantity, np.zeros((len(omega), 0), dtype=np.complex128),
-            np.ones(1, dtype=np.complex128),
-        ),
-        noise,
-    )  # fmt: skip
+    plane, nothing = np.asarray(1j * omega, dtype=np.complex128), np.zeros((len(omega), 0), dtype=np.complex128)
+    alone = np.ones(1, dtype=np.complex128)
+    return weighted(Lines(plane, each.response, np.ones(len(omega)), quantity, nothing, alone), noise)
 
 
 def weighted(lines: Lines, noise: FloatArray) -> Lines:

@@ -74,7 +74,8 @@ def mode_columns(lines: Lines, omega: FloatArray, zeta: FloatArray) -> tuple[Com
     return column, shared * (damping + 2.0 * omega**2), shared * damping
 
 
-def _stacked(values: ComplexArray) -> FloatArray:
+def stacked(values: ComplexArray) -> FloatArray:
+    """Real parts, then imaginary parts."""
     return np.concatenate((values.real, values.imag))
 
 
@@ -98,17 +99,17 @@ def _linearised(parts: Sequence[Lines], theta: FloatArray, complex_modes: bool) 
         if complex_modes:  # a second column per mode: numerator of first degree
             turn = lines.s[:, None] / omega
             blocks.append(column * turn)
-        columns = _stacked(weight * np.hstack([*blocks, lines.background]))
-        goal = _stacked(lines.weight * lines.response)
+        columns = stacked(np.asarray(weight * np.hstack([*blocks, lines.background]), dtype=np.complex128))
+        goal = stacked(np.asarray(lines.weight * lines.response, dtype=np.complex128))
         norms = np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
         basis, triangle = np.linalg.qr(columns / norms)
         factors = np.linalg.lstsq(triangle, basis.T @ goal, rcond=1e-12)[0] / norms
         gain = factors[:modes] + (factors[modes : 2 * modes] * turn if complex_modes else 0.0)
         moved = np.empty((len(goal), 2 * modes))
-        along = to_omega * gain
+        along: ComplexArray = to_omega * gain
         if complex_modes:
             along = along - column * turn * factors[modes : 2 * modes]
-        moved[:, ::2], moved[:, 1::2] = _stacked(weight * along), _stacked(weight * (to_zeta * gain))
+        moved[:, ::2], moved[:, 1::2] = stacked(weight * along), stacked(weight * (to_zeta * gain))
         linear.append(factors)
         jacobians.append(np.hstack((columns, moved)))
         projected.append(moved - basis @ (basis.T @ moved))
@@ -118,7 +119,11 @@ def _linearised(parts: Sequence[Lines], theta: FloatArray, complex_modes: bool) 
 
 
 def fit_modes(
-    parts: Sequence[Lines], starts: Sequence[tuple[float, float]], iterations: int, *, complex_modes: bool = False,
+    parts: Sequence[Lines],
+    starts: Sequence[tuple[float, float]],
+    iterations: int,
+    *,
+    complex_modes: bool = False,
     gain_floor: float = _GAIN_FLOOR,
 ) -> ModalFit:
     """Fit modes to lines: sum over modes of residue s^q / (s² + 2 zeta omega s + omega²), and the background.
@@ -156,9 +161,7 @@ def fit_modes(
         if moved <= _STEP_FLOOR or (0.0 <= gained <= gain_floor * at.squares) or damping > 1e8:
             break
     omega, zeta = np.exp(theta[::2]), np.exp(theta[1::2])
-    residues = [
-        part[:modes] + (part[modes : 2 * modes] * 1j if complex_modes else 0.0) for part in at.linear
-    ]
+    residues = [part[:modes] + (part[modes : 2 * modes] * 1j if complex_modes else 0.0) for part in at.linear]
     first = (2 if complex_modes else 1) * modes
     ends = np.cumsum([2 * len(lines.s) for lines in parts])[:-1]
     left = [part[: len(part) // 2] + 1j * part[len(part) // 2 :] for part in np.split(at.residual, ends)]

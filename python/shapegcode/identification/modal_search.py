@@ -26,8 +26,10 @@ _STABLE = 0.34  # share of the higher orders that have a pole which is fitted fr
 _SEEN = 0.12  # ... which is tried
 _QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain below which they end
 _TRIED, _WEAKEST = 3, 2
+_UNUSUAL = 2.0  # times the median of what a fit leaves: around a mode that may be two
 _LINES_PER_MODE = 4
 _FEW = 350  # lines of a window that trials take
+_BAND_LINES = 48  # a band or window has at least so many
 _FEWEST = 12  # lines below which a window is left out
 _DEGREE = 2  # of the background of a window
 CLEAR = 6.0  # by so much beyond Bayes' criterion a mode must better the fit
@@ -52,7 +54,7 @@ def candidates_of(parts: Sequence[Lines]) -> tuple[list[Candidate], list[Pole]]:
     high = max(float(lines.omega[-1]) for lines in parts)
     begin, found, everything = low, [], []
     while begin < high / _EDGE:
-        end = min(begin * _BAND, high)
+        end = _upper_end(parts, begin, _BAND, high)
         poles = band_poles(parts, begin, end)
         first = begin if begin == low else begin * _EDGE
         last = end if end == high else end / _EDGE
@@ -101,7 +103,9 @@ class Window:
 
     def inside(self) -> list[int]:
         """Modes that count."""
-        return [] if self.fit is None else [i for i, omega in enumerate(self.fit.omega) if self.low <= omega < self.high]
+        return (
+            [] if self.fit is None else [i for i, omega in enumerate(self.fit.omega) if self.low <= omega < self.high]
+        )
 
 
 def search(
@@ -109,14 +113,16 @@ def search(
 ) -> list[Window]:
     """Fit windows, each without what the modes outside of it do in it; from poles that are stable, or from `starts`."""
     spare = [(each.omega, each.zeta) for each in candidates]
+    final = starts is not None
     if starts is None:
         starts = [(each.omega, each.zeta) for each in candidates if each.share >= _STABLE]
         spare = [(each.omega, each.zeta) for each in candidates if each.share < _STABLE]
     known = _linear(parts, starts)
-    count = max(1, round(np.log(high / low) / np.log(_CORE)))
-    ends = np.geomspace(low, high, count + 1).tolist()
-    windows = []
-    for begin, end in zip(ends[:-1], ends[1:], strict=True):
+    windows, begin = [], low
+    while begin < high:
+        end = _upper_end(parts, begin / _MARGIN, _CORE * _MARGIN**2, high * _MARGIN) / _MARGIN
+        if end * np.sqrt(_CORE) > high:
+            end = high
         first, last = begin / _MARGIN, end * _MARGIN
         near = [
             index
@@ -126,8 +132,18 @@ def search(
         far = [index for index in range(len(starts)) if index not in near]
         rest = [_without(lines, [starts[i] for i in far], known[row, far]) for row, lines in enumerate(parts)]
         tried = [each for each in spare if first < each[0] < last]
-        windows.append(_fit_window(rest, [starts[i] for i in near], tried, begin, end, most))
+        windows.append(_fit_window(rest, [starts[i] for i in near], tried, begin, end, most, final))
+        begin = end
     return windows
+
+
+def _upper_end(parts: Sequence[Lines], low: float, ratio: float, highest: float) -> float:
+    """Upper end of a band: some ratio above its lower end, further where the lines are few."""
+    fewest = max(
+        float(lines.omega[min(int(np.searchsorted(lines.omega, low)) + _BAND_LINES, len(lines.s) - 1)])
+        for lines in parts
+    )
+    return float(min(max(low * ratio, fewest), highest))
 
 
 def modes_of(windows: Sequence[Window]) -> Starts:
@@ -168,7 +184,9 @@ def cut(lines: Lines, low: float, high: float, degree: int = _DEGREE) -> Lines:
     )  # fmt: skip
 
 
-def _fit_window(parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, most: int) -> Window:
+def _fit_window(
+    parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, most: int, final: bool
+) -> Window:
     """The modes of a window by evidence: from those near it, without what explains nothing, with what is left."""
     wide = [cut(lines, low / _MARGIN, high * _MARGIN) for lines in parts]
     if min(len(lines.s) for lines in wide) <= _FEWEST:
@@ -182,7 +200,9 @@ def _fit_window(parts: Sequence[Lines], near: Starts, spare: Starts, low: float,
         both.append(_selected(fewer, pruned, spare, room))
     usable = [each for each in both if each is not None]
     best = min(usable, key=lambda fit: evidence_of(fit, share)) if usable else None
-    if best is None or fewer[0] is not wide[0]:
+    if not final:
+        return Window(low, high, tuple(wide), fitted(wide, starts_of(best), _QUICK))
+    if fewer[0] is not wide[0]:
         best = _selected(wide, starts_of(best), spare, room)
     best = fitted(wide, starts_of(best), _FULL)
     if best is not None:
@@ -258,16 +278,15 @@ def _pruned(parts: Sequence[Lines], starts: Starts, share: float) -> Starts:
         kept.pop(int(np.argmin(loss)))
 
 
-def _split(
-    parts: Sequence[Lines], fit: ModalFit, share: float, evidence: float
-) -> tuple[ModalFit, float] | None:
+def _split(parts: Sequence[Lines], fit: ModalFit, share: float, evidence: float) -> tuple[ModalFit, float] | None:
     """The fit with two modes in place of one, where around it most is left for its width."""
     left = []
     for omega, zeta in starts_of(fit):
         near = np.abs(parts[0].omega - omega) < 2.0 * zeta * omega
         left.append(float(np.mean(np.abs(fit.left[0][near]) ** 2)) if np.count_nonzero(near) > _FEWEST // 2 else 0.0)
+    usual = float(np.median(np.abs(fit.left[0]) ** 2))
     for index in np.argsort(left)[::-1][:_TRIED]:
-        if not left[index]:
+        if left[index] < _UNUSUAL * usual:
             break
         starts = starts_of(fit)
         omega, zeta = starts.pop(index)
@@ -433,7 +452,9 @@ def uncertainty_of(window: Window) -> Uncertainty:
     whole = variance * (inverse @ spread @ inverse) / np.outer(norms, norms)
     freedom = max(sum(count * lines.independent for count, lines in zip(rows, parts, strict=True)) - size, 2.0)
     first = sum(counts)
-    poles = np.array([whole[first + 2 * i : first + 2 * i + 2, first + 2 * i : first + 2 * i + 2] for i in range(modes)])
+    poles = np.array(
+        [whole[first + 2 * i : first + 2 * i + 2, first + 2 * i : first + 2 * i + 2] for i in range(modes)]
+    )
     begins = np.cumsum([0, *counts[:-1]])
     chosen = [[[first + 2 * i, first + 2 * i + 1, int(begin) + i] for i in range(modes)] for begin in begins]
     each = np.array([[whole[np.ix_(index, index)] for index in row] for row in chosen])

@@ -26,6 +26,7 @@ Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 # A further mode must explain this share of the response's energy: sensors are not linear beyond .1 % of amplitude.
 _MIN_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
+_MAX_MODES = 8  # of a model, unless asked otherwise
 PEAKS = 2  # of the residual's spectrum that are tried
 _TWINS = 0.25  # of the half width of a resonance
 _STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of the chart: the model one order lower has the pole too
@@ -73,9 +74,9 @@ class Sought:
     """What is looked for."""
 
     band_hz: tuple[float, float] | None  # frequencies of interest; None: all
-    most_modes: int
+    max_modes: int | None
     modes: int | None  # their number; None: by evidence
-    accepted_percent: float  # see `identify.identify`
+    accepted_percent: float | None  # see `identify.identify`
 
     def order(self, models: Search) -> int:
         """Number of modes that is taken; refused where the data hold fewer than were asked for."""
@@ -106,7 +107,7 @@ def search(problem: FitProblem, sought: Sought) -> Search:
     evidence = [evidence_of(problem, None)]
     fits: list[Fit] = []
     pool = _pool(problem)
-    while len(fits) < (sought.modes or sought.most_modes):
+    while len(fits) < (sought.modes or sought.max_modes or _MAX_MODES):
         best = _next_fit(problem, fits[-1] if fits else None, pool)
         if best is None:
             break
@@ -372,7 +373,11 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
     # A rival that splits the mode in two or lacks it disagrees as much as one can.
     rows = [_logarithms(doubts.rival, i) for i in range(len(doubts.rival.omega_rad_s))]
     nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(frequency.value)))
-    for name, estimate, index in (("frequency", frequency, 0), ("damping ratio", damping, 1), ("stiffness", stiffness, 4)):
+    for name, estimate, index in (
+        ("frequency", frequency, 0),
+        ("damping ratio", damping, 1),
+        ("stiffness", stiffness, 4),
+    ):
         change = 0.0
         if estimate is not None:
             change = 100.0 * abs(float(np.expm1(nearest.values[index] - np.log(estimate.value))))

@@ -9,11 +9,9 @@ import numpy as np
 import scipy.linalg
 
 from shapegcode.identification.modal_fit import Lines
-from shapegcode.io.record import FloatArray
+from shapegcode.io.frequency_response import ComplexArray
 
 _CIRCLE = 0.85  # share of the unit circle that a band is laid on
-_RATIO = 1.8  # upper end of a band over its lower end, at least
-_STEP = 1.3  # from band to band
 _LINES_PER_ORDER = 4
 _MAX_ORDER = 24
 _MIN_ORDER = 2
@@ -41,13 +39,12 @@ def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:
     if most < _MIN_ORDER:
         return []
     width = 2.0 * np.pi * _CIRCLE / (high - low)
-    sides: list[tuple[FloatArray, ...]] = []
+    sides: list[tuple[ComplexArray, ComplexArray, ComplexArray]] = []
     for lines, inside in chosen:
         z = np.exp(-width * (lines.s[inside] - 1j * low))
         weight = lines.weight[inside]
-        # Numerator as an acceleration, whatever was measured: what lies below and above the band is then small.
         response = lines.response[inside]
-        numerator = weight[:, None] * z[:, None] ** np.arange(most + 1)
+        numerator = np.asarray(weight[:, None] * z[:, None] ** np.arange(most + 1), dtype=np.complex128)
         denominator = -response[:, None] * numerator
         sides.append((numerator.conj().T @ numerator, numerator.conj().T @ denominator,
                       denominator.conj().T @ denominator))  # fmt: skip
