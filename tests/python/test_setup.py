@@ -68,6 +68,13 @@ def test_answers_become_a_short_file_that_says_why(tmp_path: Path) -> None:
     assert "axes.x.modes.1.damping_ratio" in report["answered"]
 
 
+def test_a_name_is_an_answer(tmp_path: Path) -> None:
+    """Of a machine of which only the name is said, one value is answered."""
+    said = answered(tmp_path, 'name = "A"\n')
+    assert json.loads((tmp_path / "r.json").read_text())["answered"] == ["name"]
+    assert "1 value answered" in said.splitlines()[0]
+
+
 def test_the_short_file_converts_like_the_full_one(tmp_path: Path) -> None:
     """The same values whatever is written down: the emitted program is the same, byte for byte."""
     answered(tmp_path)

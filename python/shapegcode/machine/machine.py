@@ -23,10 +23,17 @@ from shapegcode.machine.axes import Axes
 from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Times
 from shapegcode.machine.input import Input
 from shapegcode.machine.output import Emission, Price, Shaping, Tolerance, Verdict
-from shapegcode.settings import edit
-from shapegcode.settings.describe import documentation, values_of, write_toml
-from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml
-from shapegcode.settings.load import MAX_PROBLEMS, KeyProblem, further_problems, line_of, parsed, read_text, validated
+from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml, values_of
+from shapegcode.settings.load import (
+    MAX_PROBLEMS,
+    KeyProblem,
+    further_problems,
+    line_of,
+    parsed,
+    read_text,
+    validated,
+    with_values,
+)
 from shapegcode.settings.remarks import (
     DEFAULT,
     ORIGIN_TEXT,
@@ -35,7 +42,6 @@ from shapegcode.settings.remarks import (
     remark_of,
     remarks_in_comments,
     take_origins,
-    with_remarks,
 )
 
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
@@ -361,6 +367,8 @@ class Machine(TomlTable):
         Raises:
             KeyError: a remark for a key that does not exist.
         """
+        from shapegcode.settings.describe import write_toml
+
         if short:
             held = {value.key: value.remark for value in self.values() if value.remark}
             return write_toml(self, held | dict(remarks or {}), short=True)
@@ -388,7 +396,7 @@ class Machine(TomlTable):
             MachineError: no such key, or a value that a machine file could not have; every problem is listed.
         """
         values = {key: value} if isinstance(key, str) else key
-        changed = edit.with_values(self, values, source or self.name, MachineError)
+        changed = with_values(self, values, source or self.name, MachineError)
         below = tuple(f"{name}." for name in values)
         changed._remarks = {
             name: remark for name, remark in self._remarks.items() if name not in values and not name.startswith(below)
@@ -419,6 +427,8 @@ _OF_A_MACHINE = ("axes.", "controller.", "times.", "power_on.", "feed_control.")
 
 def inherited_text(name: str) -> str:
     """A built-in machine's file as the start of another one: what was measured there is inherited here."""
+    from shapegcode.settings.edit import with_remarks
+
     text = Machine.builtin_text(name)
     whose = Machine.load(name).name
 
@@ -430,6 +440,8 @@ def inherited_text(name: str) -> str:
 
 def key_documentation() -> str:
     """The reference of the machine file's keys as Markdown: what ``docs/reference/machine.md`` holds, word for word."""
+    from shapegcode.settings.describe import documentation
+
     return documentation(Machine, Machine.builtin_names())
 
 

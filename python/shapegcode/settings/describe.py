@@ -1,4 +1,4 @@
-"""A machine in words: values with their origin, its file, long and short, its reference and JSON Schema."""
+"""A settings file in words: long and short with comments, its reference and its JSON Schema."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any, get_origin
 
 from pydantic.fields import FieldInfo
 
+from shapegcode.settings.edit import origin_lines
 from shapegcode.settings.keys import (
     InlineTable,
     KeyInfo,
-    KeyValue,
     TomlTable,
     facts,
     item_type,
@@ -19,40 +19,9 @@ from shapegcode.settings.keys import (
     table_type,
     toml,
 )  # fmt: skip
-from shapegcode.settings.remarks import ORIGIN, ORIGIN_TEXT, origin_lines, origin_of
+from shapegcode.settings.remarks import ORIGIN, ORIGIN_TEXT, origin_of
 
 _LINE_WIDTH = 110
-
-
-def values_of(
-    table: TomlTable, prefix: str = "", given: bool = True, remarks: Mapping[str, str] | None = None
-) -> Iterator[KeyValue]:
-    """Every key below a table with its value and origin, in the order of the file."""
-    for name, field in type(table).model_fields.items():
-        value, key = getattr(table, name), f"{prefix}{name}"
-        from_file = given and name in table.model_fields_set
-        if isinstance(value, TomlTable) and not isinstance(value, InlineTable):
-            yield from values_of(value, f"{key}.", from_file, remarks)
-        elif item_type(field) and value:
-            for number, item in enumerate(value, start=1):
-                yield from values_of(item, f"{key}.{number}.", from_file, remarks)
-        else:
-            info = key_info(field, key)
-            remark = (remarks or {}).get(key, "")
-            # A key without a value can have a remark that says why: "assumed: not limited", "not measured: rigid".
-            says_why = not value and (value is not None or remark.startswith("assumed"))
-            origin = origin_of(remark) if from_file or (remark and says_why) else "default"
-            assumed = origin == "assumed" or (info.assumed and origin == "default")
-            yield KeyValue(
-                key=key,
-                value="not set" if value is None else toml(value),
-                unit=info.unit,
-                origin=origin,
-                assumed=assumed,
-                meaning=info.meaning,
-                fanuc=info.fanuc,
-                remark=remark,
-            )
 
 
 _HEAD = (
@@ -63,7 +32,7 @@ _SHORT_HEAD = (
     "Machine file of shapegcode, the short form: what is not here has its default. `shapegcode machine show FILE` "
     "prints every value with its meaning; docs/reference/machine.md explains the keys."
 )
-_TOLD = ("measured", "dump")
+_FOUND = ("measured", "dump")
 
 
 def write_toml(machine: TomlTable, remarks: Mapping[str, str], *, short: bool = False) -> str:
@@ -74,8 +43,8 @@ def write_toml(machine: TomlTable, remarks: Mapping[str, str], *, short: bool = 
     writer.table(machine, "")
     if writer.remarks and not short:
         raise KeyError(f"remarks for unknown keys: {', '.join(sorted(writer.remarks))}")
-    if said := origin_lines(writer.said):
-        writer.lines += [*([""] if writer.lines[-1] else []), *said]
+    if origins := origin_lines(writer.written):
+        writer.lines += [*([""] if writer.lines[-1] else []), *origins]
     return "\n".join(writer.lines).rstrip("\n") + "\n"
 
 
@@ -84,14 +53,14 @@ class _TomlWriter:
 
     def __init__(self, remarks: dict[str, str], short: bool) -> None:
         self.remarks = remarks  # that are not yet written
-        self.said: dict[str, str] = {}
+        self.written: dict[str, str] = {}
         self.lines: list[str] = []
         self._short = short
 
     def _add(self, line: str, key: str) -> None:
         """A line, its remark as the comment behind it: for people, what counts is the table of the origins."""
         if remark := self.remarks.pop(key, ""):
-            self.said[key] = remark
+            self.written[key] = remark
         self.lines.append(f"{line}  # {remark}" if remark else line)
 
     def comment(self, text: str) -> None:
@@ -108,7 +77,7 @@ class _TomlWriter:
             value, key = getattr(table, name), f"{prefix}{name}"
             if (isinstance(value, TomlTable) and not isinstance(value, InlineTable)) or item_type(field):
                 below.append((key, field, value))
-            elif not self._short or self._is_told(key, table, name, field):
+            elif not self._short or self._is_kept(key, table, name, field):
                 if not self._short:
                     info = key_info(field, key)
                     unit = f" [{info.unit}]" if info.unit and info.unit != "1" else ""
@@ -146,7 +115,7 @@ class _TomlWriter:
             meaning = (item.__doc__ or "").rstrip(".") if number == 1 else ""
             self._below(f"[[{key}]]", meaning, table, f"{key}.{number}.")
 
-    def _is_told(self, key: str, table: TomlTable, name: str, field: FieldInfo) -> bool:
+    def _is_kept(self, key: str, table: TomlTable, name: str, field: FieldInfo) -> bool:
         """Whether the file must hold it, or holds it with a word of where it comes from."""
         value = getattr(table, name)
         if field.is_required():
@@ -156,7 +125,7 @@ class _TomlWriter:
         # What equals the default goes where nothing is lost: an assumption whose default is marked as one, a statement
         # without a word of where it comes from whose default is not.
         told = {"assumed": not assumed, "inherited": not assumed, "file": bool(remark) or assumed}.get(
-            origin, origin in _TOLD
+            origin, origin in _FOUND
         )
         if value is None:
             return remark.startswith("assumed")

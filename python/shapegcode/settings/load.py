@@ -1,10 +1,11 @@
-"""Reading a TOML file of settings as its model: every problem at once, each with its line."""
+"""Reading a TOML file of settings as its model: every problem at once, each with its line; values changed by key."""
 
 from __future__ import annotations
 
 import difflib
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,8 +14,8 @@ from pydantic.fields import FieldInfo
 
 from shapegcode.errors import FileError, Problem
 from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file, toml_tables
-from shapegcode.settings.keys import TomlTable, facts, table_type, toml, toml_key
-from shapegcode.settings.remarks import open_brackets
+from shapegcode.settings.keys import InlineTable, TomlTable, facts, table_type, toml, toml_key
+from shapegcode.settings.remarks import lines_of
 
 MAX_PROBLEMS = 100
 _LONGEST_NAME = 200  # that is compared with known ones
@@ -176,33 +177,20 @@ def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     return f"; known here: {', '.join(model.model_fields)}"
 
 
-_HEADER = re.compile(r"\s*\[{1,2}\s*([^\[\]]+?)\s*\]{1,2}\s*(?:#.*)?")
+@lru_cache(maxsize=1)  # every problem of a file asks
+def _first_lines(text: str) -> dict[tuple[str, str], int]:
+    found: dict[tuple[str, str], int] = {}
+    for number, (_, line) in enumerate(lines_of(text), start=1):
+        if line is not None:
+            found.setdefault((line.kind, line.key), number)
+    return found
 
 
 def line_of(key: str, text: str) -> int | None:
     """Line of a dotted key in a text of the plain layout ``[table]`` / ``key = value``; None if not found there."""
-    table, counts = "", dict[str, int]()
-    inside = 0  # depth of the brackets of a list that goes over several lines
-    for number, line in enumerate(text.splitlines(), start=1):
-        if inside:
-            inside += open_brackets(line)
-            continue
-        header = _HEADER.fullmatch(line)
-        if header:
-            table = re.sub(r"\s*\.\s*", ".", header[1])
-            if line.lstrip().startswith("[["):
-                counts[table] = counts.get(table, 0) + 1
-                table = f"{table}.{counts[table]}"
-            if table == key:
-                return number
-            continue
-        assignment = re.match(r'\s*([A-Za-z0-9_.-]+|"[^"]*")\s*=', line)
-        if assignment:
-            name = f"{table}.{assignment[1]}" if table else assignment[1]
-            if key == name or key.startswith(name + "."):
-                return number
-            inside = open_brackets(line[assignment.end() :])
-    return None
+    lines, parts = _first_lines(text), key.split(".")
+    names = [("key", ".".join(parts[:count])) for count in range(1, len(parts) + 1)]
+    return min((lines[name] for name in (*names, ("table", key)) if name in lines), default=None)
 
 
 _Model = TypeVar("_Model", bound=TomlTable)
@@ -238,3 +226,87 @@ def loaded(model: type[_Model], path: str | Path, error: type[FileError]) -> _Mo
     """A file as its model."""
     text = read_text(Path(path), error)
     return validated(model, parsed(text, str(path), error), str(path), text, error)
+
+
+# --- values changed by their dotted keys ------------------------------------------------------------------------------
+
+# A part of a dotted key: in quotes where it holds a dot itself.
+_PART = re.compile(r'"([^"]*)"|([^."]+)')
+
+
+def with_values(settings: _Model, values: Mapping[str, object], source: str, error: type[FileError]) -> _Model:
+    """The settings with other values; what was a default stays one."""
+    data = _plain(settings)
+    for key, value in values.items():
+        *tables, last = parts = _parts(key)
+        table: Any = data
+        held: Any = settings
+        for rank, name in enumerate(parts):
+            if wrong := _no_row(table, parts[:rank], name):
+                raise error(source, (Problem(key, toml(value), wrong),))
+            if rank < len(tables):
+                held = _below(held, name)
+                table = _entry(table, name, held)
+        if isinstance(table, list):
+            table[int(last) - 1] = value
+        elif isinstance(table, dict) and value is None:
+            table.pop(last, None)
+        elif isinstance(table, dict):
+            table[last] = value
+        else:
+            raise error(source, (Problem(key, toml(value), "no such key"),))
+    return validated(type(settings), data, source, "", error)
+
+
+def missing_row(settings: TomlTable, key: str) -> str:
+    """Why a dotted key names no entry of a list: there it must be a number from 1 to as many as there are."""
+    held: Any = settings
+    parts = _parts(key)
+    for rank, name in enumerate(parts):
+        if wrong := _no_row(held, parts[:rank], name):
+            return wrong
+        held = _below(held, name)
+    return ""
+
+
+def _no_row(held: Any, above: list[str], name: str) -> str:
+    if not isinstance(held, list | tuple) or _is_row(name, held):
+        return ""
+    there = f"there {'is' if len(held) == 1 else 'are'} {len(held)}" if held else "there is none"
+    return f"no such key: {'.'.join(above)} counts from 1, and {there}"
+
+
+def _parts(key: str) -> list[str]:
+    return [quoted or bare for quoted, bare in _PART.findall(key)] or [key]
+
+
+def _plain(value: Any) -> Any:
+    """What a file says of a value, in the dictionaries and lists of a TOML file."""
+    if isinstance(value, TomlTable):
+        fields = {name: getattr(value, name) for name in value.model_fields_set}
+        return {name: _plain(held) for name, held in fields.items() if held is not None}
+    if isinstance(value, Mapping):
+        return {name: _plain(held) for name, held in value.items()}
+    return [_plain(held) for held in value] if isinstance(value, list | tuple) else value
+
+
+def _is_row(name: str, rows: list[Any] | tuple[Any, ...]) -> bool:
+    return name.isdigit() and 0 < int(name) <= len(rows)
+
+
+def _below(held: Any, name: str) -> Any:
+    """What the loaded settings hold under a name, defaults as well; None where there is nothing."""
+    if isinstance(held, Mapping):
+        return held.get(name)
+    if isinstance(held, list | tuple):
+        return held[int(name) - 1] if _is_row(name, held) else None
+    return getattr(held, name, None) if isinstance(held, TomlTable) else None
+
+
+def _entry(table: Any, name: str, held: Any) -> Any:
+    """A table of the file by its name, made where the file leaves it out; None where there can be none."""
+    if isinstance(table, dict):
+        # A value that is a table goes as a whole: its other keys must not be lost.
+        whole = held is not None and (isinstance(held, InlineTable) or not isinstance(held, TomlTable))
+        return table.setdefault(name, _plain(held) if whole else {})
+    return table[int(name) - 1] if isinstance(table, list) else None

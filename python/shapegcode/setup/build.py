@@ -17,6 +17,7 @@ from shapegcode.setup.answers import EXPLAINED, Answers, is_mode, mode_of
 from shapegcode.setup.result import MachineSetup, OpenQuestion
 
 _ANSWERED = "answered"
+_IN_WORDS = {"name": "name", "control": "description"}
 _ASSUMED_RAPID_MM_PER_MIN = 24_000.0
 _ASSUMED_ACCELERATION_MM_S2 = 3000.0
 _LOOK_AHEAD = {"G05.1": (["G05.1 Q0"], ["G05.1 Q1"]), "G08": (["G08 P0"], ["G08 P1"])}
@@ -57,9 +58,11 @@ def set_up(answers: Answers) -> MachineSetup:
         )
         text = update.text
     machine = Machine.from_toml(text, answers.name)
+    # Name and kind of control go into words that have no origin.
+    named = {key for name, key in _IN_WORDS.items() if getattr(answers, name) != Answers.model_fields[name].default}
     return MachineSetup(
         machine=answers.name,
-        answered=tuple(sorted(value.key for value in machine.values() if value.remark.startswith(_ANSWERED))),
+        answered=tuple(sorted(named | {v.key for v in machine.values() if v.remark.startswith(_ANSWERED)})),
         imported=tuple(sorted(value.key for value in machine.values() if value.origin in ("dump", "measured"))),
         open=tuple(_open(machine)),
         notes=tuple(notes),
