@@ -81,6 +81,13 @@ class Draft:
             for entry in entries or ([path] if path else []):
                 self.read.append(ReadParameter(number, entry.target, entry.letter + entry.text, entry.line, key, shown))
 
+    def choose(self, key: str, number: int, bit: int, on: Value = True, off: Value = False) -> bool | None:
+        """Put one of two values into the machine by a bit of the dump; None, and nothing, where the dump has none."""
+        found = self.values.bit(number, bit)
+        if found is not None:
+            self.set(key, on if found else off, number)
+        return found
+
     def put(self, key: str, value: Any) -> Value:
         """Put a value into the tables, without a word about it; what is shown of it comes back."""
         *tables, name = key.split(".")
