@@ -2,8 +2,7 @@
 
 A machine file is TOML. :class:`Machine` is its model; it and its tables, one file each, are the only place that holds
 defaults for it: every other module takes the values from here. Each key carries its unit, its meaning and, where the
-number is not known for real machines, the remark *assumed*; :func:`key_documentation` turns that into
-``docs/reference/machine.md``.
+number is not known for real machines, the remark *assumed*, of which ``docs/reference/machine.md`` is made.
 """
 
 from __future__ import annotations
@@ -436,13 +435,6 @@ def inherited_text(name: str) -> str:
         return inherited(whose, remark) if remark and key.startswith(_OF_A_MACHINE) else remark
 
     return with_remarks(text, remark)
-
-
-def key_documentation() -> str:
-    """The reference of the machine file's keys as Markdown: what ``docs/reference/machine.md`` holds, word for word."""
-    from shapegcode.settings.describe import documentation
-
-    return documentation(Machine, Machine.builtin_names())
 
 
 def _several(modes: float | Mode | Sequence[float | Mode]) -> Sequence[float | Mode]:
