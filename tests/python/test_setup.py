@@ -21,7 +21,7 @@ from prompt_toolkit.output import DummyOutput
 
 import shapegcode as sg
 from command import run
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.settings.describe import toml_schema
 from shapegcode.setup.ask import ask_all

@@ -212,7 +212,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
     from shapegcode.conversion.open_axes import open_axes
     from shapegcode.machine import Machine
     from shapegcode.machine.description_result import OpenValue
-    from shapegcode.machine.output import ANY_PRICE
+    from shapegcode.machine.programs import ANY_PRICE
 
     machine, said = Machine.load(args.machine), ""
     with runner.progress(f"converting {args.input}", args):

@@ -20,8 +20,7 @@ from shapegcode._core import Mode
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine.axes import Axes
 from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Times
-from shapegcode.machine.input import Input
-from shapegcode.machine.output import Emission, Price, Shaping, Tolerance, Verdict
+from shapegcode.machine.programs import Emission, Input, Price, Shaping, Tolerance, Verdict
 from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml, values_of
 from shapegcode.settings.load import (
     MAX_PROBLEMS,
