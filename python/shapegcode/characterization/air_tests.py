@@ -127,13 +127,13 @@ def check(test: AirTest, box: AirBox) -> None:
         index = AXES.index(part.axis)
         for step in steps(part):
             at[part.axis] += step.length_mm
-            place = at[part.axis]
-            if not box.low[index] - 1e-6 <= place <= box.high[index] + 1e-6:
+            position = at[part.axis]
+            if not box.low[index] - 1e-6 <= position <= box.high[index] + 1e-6:
                 raise ArgumentError(
-                    f"test {test.name}: {part.axis} would go to {place:.3f} mm, the box is "
+                    f"test {test.name}: {part.axis} would go to {position:.3f} mm, the box is "
                     f"{box.low[index]:g} to {box.high[index]:g} mm"
                 )
-    if not all(math.isclose(place, 0.0, abs_tol=1e-6) for place in at.values()):
+    if not all(math.isclose(position, 0.0, abs_tol=1e-6) for position in at.values()):
         raise ArgumentError(f"test {test.name} would not end where it began: {at}")
 
 

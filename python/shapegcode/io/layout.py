@@ -82,8 +82,8 @@ def refuse_binary(path: Path, head: bytes, needed: str) -> None:
     """Refuse a file that is no text."""
     strange = sorted(set(head) - _TEXT_BYTES)
     if strange:
-        place = head.index(bytes([strange[0]]))
-        raise RecordError(f"{path}: a binary file (byte 0x{strange[0]:02x} at {place}); needed is {needed}")
+        position = head.index(bytes([strange[0]]))
+        raise RecordError(f"{path}: a binary file (byte 0x{strange[0]:02x} at {position}); needed is {needed}")
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:

@@ -164,10 +164,10 @@ def even_grid(times_s: FloatArray) -> EvenGrid:
 def resample(values: FloatArray, times_s: FloatArray, grid: EvenGrid) -> FloatArray:
     """The band-limited signal that goes through the samples best, on a grid: least squares over sinc functions."""
     offset = float(np.mean(values))
-    place = (times_s - grid.times_s[0]) / grid.period_s
-    first = np.floor(place).astype(int) - _REACH + 1
+    at = (times_s - grid.times_s[0]) / grid.period_s
+    first = np.floor(at).astype(int) - _REACH + 1
     columns = first[:, None] + np.arange(2 * _REACH)
-    away = place[:, None] - columns
+    away = at[:, None] - columns
     inside = np.sqrt(np.maximum(1.0 - (away / _REACH) ** 2, 0.0))
     weights = np.sinc(away) * np.i0(_BETA * inside) / np.i0(_BETA)
     # Grid points beyond the ends belong to the signal, too.

@@ -31,10 +31,10 @@ class Draft:
         self.missing: list[MissingParameter] = []
         self.remarks: dict[str, str] = {}  # per dotted key, where its value comes from
 
-    def problem(self, number: int, said: str) -> None:
+    def problem(self, number: int, message: str) -> None:
         """Something that makes the dump useless; the line is that of the parameter."""
         line = next((entry.line for (n, _), entry in self.dump.entries.items() if n == number), None)
-        self.values.problems.append(Problem(f"parameter {number}", "", said, line))
+        self.values.problems.append(Problem(f"parameter {number}", "", message, line))
 
     def miss(self, number: int | str, why: str, line: int | None = None) -> None:
         """A parameter that is not there, or that changes nothing."""

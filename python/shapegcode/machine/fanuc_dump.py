@@ -71,8 +71,8 @@ def read_table(data: bytes, file: str, tables: ControlTables) -> None:
             elif not _HARMLESS.fullmatch(words):
                 tables.left_out.append((file, line, words[:60]))
         except (ValueError, KeyError, SyntaxError, ZeroDivisionError, OverflowError) as bad:
-            said = f'"{words[:60]}": not a line of a table of offsets or variables ({bad})'
-            raise MachineError(file, (Problem("", "", said, line),)) from bad
+            message = f'"{words[:60]}": not a line of a table of offsets or variables ({bad})'
+            raise MachineError(file, (Problem("", "", message, line),)) from bad
 
 
 def _every_line(data: bytes) -> Iterator[tuple[int, str]]:

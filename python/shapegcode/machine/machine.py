@@ -312,17 +312,17 @@ class Machine(TomlTable):
         machine = validated(cls, plain, source, text, MachineError)
         if stated is None:
             machine._remarks = remarks_in_comments(text)
-            machine._origins_in_comments = any(origin_of(said) != "file" for said in machine._remarks.values())
+            machine._origins_in_comments = any(origin_of(origin) != "file" for origin in machine._remarks.values())
             return machine
         keys = {value.key: value.value for value in machine.values()}
-        wrong = [(key, said, limit) for key, said in stated.items() if (limit := _wrong_origin(key, said, keys))]
+        wrong = [(key, origin, limit) for key, origin in stated.items() if (limit := _wrong_origin(key, origin, keys))]
         if wrong:
             problems = (
-                Problem(f"origin.{key}", toml(said), limit, line_of(f"origin.{key}", text) or line_of(key, text))
-                for key, said, limit in wrong[:MAX_PROBLEMS]
+                Problem(f"origin.{key}", toml(origin), limit, line_of(f"origin.{key}", text) or line_of(key, text))
+                for key, origin, limit in wrong[:MAX_PROBLEMS]
             )
             raise MachineError(source, (*problems, *further_problems(len(wrong))))
-        machine._remarks = {key: remark_of(said) for key, said in stated.items()}
+        machine._remarks = {key: remark_of(origin) for key, origin in stated.items()}
         return machine
 
     @staticmethod
@@ -406,13 +406,13 @@ class Machine(TomlTable):
         return list(values_of(self, remarks=self._remarks))
 
 
-def _wrong_origin(key: str, said: object, keys: Mapping[str, str]) -> str:
+def _wrong_origin(key: str, origin: object, keys: Mapping[str, str]) -> str:
     """What an origin must be; empty: it is so."""
     if key not in keys and not any(key.startswith(f"{each}.") and keys[each].startswith("{") for each in keys):
         return "no such key of this machine (modes count from 1): take the line out"
-    if isinstance(said, str) and re.match(ORIGIN_TEXT, said):
+    if isinstance(origin, str) and re.match(ORIGIN_TEXT, origin):
         return ""
-    if isinstance(said, list):
+    if isinstance(origin, list):
         return "must be one: this value has two, in [origin] and beside it, or in two spellings of its key"
     return (
         "must be measured, parameters (of the control), inherited, assumed, choice, default or stated; a note may "

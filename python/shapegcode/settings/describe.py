@@ -123,12 +123,12 @@ class _TomlWriter:
         origin = origin_of(remark)
         # What equals the default goes where nothing is lost: an assumption whose default is marked as one, a statement
         # without a word of where it comes from whose default is not.
-        told = {"assumed": not assumed, "inherited": not assumed, "file": bool(remark) or assumed}.get(
+        kept = {"assumed": not assumed, "inherited": not assumed, "file": bool(remark) or assumed}.get(
             origin, origin in _FOUND
         )
         if value is None:
             return remark.startswith("assumed")
-        return name in table.model_fields_set and (told or value != field.get_default(call_default_factory=True))
+        return name in table.model_fields_set and (kept or value != field.get_default(call_default_factory=True))
 
 
 def toml_schema(model: type[TomlTable], title: str, *, origins: bool = False) -> dict[str, Any]:
@@ -160,8 +160,8 @@ def _allow_origins(model: type[TomlTable], found: dict[str, Any], defs: dict[str
                 continue
             value = entry["properties"][name]
             if beside not in value.get("anyOf", ()):
-                said = {key: value.pop(key) for key in ("description", "default") if key in value}
-                entry["properties"][name] = {"anyOf": [*value.get("anyOf", [value]), beside]} | said
+                text = {key: value.pop(key) for key in ("description", "default") if key in value}
+                entry["properties"][name] = {"anyOf": [*value.get("anyOf", [value]), beside]} | text
     found["properties"][ORIGIN] = {"$ref": "#/$defs/Origins", "description": "where values come from, by key"}
 
 
@@ -192,8 +192,8 @@ def _table(patterns: dict[str, Any]) -> dict[str, Any]:
 
 def _describe(entry: dict[str, Any]) -> None:
     unit, fanuc, assumed = (entry.pop(name, "") for name in ("unit", "fanuc", "assumed"))
-    said = entry.get("description", "")
-    said += f" [{unit}]" if unit and unit != "1" else ""
-    said += f" (FANUC parameter {fanuc})" if fanuc else ""
-    entry["description"] = said + (" The default is assumed." if assumed else "")
+    text = entry.get("description", "")
+    text += f" [{unit}]" if unit and unit != "1" else ""
+    text += f" (FANUC parameter {fanuc})" if fanuc else ""
+    entry["description"] = text + (" The default is assumed." if assumed else "")
     entry.pop("title", None)

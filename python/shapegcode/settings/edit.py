@@ -142,8 +142,8 @@ def with_remarks(text: str, change: Callable[[str, str], str]) -> str:
         ):
             lines.append(raw)
             continue
-        body, said = raw.rstrip("\r\n"), new[line.key]
-        lines.append(body[: line.end].rstrip() + (f"  # {said}" if said else "") + raw[len(body) :])
+        body, remark = raw.rstrip("\r\n"), new[line.key]
+        lines.append(body[: line.end].rstrip() + (f"  # {remark}" if remark else "") + raw[len(body) :])
     return with_origin_table("".join(lines), new)
 
 

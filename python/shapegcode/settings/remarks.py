@@ -85,8 +85,8 @@ def take_origins(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
     plain = {name: _plain(value, name, inline) for name, value in data.items() if name != ORIGIN}
     if ORIGIN in data:
         _flatten(data[ORIGIN], "", found)
-    for key, said in inline.items():
-        _note(key, said, found)
+    for key, origin in inline.items():
+        _note(key, origin, found)
     return plain, found if ORIGIN in data or inline else None
 
 
@@ -109,8 +109,8 @@ def _flatten(value: Any, key: str, found: dict[str, Any]) -> None:
         _flatten(each, f"{key}.{name}" if key else name, found)
 
 
-def _note(key: str, said: Any, found: dict[str, Any]) -> None:
-    found[key] = [found[key], said] if key in found else said
+def _note(key: str, origin: Any, found: dict[str, Any]) -> None:
+    found[key] = [found[key], origin] if key in found else origin
 
 
 def remark_of(stated: str) -> str:
@@ -122,7 +122,7 @@ def remark_of(stated: str) -> str:
 def remarks_of(text: str) -> dict[str, str]:
     """Where the values of a file come from."""
     stated = take_origins(tomllib.loads(text))[1]
-    return remarks_in_comments(text) if stated is None else {key: remark_of(said) for key, said in stated.items()}
+    return remarks_in_comments(text) if stated is None else {key: remark_of(origin) for key, origin in stated.items()}
 
 
 def remarks_in_comments(text: str) -> dict[str, str]:

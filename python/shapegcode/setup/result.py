@@ -60,9 +60,9 @@ class MachineSetup(Result):
     def answer(self) -> str:
         """How much of it is said, and what is open."""
         count = len(self.answered)
-        said = f"{self.machine}: {count} value{'' if count == 1 else 's'} answered, {len(self.imported)} imported"
+        sentence = f"{self.machine}: {count} value{'' if count == 1 else 's'} answered, {len(self.imported)} imported"
         unknown = [each.key.split(".")[1].upper() for each in self.open if each.key.endswith(".modes")]
-        return f"{said}; vibration of {', '.join(unknown)} is not known" if unknown else said
+        return f"{sentence}; vibration of {', '.join(unknown)} is not known" if unknown else sentence
 
     @property
     def next_step(self) -> str:

@@ -30,7 +30,7 @@ from shapegcode.testcut.record import (
     ForceRecord,
     PlacedRecord,
     Revolutions,
-    placed,
+    place_samples,
     read_forces,
     revolutions,
     turned,
@@ -154,8 +154,8 @@ def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
     if record.time_s is not None:
         return float(turn / np.mean(np.diff(record.time_s)))
     assert record.position_mm is not None
-    way = float(np.ptp(record.position_mm)) / (len(record) - 1)
-    return cut.passes[number - 1].feed_mm_per_min / cut.spindle_rev_per_min / max(way, 1e-12)
+    travel = float(np.ptp(record.position_mm)) / (len(record) - 1)
+    return cut.passes[number - 1].feed_mm_per_min / cut.spindle_rev_per_min / max(travel, 1e-12)
 
 
 def _reduced(
@@ -171,7 +171,7 @@ def _reduced(
         if _samples(cut, number, record) <= 1.0 + 1e-6:
             rows.append(_of_means(cut, measuring, record))
             continue
-        found = revolutions(placed(record, cut, measuring, expected(cut, measuring, law)))
+        found = revolutions(place_samples(record, cut, measuring, expected(cut, measuring, law)))
         shown = found.record
         offset, drift = ((float(along), float(left)) for along, left in (shown.offset_n, shown.drift_n))
         passes.append(TaperPass(shown.file, found.feed_mm_per_min, shown.spindle_rev_per_min, offset, drift))
@@ -263,7 +263,7 @@ def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResu
     passes = {number: _pass(cut, number, record) for number, record in measured.items()}
     first = passes[min(passes)]
     seen = _inside(cut, first.number, first.record.x_mm) & ~first.record.chatter
-    there = np.interp(first.record.x_mm[seen], first.hoped.x_mm, first.hoped.mean_resultant_n)
+    there = np.interp(first.record.x_mm[seen], first.forecast.x_mm, first.forecast.mean_resultant_n)
     ratio = None
     if {1, 2} <= set(passes):
         before, after = passes[1], passes[2]
@@ -282,18 +282,18 @@ def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResu
 
 def _pass(cut: TestCut, number: int, record: ForceRecord) -> CornerPass:
     measuring = cut.passes[number - 1]
-    hoped = expected(cut, measuring)
-    found = revolutions(placed(record, cut, measuring, hoped))
+    forecast = expected(cut, measuring)
+    found = revolutions(place_samples(record, cut, measuring, forecast))
     seen = _inside(cut, number, found.x_mm) & ~found.chatter
-    far = _inside(cut, number, hoped.x_mm)
+    far = _inside(cut, number, forecast.x_mm)
     return CornerPass(
         number=number,
         measured_mean_n=float(found.resultant_n[seen].max()),
         measured_peak_n=float(found.peak_n[seen].max()),
-        expected_mean_n=float(hoped.mean_resultant_n[far].max()),
-        expected_peak_n=float(hoped.peak_resultant_n[far].max()),
+        expected_mean_n=float(forecast.mean_resultant_n[far].max()),
+        expected_peak_n=float(forecast.peak_resultant_n[far].max()),
         record=found,
-        hoped=hoped,
+        forecast=forecast,
     )
 
 
@@ -315,7 +315,7 @@ def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> Interval
     records = {}
     for number, record in measured.items():
         measuring = cut.passes[number - 1]
-        records[number] = placed(record, cut, measuring, expected(cut, measuring))
+        records[number] = place_samples(record, cut, measuring, expected(cut, measuring))
     found = sorted((_followed(cut, number, record) for number, record in records.items()), key=lambda p: p.interval_mm)
     good: float | None = None
     for each in reversed(found):
@@ -398,10 +398,10 @@ def _speeds(measuring: MeasuringPass, time_s: FloatArray, lag: float) -> FloatAr
     begins, starts = [0.0], [measuring.feeds[0][1]]
     commands: list[float] = []
     length = np.diff([end for end, _ in measuring.feeds])
-    for way, (_, feed) in zip(length, measuring.feeds[1:], strict=True):
+    for travel, (_, feed) in zip(length, measuring.feeds[1:], strict=True):
         speed, command = starts[-1] / _PER_MINUTE, feed / _PER_MINUTE
         commands.append(feed)
-        duration = _block_time(float(way), speed, command, lag)
+        duration = _block_time(float(travel), speed, command, lag)
         begins.append(begins[-1] + duration)
         left = math.exp(-duration / lag) if lag > 0.0 else 0.0
         starts.append((command + (speed - command) * left) * _PER_MINUTE)
@@ -426,13 +426,13 @@ def _speeds_at(measuring: MeasuringPass, x_mm: FloatArray, lag: float) -> FloatA
     first, last = measuring.feeds[0][0], measuring.feeds[-1][0]
     fine = np.linspace(0.0, 1.5 * (last - first) / min(feed for _, feed in measuring.feeds) * _PER_MINUTE, 20000)
     speed = _speeds(measuring, fine, lag)
-    way = first + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))]) / _PER_MINUTE
-    return np.where(x_mm < first, measuring.feeds[0][1], np.interp(x_mm, way, speed))
+    travel = first + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))]) / _PER_MINUTE
+    return np.where(x_mm < first, measuring.feeds[0][1], np.interp(x_mm, travel, speed))
 
 
-def _noise(x: FloatArray, force: FloatArray, way: float) -> float:
+def _noise(x: FloatArray, force: FloatArray, travel: float) -> float:
     """Standard deviation of means over a way, as a share of the mean."""
-    place = ((x - x[0]) / way).astype(int)
-    sums, counts = np.bincount(place, force), np.bincount(place)
+    interval_of = ((x - x[0]) / travel).astype(int)
+    sums, counts = np.bincount(interval_of, force), np.bincount(interval_of)
     means = sums[counts > 0] / counts[counts > 0]
     return float(np.std(means) / np.mean(means)) if len(means) > 2 else 0.0

@@ -317,7 +317,7 @@ def fit_coefficients(
     parameters, left, weighted = _solved(model, parameters, weights)
     correlation = neighbour_correlation(left / noise, data.group, outlier)
     predicted = data.force_n - left[:, :2]
-    covariance = _covariance(weighted, left, weights, correlation) + _of_place(model, parameters, weighted, weights)
+    covariance = _covariance(weighted, left, weights, correlation) + _of_position(model, parameters, weighted, weights)
     kept = left[~outlier, :2]
     size = np.linalg.norm(data.force_n[~outlier], axis=1)
     free = int((weights > 0.0).sum()) - count
@@ -414,7 +414,7 @@ def _covariance(weighted: FloatArray, left: FloatArray, weights: FloatArray, cor
     return np.asarray(inner / np.outer(scale, scale) * square * (1.0 + correlation) / (1.0 - correlation))
 
 
-def _of_place(model: ForceModel, parameters: FloatArray, weighted: FloatArray, weights: FloatArray) -> FloatArray:
+def _of_position(model: ForceModel, parameters: FloatArray, weighted: FloatArray, weights: FloatArray) -> FloatArray:
     """Covariance that comes from not knowing exactly where the tool was in each group."""
     data, count = model.data, len(parameters)
     found = np.zeros((count, count))
@@ -438,14 +438,14 @@ def _with_intervals(
     from scipy.stats import t as student
 
     quantile = float(student.ppf(0.975, max(free, 1)))
-    way = math.log(chip_mm / model.reference)
+    distance = math.log(chip_mm / model.reference)
     found = []
     for k, (name, unit) in enumerate(zip(COEFFICIENTS[: len(parameters)], _UNITS, strict=False)):
         factor = k in (0, 2)
         direction = np.zeros(len(parameters))
         direction[k] = 1.0
         if factor:
-            direction[k + 1] = way
+            direction[k + 1] = distance
         value = float(direction @ parameters)
         half = quantile * math.sqrt(max(float(direction @ covariance @ direction), 0.0))
         ends = (value, value - half, value + half)

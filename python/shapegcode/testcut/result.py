@@ -184,12 +184,12 @@ class TaperResult(Result):
         """k1 and k2 in the middle of the chips, and what the law leaves."""
         k1, k2 = (each.value for each in self.at_chip)
         chip = self.chip_mm
-        said = (
+        sentence = (
             f"k1 {k1:.4g} N/mm² and k2 {k2:.3g} at a chip of {1e3 * chip.middle:.2f} um; {self.mean_forces} mean "
             f"forces, chips {1e3 * chip.min:.2f} to {1e3 * chip.max:.2f} um thick on average; the law leaves "
             f"{self.rms_percent:.1f} % of the force"
         )
-        return "; poor: ".join([said, *self.poor])
+        return "; poor: ".join([sentence, *self.poor])
 
     @property
     def next_step(self) -> str:
@@ -252,7 +252,7 @@ class CornerPass:
         expected_mean_n: largest mean of the force law.
         expected_peak_n: largest magnitude of the force law.
         record: what was recorded, by revolution.
-        hoped: what the force law lets expect.
+        forecast: what the force law lets expect.
     """
 
     number: int
@@ -261,7 +261,7 @@ class CornerPass:
     expected_mean_n: float
     expected_peak_n: float
     record: Revolutions = field(metadata=hidden())
-    hoped: Expected = field(metadata=hidden())
+    forecast: Expected = field(metadata=hidden())
 
 
 @dataclass(frozen=True)
@@ -308,11 +308,11 @@ class CornerResult(Result):
     @property
     def answer(self) -> str:
         """Scale and ratio."""
-        said = f"the measured resultant is {self.scale:.2f} times the expected one where the feed is constant"
+        sentence = f"the measured resultant is {self.scale:.2f} times the expected one where the feed is constant"
         if self.ratio is None:
-            return said
+            return sentence
         return (
-            f"{said}; largest mean resultant after over before: measured {self.ratio.measured:.2f}, expected "
+            f"{sentence}; largest mean resultant after over before: measured {self.ratio.measured:.2f}, expected "
             f"{self.ratio.expected:.2f}"
         )
 

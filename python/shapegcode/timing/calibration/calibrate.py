@@ -480,9 +480,9 @@ def _motion_numbers(
         had = _had(machine, parameter.key.format(axis=parameter.axes[:1]))
         numbers.append(_number(key, parameter.meaning, (value, low, high), parameter.unit, told, had))
         for axis in parameter.axes or " ":
-            place = parameter.key.format(axis=axis)
-            place = place.rpartition(".")[0] if place.startswith("controller.corner_speed") else place
-            remarks[place] = f"measured ({source}): {low:.4g} ... {high:.4g} {parameter.unit}"
+            target = parameter.key.format(axis=axis)
+            target = target.rpartition(".")[0] if target.startswith("controller.corner_speed") else target
+            remarks[target] = f"measured ({source}): {low:.4g} ... {high:.4g} {parameter.unit}"
     return numbers, remarks
 
 
@@ -523,12 +523,12 @@ def _usual(overrides: Iterable[tuple[float, float]]) -> float:
 
 
 def _had(machine: Machine, key: str) -> float | None:
-    place: object = machine
+    target: object = machine
     for name in key.split("."):
-        place = getattr(place, name, None)
-    if isinstance(place, int | float):
-        return float(place)
-    return float(place.x) if place is not None and hasattr(place, "x") else None
+        target = getattr(target, name, None)
+    if isinstance(target, int | float):
+        return float(target)
+    return float(target.x) if target is not None and hasattr(target, "x") else None
 
 
 def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dict[str, object]:

@@ -310,34 +310,34 @@ def fit_motion(
     reach = np.array([_SEEN_SPREAD if parameter.name in seen else _TYPICAL_SPREAD for parameter in parameters])
     calls = 0
 
-    def fit(place: FloatArray) -> MotionFit:
-        kept = np.clip(place, low, high)
+    def fit(point: FloatArray) -> MotionFit:
+        kept = np.clip(point, low, high)
         values = {parameter.name: math.exp(value) for parameter, value in zip(parameters, kept, strict=True)}
         return MotionFit(family, values, rapid_mm_per_s)
 
-    def cost(place: FloatArray) -> float:
+    def cost(point: FloatArray) -> float:
         nonlocal calls
         calls += 1
         if on_step is not None and calls % 20 == 0:
             on_step()
-        beyond = float(np.abs(place - np.clip(place, low, high)).sum())
-        usual = _PRIOR * float((((place - typical) / reach) ** 2).sum())
-        return misfit(sections, fit(place).model(machine)) + usual + 10.0 * beyond
+        beyond = float(np.abs(point - np.clip(point, low, high)).sum())
+        usual = _PRIOR * float((((point - typical) / reach) ** 2).sum())
+        return misfit(sections, fit(point).model(machine)) + usual + 10.0 * beyond
 
-    def search(place: FloatArray, most: int) -> tuple[float, FloatArray]:
-        simplex = np.vstack([place, place + _STEP * np.eye(len(parameters))])
+    def search(point: FloatArray, most: int) -> tuple[float, FloatArray]:
+        simplex = np.vstack([point, point + _STEP * np.eye(len(parameters))])
         found = minimize(
-            cost, place, method="Nelder-Mead",
+            cost, point, method="Nelder-Mead",
             options={"maxfev": most, "xatol": 2e-3, "fatol": 1e-4, "initial_simplex": simplex, "adaptive": True},
         )  # fmt: skip
         return float(found.fun), found.x
 
     # The misfit has several valleys: the search begins in the lowest of many places, and again from where it ended.
     generator = np.random.default_rng(1)
-    places, valleys, restarts = (_PLACES, _VALLEYS, 2) if thorough else (_PLACES // 2, _VALLEYS // 2, 1)
-    spread = generator.normal(0.0, _SEARCHED, (places, len(parameters))) * (reach / _TYPICAL_SPREAD)
+    points, valleys, restarts = (_PLACES, _VALLEYS, 2) if thorough else (_PLACES // 2, _VALLEYS // 2, 1)
+    spread = generator.normal(0.0, _SEARCHED, (points, len(parameters))) * (reach / _TYPICAL_SPREAD)
     tried = [typical, *(np.clip(typical + each, low, high) for each in spread)]
-    ranked = sorted(((cost(place), index) for index, place in enumerate(tried)), key=lambda each: each[0])
+    ranked = sorted(((cost(point), index) for index, point in enumerate(tried)), key=lambda each: each[0])
     ends = [search(tried[index], _STEPS // 2) for _, index in ranked[:valleys]]
     best = min(ends, key=lambda end: end[0])
     for _ in range(restarts):
@@ -360,7 +360,7 @@ def parameter_intervals(
 
     def taken(values: dict[str, float]) -> list[FloatArray]:
         residual = section_residuals(sections, replace(fit, values=values).model(machine))
-        return [np.diff(each[places]) for each, places in zip(residual, stretches, strict=True)]
+        return [np.diff(each[points]) for each, points in zip(residual, stretches, strict=True)]
 
     centre = taken(fit.values)
     slopes = []
@@ -395,13 +395,13 @@ def parameter_intervals(
 
 def _stretches(section: SeenSection) -> IntArray:
     """Readings that are some seconds apart."""
-    places = [0]
+    points = [0]
     for index, time_s in enumerate(section.time_s):
-        if time_s - section.time_s[places[-1]] >= _WINDOW_S:
-            places.append(index)
-    if len(places) == 1 and len(section.time_s) > 1:
-        places.append(len(section.time_s) - 1)
-    return np.array(places)
+        if time_s - section.time_s[points[-1]] >= _WINDOW_S:
+            points.append(index)
+    if len(points) == 1 and len(section.time_s) > 1:
+        points.append(len(section.time_s) - 1)
+    return np.array(points)
 
 
 # --- what takes time beside the motion --------------------------------------------------------------------------------
@@ -536,14 +536,14 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     scale = np.array([_MAX_S if not name.endswith("from") else _SPEEDS_KRPM[1] for name in names])
     pull = np.array([0.0 if name.endswith("from") else _RIDGE for name in names]) / _READING_S
 
-    def errors(place: FloatArray) -> FloatArray:
-        model = whole_model(machine, motion, dict(zip(names, place.tolist(), strict=True)), kept)
+    def errors(point: FloatArray) -> FloatArray:
+        model = whole_model(machine, motion, dict(zip(names, point.tolist(), strict=True)), kept)
         starts = starts_of(model)
         taken = [
             starts(span.run, 1.0)[span.end] - (starts(span.run, 1.0)[span.begin] if span.begin > 0 else 0.0)
             for span in spans
         ]
-        return np.concatenate([(np.array(taken) - seconds) / _READING_S, pull * place])
+        return np.concatenate([(np.array(taken) - seconds) / _READING_S, pull * point])
 
     begin = np.array([4.0 if name.endswith("from") else 0.3 for name in names])
     found = least_squares(

@@ -64,11 +64,11 @@ class TimedProgram:
     @cached_property
     def sequence_lines(self) -> dict[int, list[int]]:
         """Lines by their N number, ascending."""
-        places: dict[int, list[int]] = defaultdict(list)
+        positions: dict[int, list[int]] = defaultdict(list)
         for line, text in enumerate(self.text_lines, start=1):
             if number := _SEQUENCE.match(text):
-                places[int(number[1])].append(line)
-        return places
+                positions[int(number[1])].append(line)
+        return positions
 
     @cached_property
     def tools(self) -> IntArray:
@@ -147,9 +147,9 @@ def line_numbers(log: RunLog, timed: TimedProgram) -> IntArray:
         return value
     found, at = np.zeros(len(value), dtype=np.int64), 0
     for index, sequence_number in enumerate(value.tolist()):
-        ahead = [place for place in timed.sequence_lines.get(sequence_number, []) if place >= at]
-        if ahead:
-            at = found[index] = ahead[0]
+        later = [candidate for candidate in timed.sequence_lines.get(sequence_number, []) if candidate >= at]
+        if later:
+            at = found[index] = later[0]
     return found
 
 
@@ -238,7 +238,7 @@ def stretches_of(entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float,
         seen = steady_value(inside) if len(inside) else None
         fallback = stated if stated is not None else whole
         value = seen if seen is not None else fallback if fallback is not None else 1.0
-        found.append(Stretch((first, last), as_dialled(value), seen is not None))
+        found.append(Stretch((first, last), to_whole_percent(value), seen is not None))
     used = sorted({stretch.feed_override for stretch in found if stretch.measured})
     if any(abs(value - 1.0) > 0.005 for value in used):
         notes.append("feed override " + ", ".join(f"{value:.1%}" for value in used) + " as steady cuts show")
@@ -247,7 +247,7 @@ def stretches_of(entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float,
     return found
 
 
-def as_dialled(ratio: float) -> float:
+def to_whole_percent(ratio: float) -> float:
     """As a dial has it: whole percents where they are within what a reading means."""
     whole = round(ratio, 2)
     return whole if abs(ratio - whole) < 0.002 else round(ratio, 4)
@@ -356,19 +356,19 @@ def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: lis
 def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
     """Which values belong to the longest row that never falls."""
     ends: list[int] = []  # value at which the best row of each length ends
-    places: list[int] = []  # and where
+    positions: list[int] = []  # and where
     before = np.full(len(line), -1, dtype=np.int64)
     for index, value in enumerate(line.tolist()):
         length = bisect_right(ends, value)
         if length == len(ends):
             ends.append(value)
-            places.append(index)
+            positions.append(index)
         else:
             ends[length] = value
-            places[length] = index
-        before[index] = places[length - 1] if length > 0 else -1
+            positions[length] = index
+        before[index] = positions[length - 1] if length > 0 else -1
     kept = np.zeros(len(line), dtype=bool)
-    at = places[-1] if places else -1
+    at = positions[-1] if positions else -1
     while at >= 0:
         kept[at] = True
         at = int(before[at])
@@ -471,7 +471,7 @@ def with_override(run: ObservedRun, rate_mm_per_s: float) -> ObservedRun:
     if math.isfinite(run.rapid_override):
         return run
     ratio = _shown_rate(run)[0] / rate_mm_per_s
-    override = as_dialled(min(1.0, ratio)) if math.isfinite(ratio) else 1.0
+    override = to_whole_percent(min(1.0, ratio)) if math.isfinite(ratio) else 1.0
     notes = (*run.notes, f"rapid override {override:.0%} as its rapids show") if override < 0.99 else run.notes
     return replace(run, rapid_override=override, notes=notes)
 

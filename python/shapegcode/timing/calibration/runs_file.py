@@ -193,15 +193,15 @@ class _Found:
 
     def entry(self, number: int, row: _RunsRow) -> RunEntry:
         """An entry; what is wrong goes to the problems, unless it is left out."""
-        place = f"runs.{number}"
+        where = f"runs.{number}"
         program = self._folder / row.program
         if row.leave_out is None and not program.is_file():
-            self._problem(f"{place}.program", row.program, "no such file")
+            self._problem(f"{where}.program", row.program, "no such file")
         key = "log" if row.logs is None else "logs"
         logs = tuple(
             log
             for pattern in row.logs or [row.log or ""]
-            for log in self._logs(f"{place}.{key}", pattern, number, program, row.leave_out is None)
+            for log in self._logs(f"{where}.{key}", pattern, number, program, row.leave_out is None)
         )
         same = ("use", "format", "override_percent", "rapid_override_percent", "leave_out", "logged_as")
         return RunEntry(
@@ -209,7 +209,7 @@ class _Found:
             logs,
             feed_unit=None if row.feed_unit is None else stated_feed_unit(row.feed_unit),
             items=tuple((row.items or {}).items()),
-            line=line_of(place, self._text),
+            line=line_of(where, self._text),
             **{name: getattr(row, name) for name in same},
         )
 
