@@ -49,7 +49,7 @@ class AirBox:
         return cls(tuple(values[::2]), tuple(values[1::2]))  # type: ignore[arg-type]
 
     def travel_mm(self, axis: str) -> float:
-        """Signed way from the start point to the farther side, in mm."""
+        """Signed travel from the start point to the farther side, in mm."""
         index = AXES.index(axis)
         low, high = self.low[index], self.high[index]
         return high if high >= -low else low
@@ -155,7 +155,7 @@ _PER_MINUTE = 60.0
 
 
 class _Maker:
-    """Draws up the parts of tests for one machine and one box."""
+    """Designs the parts of tests for one machine and one box."""
 
     def __init__(self, machine: Machine, box: AirBox) -> None:
         self._box = box
@@ -341,7 +341,7 @@ def _rapid_s(part: Part, timing: ControllerTiming) -> float:
     if nominal >= ramp:
         moving = whole_periods(nominal, timing.period_s) + ramp
     else:
-        # acceleration = rate / time constant; half the way up, half the way down
+        # acceleration = rate / time constant; half of the travel up, half down
         moving = 2.0 * whole_periods(math.sqrt(nominal * ramp), timing.period_s)
     return moving + timing.rapid_bell_s[part.axis] + timing.in_position_s[part.axis]
 

@@ -40,7 +40,7 @@ def characterize(
         results: a filled-in RESULTS.toml, the folder that holds it and the logs, or one log beside it.
         machine: whose file gets the values.
         units: of time and length in the logs, for example "ms,um"; None: from their headers.
-        on_progress: told the share of the work done, 0 to 1.
+        on_progress: called with the share of the work done, 0 to 1.
 
     Returns:
         What is known, with 95 % intervals, and the machine with it.

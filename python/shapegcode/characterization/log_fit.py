@@ -237,7 +237,7 @@ def _feed_steps(facts: LogFacts, parts: list[PartLog]) -> None:
 
 
 def _followed_share(log: PartLog) -> float | None:
-    """How much of the step the speed follows; None where nothing of the way is steady."""
+    """How much of the step the speed follows; None where nothing of the travel is steady."""
     part = log.part
     top = int(np.argmax(log.travel_mm))  # the turn, which smoothing cuts short
     begin = log.times_s[int(np.argmax(log.travel_mm > max(0.02, 5 * log.noise_mm)))]
@@ -256,7 +256,7 @@ def _followed_share(log: PartLog) -> float | None:
 
 # --- time constants from the shape of single moves --------------------------------------------------------------------
 
-_ODD_SHAPE = 0.002  # of the way: a fit that leaves more is no fit
+_ODD_SHAPE = 0.002  # of the travel: a fit that leaves more is no fit
 _BELL_GAIN = 0.8  # a second moving average must lower the variance below this share
 _FINE = 1.7  # periods
 _FINE_BENT = 1.0
@@ -266,7 +266,7 @@ _SHAPE_NOTES = {"linear": "linear", "bell": "the longer of two moving averages",
 
 @dataclass
 class LogFacts(Facts):
-    """What the logs have told so far; times in s."""
+    """What the logs have shown so far; times in s."""
 
     source: str = "log"
     period: float | None = None  # interpolation period; None: not known
@@ -456,7 +456,7 @@ def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
         name = f"position gain {axis}"
         gain, rest = _lag_of(records)
         if rest < 0.02 or not 2.0 * GAINS[0] < gain < 0.5 * GAINS[1]:
-            facts.add_unknown(name, "the actual position follows the command without a lag that tells it", "1/s")
+            facts.add_unknown(name, "the actual position follows the command without a lag that determines it", "1/s")
             continue
         spread = np.std(np.array([_lag_of([record]) for record in records]), axis=0) / math.sqrt(len(records))
         # Command and actual position may be sampled up to half a sample apart, which looks like lag.

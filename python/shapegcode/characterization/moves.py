@@ -1,6 +1,6 @@
 """Single moves in a servo log: when the command changes, where the moves are, what shape they have.
 
-A move that starts and ends at rest is a rectangle of speed, smoothed. Its way is a sum of powers of time for moving
+A move that starts and ends at rest is a rectangle of speed, smoothed. Its travel is a sum of powers of time for moving
 averages, and a closed form for an exponential; time constants come from fitting that to all moves of a part at once.
 """
 
@@ -111,11 +111,11 @@ class PartLog:
 
     part: Part
     times_s: FloatArray
-    travel_mm: FloatArray  # way of the part's axis from its start, in the direction of the first move
+    travel_mm: FloatArray  # travel of the part's axis from its start, in the direction of the first move
     noise_mm: float  # standard deviation of a sample at rest
 
     def middles_s(self) -> FloatArray:
-        """The times at which a there-and-back part passes the middle of its way, (n,)."""
+        """The times at which a there-and-back part passes the middle of its travel, (n,)."""
         length = abs(self.part.length_mm) * self.part.stride
         u = self.travel_mm / length - 0.5
         # hysteresis, so that noise at the middle does not count twice
@@ -183,7 +183,7 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
 
 
 def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
-    """Share of the way at the times after the start, for a rectangle and moving averages of these lengths in s."""
+    """Share of the travel at the times after the start, for a rectangle and moving averages of these lengths in s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power = len(used)
     if not power:
@@ -257,7 +257,7 @@ def fit_shape(
 
 
 def line_slope(log: PartLog, settle_s: float) -> tuple[float, float] | None:
-    """Mean speed in mm/s of the way out, and its 95 % half-width; None if too little of it is steady."""
+    """Mean speed in mm/s of the outward travel, and its 95 % half-width; None if too little of it is steady."""
     top = int(np.argmax(log.travel_mm))
     begin = int(np.argmax(log.travel_mm > max(8.0 * log.noise_mm, 0.003)))
     first, last = log.times_s[begin] + settle_s, log.times_s[top] - settle_s

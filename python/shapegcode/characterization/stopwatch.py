@@ -38,7 +38,7 @@ _NAMES = ("overhead", "cutting", "X", "Y", "Z", "block")
 
 @dataclass
 class WatchFacts(Facts):
-    """What the times have told so far."""
+    """What the times have shown so far."""
 
     source: str = "stopwatch"
     contradictions: list[str] = field(default_factory=list)  # times that do not go with the others, in words
@@ -160,7 +160,7 @@ def _least_squares(rows: Sequence[TimedTest], period: float, end: BlockEnd) -> _
 
 
 def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
-    """Time constant of an exponential, whose way to a stop lasts longer from a higher feed; 0 if it does not."""
+    """Time constant of an exponential, whose deceleration lasts longer from a higher feed; 0 if it does not."""
     fast = rows.get("stop_below")
     slow = [rows[name] for name in _SLOW if name in rows]
     name = "cutting acceleration shape"
@@ -179,7 +179,7 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
     slope = float(weight @ ((x - centre) * y)) / spread
     half = 1.96 / math.sqrt(spread)
     if slope <= half + 0.002:
-        note = "a stop takes equally long from every feed; linear or bell cannot be told apart"
+        note = "a stop takes equally long from every feed; linear or bell cannot be distinguished"
         facts.add_word(name, "linear or bell", _SHAPE_KEY, note)
         return 0.0
     facts.add_word(name, "exponential", "", "stops from a higher feed last longer")

@@ -25,8 +25,8 @@ class EdgeAxis:
 
     Attributes:
         number: behind the bar of its signals: 3 of "DES_POS|3".
-        name: as the header labels it, such as "X1"; the number where it has no label. A label is what the recorder was
-            told, not what the control calls the axis.
+        name: as the header labels it, such as "X1"; the number where it has no label. A label is set in the
+            recorder: it is not what the control calls the axis.
         signals: what was recorded of it, such as "DES_POS".
     """
 

@@ -409,7 +409,7 @@ class _Part:
             if not isinstance(address, str) or not address.strip():
                 raise RecordError(f"{key}[{index}] has no Address: needed is for example 'DES_POS|1'")
             if address in dict(found):
-                raise RecordError(f"{key}[{index}]: {address} is listed twice: which one holds cannot be told")
+                raise RecordError(f"{key}[{index}]: {address} is listed twice: which one holds is not known")
             found.append((address.strip(), str(each.get("Axis") or "")))
         if "CYCLE" not in dict(found):
             raise RecordError(

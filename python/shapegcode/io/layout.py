@@ -59,7 +59,7 @@ def head_of(path: Path) -> bytes:
 
 _TEXT_BYTES = frozenset(range(32, 256)) | {9, 10, 12, 13}
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-#: Behind a point for thousands stand three digits; the comma behind the last of them tells it from a decimal point.
+#: Behind a point for thousands stand three digits; the comma behind them makes it no decimal point.
 _THOUSANDS = r"\d{1,3}(?:\.\d{3})+(?=,\d)"
 _COMMA_NUMBER = re.compile(
     rf"[+-]?({_THOUSANDS},\d+|\d+(,\d+)?|,\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE

@@ -146,7 +146,7 @@ def _set_filter(draft: Draft, found: tuple[float, float, str, str], *names: str)
 
 
 def _look_ahead_at_start(draft: Draft) -> None:
-    """A control that starts every program with the look-ahead on must be told to leave it, and may not do so."""
+    """A control that starts every program with the look-ahead on must be made to leave it, and may not do so."""
     if draft.choose("verdict.look_ahead", 1604, 0):
         draft.set("emission.prologue", _OFF, 1604)
         draft.set("emission.epilogue", _ON, 1604)

@@ -174,13 +174,13 @@ class Machine(TomlTable):
 
     @property
     def bears_override(self) -> bool:
-        """Whether shaped text is made for a dial that is turned: asked for, or its positions stated in the verdict."""
+        """Whether emitted blocks are override-tolerant: asked for, or overrides stated in the verdict."""
         stated = self.verdict.override_percent != (100.0, 100.0)
         return self.emission.override == "any" or (self.emission.override == "ask" and stated)
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Feed overrides in steps of a dial for which text is made that bears one: the stated band, or 70 to 120 %."""
+        """Feed overrides, by 10 %, for which override-tolerant blocks are made: the stated band, or 70 to 120 %."""
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT

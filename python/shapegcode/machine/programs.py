@@ -68,7 +68,7 @@ class Input(TomlTable):
     compensation: Literal["refuse", "expand", "keep"] = key(
         'what `convert` does with cutter compensation G41/G42. "refuse": says so and stops; "expand": shapes the tool '
         'path of the radius given here: the offset in the control no longer acts; "keep": leaves these moves as they '
-        "are. The clock and the pictures always use the expanded path where the radius is known",
+        "are. Cycle time and pictures always use the expanded path where the radius is known",
         default="refuse",
     )
     compensation_start_up: Literal["A", "B"] = key(
@@ -88,7 +88,7 @@ class Input(TomlTable):
         assumed=True,
     )
     peck_clearance_mm: NonNegative = key(
-        "distance to which a peck of G73 and G83 returns before it feeds on; for the clock",
+        "distance to which a peck of G73 and G83 returns before it feeds on; for the cycle time",
         fanuc="5114, 5115",
         default=0.5,
         assumed=True,
@@ -359,7 +359,7 @@ class Verdict(TomlTable):
     plant: Literal["modal", "feed-drive"] = key(
         'what stands behind the command: "modal": the modes behind an ideal servo, so that servo lag is no part of the '
         'verdict; "feed-drive": motor, screw, friction and servo loops of axes.*.drive with the modes, where they are '
-        "known: the contour error then holds their lag, and the residual is the swing of the table behind its motor",
+        "known: the contour error then holds their lag, the residual is the vibration of the table behind its motor",
         default="modal",
     )
     override_percent: tuple[_Override, _Override] = key(

@@ -32,7 +32,7 @@ class KeyProblem(ValueError):
 
 
 def syntax_problem(message: str, text: str) -> Problem:
-    """The place of a TOML syntax error, which tomllib only tells in words."""
+    """Line and column of a TOML syntax error, which tomllib has only in its message."""
     found = re.search(r"\s*\(at line (\d+), column (\d+)\)$", message)
     if found:
         return Problem("", "", f"{message[: found.start()]} (column {found[2]})", int(found[1]))
@@ -78,47 +78,33 @@ def further_problems(count: int) -> tuple[Problem, ...]:
     return (Problem("", "", f"{more} further problems are not listed"),) if more > 0 else ()
 
 
-def _number(limit: float) -> str:
-    return f"{limit:g}" if abs(limit) < 1e6 else str(limit)
+_LIMITS = {
+    "missing": "required, but missing",
+    "greater_than": "must be greater than {gt}",
+    "greater_than_equal": "must be {ge} or more",
+    "less_than": "must be less than {lt}",
+    "less_than_equal": "must be {le} or less",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    **dict.fromkeys(("int_type", "int_from_float"), "must be a whole number"),
+    "bool_type": "must be true or false",
+    "string_type": "must be a text in quotes",
+    "literal_error": "must be {expected}",
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "must be a table"),
+    "too_short": "must have {min_length} or more values",
+    "too_long": "must have {max_length} or fewer values",
+    **dict.fromkeys(("tuple_type", "list_type"), "must be a list"),
+    "value_error": "{error}",
+}
+"""What a value must be, in words, by pydantic's kind of the error."""
 
 
 def _limit(kind: str, context: Mapping[str, Any], message: str) -> str:
-    """What a value must be, in words, from pydantic's description of the error."""
-    match kind:
-        case "missing":
-            return "required, but missing"
-        case "greater_than":
-            return f"must be greater than {_number(context['gt'])}"
-        case "greater_than_equal":
-            return f"must be {_number(context['ge'])} or more"
-        case "less_than":
-            return f"must be less than {_number(context['lt'])}"
-        case "less_than_equal":
-            return f"must be {_number(context['le'])} or less"
-        case "finite_number":
-            return "must be a finite number"
-        case "float_type":
-            return "must be a number"
-        case "int_type" | "int_from_float":
-            return "must be a whole number"
-        case "bool_type":
-            return "must be true or false"
-        case "string_type":
-            return "must be a text in quotes"
-        case "literal_error":
-            return f"must be {context['expected']}".replace("'", '"')
-        case "model_type" | "model_attributes_type" | "dict_type":
-            return "must be a table"
-        case "too_short":
-            return f"must have {context['min_length']} or more values"
-        case "too_long":
-            return f"must have {context['max_length']} or fewer values"
-        case "tuple_type" | "list_type":
-            return "must be a list"
-        case "value_error":
-            return str(context["error"])
-        case _:
-            return message[:1].lower() + message[1:]
+    if kind not in _LIMITS:
+        return message[:1].lower() + message[1:]
+    numbers = {name: f"{context[name]:g}" for name in ("gt", "ge", "lt", "le") if abs(context.get(name, 1e9)) < 1e6}
+    text = _LIMITS[kind].format_map({**context, **numbers})
+    return text.replace("'", '"') if kind == "literal_error" else text
 
 
 def _short(value: object) -> str:

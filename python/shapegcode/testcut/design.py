@@ -1,4 +1,4 @@
-"""Draws up test cuts: which edge, which passes, which feeds; and writes them as FANUC programs with instructions.
+"""Designs test cuts: which edge, which passes, which feeds; and writes them as FANUC programs with instructions.
 
 Source: Y.-H. Kim, S.-L. Ko: Improvement of the Accuracy in Cornering Cut Using End Mill, 2001 (paper 001).
 """
@@ -50,7 +50,7 @@ _MAX_DEPTH_RATIO = 0.95  # of the radius, up to which a radial depth is taken
 
 @dataclass(frozen=True)
 class CutConditions:
-    """What every test cut needs to know; what machine and tool cannot do is refused when a cut is drawn up.
+    """What every test cut needs to know; what machine and tool cannot do is refused when a cut is designed.
 
     Attributes:
         machine: whose controller runs the program.

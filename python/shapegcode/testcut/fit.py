@@ -182,14 +182,14 @@ def _reduced(
             low, high = float(found.x_mm[first]), float(found.x_mm[behind - 1])
             left_out.append(LeftOut(number, low, high))
             warnings.append(
-                f"{shown.file}: X {low:.1f} to {high:.1f} mm left out: the force swings far more there than in the "
+                f"{shown.file}: X {low:.1f} to {high:.1f} mm left out: the force oscillates far more there than in the "
                 "rest of the pass (chatter?)"
             )
     return rows, passes, left_out, warnings
 
 
 def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> MeanForces:
-    """Rows that are means already: at the radial depth that the file tells, or at its positions."""
+    """Rows that are means already: at the radial depth that the file states, or at its positions."""
     if record.radial_depth_mm is not None:
         depth = record.radial_depth_mm
         wrong = np.flatnonzero((depth <= 0.0) | (depth >= 2.0 * cut.tool.radius_mm))
@@ -422,7 +422,7 @@ def _block_time(travel: float, speed: float, command: float, lag: float) -> floa
 
 
 def _speeds_at(measuring: MeasuringPass, x_mm: FloatArray, lag: float) -> FloatArray:
-    """The same where the record tells the position: at the X of each sample."""
+    """The same where the record has the position: at the X of each sample."""
     first, last = measuring.feeds[0][0], measuring.feeds[-1][0]
     fine = np.linspace(0.0, 1.5 * (last - first) / min(feed for _, feed in measuring.feeds) * _PER_MINUTE, 20000)
     speed = _speeds(measuring, fine, lag)
@@ -431,7 +431,7 @@ def _speeds_at(measuring: MeasuringPass, x_mm: FloatArray, lag: float) -> FloatA
 
 
 def _noise(x: FloatArray, force: FloatArray, travel: float) -> float:
-    """Standard deviation of means over a way, as a share of the mean."""
+    """Standard deviation of means over a travel, as a share of the mean."""
     interval_of = ((x - x[0]) / travel).astype(int)
     sums, counts = np.bincount(interval_of, force), np.bincount(interval_of)
     means = sums[counts > 0] / counts[counts > 0]

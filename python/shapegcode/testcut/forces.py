@@ -135,7 +135,7 @@ def mean_chip_mm(
 ) -> FloatArray:
     """Mean chip thickness that the force law gives each engagement its coefficients by.
 
-    The law itself tells it: with the exponent 1 the force is the mean chip thickness times the force with exponent 0.
+    The law itself gives it: with the exponent 1 the force is the mean chip thickness times the force with exponent 0.
     """
     once, twice = (
         ForceLaw(tool, CuttingLaw(1.0, exponent), spindle_rev_per_min, axial_depth_mm)
@@ -179,7 +179,7 @@ class MeanForces:
     force_n: FloatArray  # (n, 2) along the feed and to its left
     revolutions: FloatArray  # (n,) how many each is the mean of
     group: npt.NDArray[np.intp]  # (n,) number of the pass or file, in the order in which it was cut
-    # n engagements if the place of the tool were off by its standard error, the same way for all rows of a group;
+    # n engagements if the position of the tool were off by its standard error, alike for all rows of a group;
     # None: the engagements are exact
     displaced: Engagement | None = None
     torque_nm: FloatArray | None = None  # (n,) mean torque of the spindle; None: not measured
@@ -237,7 +237,7 @@ class ForceModel:
 
 # --- the coefficients: power laws about the middle of the chips, where factor and exponent do not disturb each other --
 
-MIN_CHIP_RATIO = 1.5  # The thickest mean chip over the thinnest; below it exponents are not told apart from factors
+MIN_CHIP_RATIO = 1.5  # The thickest mean chip over the thinnest; below it exponents are not distinguished from factors
 MIN_FEED_RATIO = 1.3  # The same of the feeds, for edge forces
 _ROUNDS = 6
 _HUBER = 2.5
@@ -358,14 +358,14 @@ def _check(data: MeanForces, chip: FloatArray, count: int, edge: bool) -> None:
     feeds = np.unique(np.round(data.feed_mm_per_min, 3))
     if high / low < MIN_CHIP_RATIO:
         raise ArgumentError(
-            f"the exponents cannot be told: the mean chip is {low * 1e3:.2f} to {high * 1e3:.2f} um thick, a ratio of "
-            f"{high / low:.2f}, and must have one of {MIN_CHIP_RATIO:g} or more: let the radial depth grow from "
+            f"the exponents cannot be determined: the mean chip is {low * 1e3:.2f} to {high * 1e3:.2f} um thick, a "
+            f"ratio of {high / low:.2f}, and must have one of {MIN_CHIP_RATIO:g} or more: let the radial depth grow from "
             "0.05 D to 0.35 D (ratio 2.7), or add passes with other feeds"
         )
     if edge and feeds.max() / feeds.min() < MIN_FEED_RATIO:
         raise ArgumentError(
-            f"edge forces cannot be told from the exponents at feeds from {feeds.min():g} to {feeds.max():g} mm/min: "
-            f"measure with feeds of a ratio of {MIN_FEED_RATIO:g} or more, better 3"
+            f"edge forces cannot be distinguished from the exponents at feeds from {feeds.min():g} to {feeds.max():g} "
+            f"mm/min: measure with feeds of a ratio of {MIN_FEED_RATIO:g} or more, better 3"
         )
 
 

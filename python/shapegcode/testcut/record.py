@@ -44,9 +44,9 @@ class ForceRecord:
     time_s: FloatArray | None = None  # (n,), evenly spaced; None: not recorded
     position_mm: FloatArray | None = None  # (n,) X of the tool's axis in the program's coordinates; None: not recorded
     radial_depth_mm: FloatArray | None = (
-        None  # (n,) of means at known depths; None: the test cut's description tells it
+        None  # (n,) of means at known depths; None: the test cut's description states it
     )
-    feed_mm_per_min: FloatArray | None = None  # (n,) where the file tells it
+    feed_mm_per_min: FloatArray | None = None  # (n,) where the file states it
 
     def __len__(self) -> int:
         return len(self.force_n)
@@ -181,7 +181,7 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
 
 
 def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
-    """Time of each sample, and the way gone since the first one at the commanded feeds (or as measured)."""
+    """Time of each sample, and the travel since the first one at the commanded feeds (or as measured)."""
     if record.position_mm is not None:
         x = record.position_mm
         if record.time_s is not None:
@@ -287,7 +287,7 @@ def _positions(
     seen = np.flatnonzero(forecast.mean_n > _ABOVE_SHARE * forecast.mean_n.max())
     wanted = forecast.x_mm[seen[0]], forecast.x_mm[seen[-1]]
     if record.position_mm is None and not measuring.constant_feed:
-        # The way over time is that of the blocks; only where it begins is looked for.
+        # The travel over time is that of the blocks; only where it begins is looked for.
         moved = _travel_of_blocks(measuring, time - time[contact[0]], wanted[0])
     scale = (wanted[1] - wanted[0]) / (moved[contact[1]] - moved[contact[0]])
     free = record.position_mm is None and measuring.constant_feed

@@ -1,4 +1,4 @@
-"""Test cuts as they were drawn up, and what their records tell: coefficients, forces, the feed that is followed."""
+"""Designs of test cuts, and what their records show: coefficients, forces, the feed that is followed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from shapegcode.testcut.record import Revolutions
 
 @dataclass(frozen=True, repr=False, eq=False)
 class CutDesign(Result):
-    """A test cut as it was drawn up.
+    """The design of a test cut.
 
     Attributes:
         cut: what the side file holds.
@@ -114,7 +114,7 @@ class TaperPass:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A stretch with chatter.
+    """A part of a pass with chatter.
 
     Attributes:
         number: of the pass, from 1.
@@ -144,7 +144,7 @@ class TaperResult(Result):
         rms_percent: the same, of both, as a share of the resultant.
         neighbour_correlation: how far neighbours share what the fit leaves, 0 to 1; the intervals allow for it.
         passes: what the sampled records showed; empty for files with means.
-        left_out: stretches with chatter.
+        left_out: parts with chatter.
         poor: coefficients of the power laws that are not known well, in words.
         warnings: what else the user should know.
         cut: the test cut.
@@ -318,7 +318,7 @@ class CornerResult(Result):
 
     @property
     def next_step(self) -> str:
-        """The test cut that tells more."""
+        """The test cut to do next."""
         if abs(self.scale - 1.0) > RATIO_LIMIT:
             return "shapegcode testcut taper measures the coefficients"
         return "shapegcode testcut interval shows how often the feed may change"
@@ -378,7 +378,7 @@ class IntervalResult(Result):
         program: of the test cut.
         machine: name of the machine.
         interval_mm: shortest interval from which on all measured ones are followed; None: none is.
-        lag_interval_mm: way in which 90 % of a step are done with the median lag, at the largest feed.
+        lag_interval_mm: travel in which 90 % of a step are done with the median lag, at the largest feed.
         passes: of the measured ones, by interval.
         warnings: what else the user should know.
         kind: of the test cut.

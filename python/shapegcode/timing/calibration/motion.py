@@ -189,10 +189,10 @@ class MotionFit:
 # --- how far a model is off -------------------------------------------------------------------------------------------
 #
 # A control reports its line a few times a second: the time at which one is first seen is late by up to one reading.
-# What a stretch of the log takes is therefore known to a reading or two, whatever its length; the error of the model
+# What a part of the log takes is therefore known to a reading or two, whatever its length; the error of the model
 # grows with it.
 
-#: (length of the stretches in s, error beyond which it counts no more in s, weight).
+#: (length of the windows in s, error beyond which it counts no more in s, weight).
 _SCALES = ((1.0, 0.25, 1.0), (6.0, 0.5, 0.7), (30.0, 1.0, 0.5))
 _SECTION = (2.0, 0.5)  # of whole sections: error per half minute in s beyond which it counts no more, weight
 _MIN_READINGS = 10
@@ -208,8 +208,8 @@ class SeenSection:
     line: IntArray  # (n,) which
 
     @cached_property
-    def stretches(self) -> tuple[tuple[IntArray, IntArray], ...]:
-        """For each length of a stretch: readings at which one begins, and those at which it ends."""
+    def windows(self) -> tuple[tuple[IntArray, IntArray], ...]:
+        """For each length of a window: readings at which one begins, and those at which it ends."""
         found = []
         for length_s, _, _ in _SCALES:
             upto = np.searchsorted(self.time_s, self.time_s + length_s)
@@ -222,10 +222,10 @@ def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
     """The sections of runs of which enough was seen."""
     found = []
     for run in runs:
-        for stretch in run.stretches:
-            inside = (run.line >= stretch.lines[0]) & (run.line <= stretch.lines[1])
+        for cut_section in run.cut_sections:
+            inside = (run.line >= cut_section.lines[0]) & (run.line <= cut_section.lines[1])
             if int(inside.sum()) >= _MIN_READINGS:
-                found.append(SeenSection(run, stretch.feed_override, run.time_s[inside], run.line[inside]))
+                found.append(SeenSection(run, cut_section.feed_override, run.time_s[inside], run.line[inside]))
     return found
 
 
@@ -262,7 +262,7 @@ def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
     for section, residual in zip(sections, section_residuals(sections, model), strict=True):
         sums, counts = square[id(section.run.timed)], count[id(section.run.timed)]
         for scale, (_, limit_s, _) in enumerate(_SCALES):
-            begins, ends = section.stretches[scale]
+            begins, ends = section.windows[scale]
             apart = residual[ends] - residual[begins]
             sums[scale] += np.minimum(apart**2, limit_s**2).sum()
             counts[scale] += len(apart)
@@ -351,16 +351,16 @@ def parameter_intervals(
 ) -> dict[str, tuple[float, float]]:
     """95 % intervals of the numbers of a fit.
 
-    From the derivatives of what stretches of some seconds take; the scatter is that of the sections, each of which
+    From the derivatives of what windows of some seconds take; the scatter is that of the sections, each of which
     counts as one (a sandwich of clusters), so that an error of the model is in it.
     """
     names = [parameter.name for parameter in fit.family.parameters]
     sections = sections_of(runs)
-    stretches = [_stretches(section) for section in sections]
+    windows = [_windows(section) for section in sections]
 
     def taken(values: dict[str, float]) -> list[FloatArray]:
         residual = section_residuals(sections, replace(fit, values=values).model(machine))
-        return [np.diff(each[points]) for each, points in zip(residual, stretches, strict=True)]
+        return [np.diff(each[points]) for each, points in zip(residual, windows, strict=True)]
 
     centre = taken(fit.values)
     slopes = []
@@ -393,7 +393,7 @@ def parameter_intervals(
     return found
 
 
-def _stretches(section: SeenSection) -> IntArray:
+def _windows(section: SeenSection) -> IntArray:
     """Readings that are some seconds apart."""
     points = [0]
     for index, time_s in enumerate(section.time_s):
@@ -423,7 +423,7 @@ _TABLE_KRPM = 30.0  # a spindle's table is written up to so far above where its 
 class FunctionFit:
     """Times beside the motion."""
 
-    # by name: "start", "tool change", "M8", "way xy", "way z" in s; "spindle start from" and "spindle stop from" in
+    # by name: "start", "tool change", "M8", "move xy", "move z" in s; "spindle start from" and "spindle stop from" in
     # 1000/min, "spindle start" and "spindle stop" in s per 1000/min above
     values: dict[str, float]
     low: dict[str, float]  # of the 95 % intervals by name
@@ -452,8 +452,8 @@ def whole_model(
     model.last_tool_in_spindle = last_tool_in_spindle
     model.m_function_s = 0.0
     model.m_code_s = dict(m_codes(values).items())
-    xy = values.get("way xy", 0.0)
-    model.unknown_move_s = [xy, xy, values.get("way z", 0.0)]
+    xy = values.get("move xy", 0.0)
+    model.unknown_move_s = [xy, xy, values.get("move z", 0.0)]
     model.spindle_start_s = spindle_rows(values, "spindle start")
     model.spindle_stop_s = spindle_rows(values, "spindle stop")
     return model
@@ -492,7 +492,7 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
     functions = [each for run in runs for each in run.timed.program.core.functions]
     codes = {code for codes, _, _ in functions for code in codes}
     spins = any(speed > 0.0 for _, _, speed in functions)
-    names = ["start", "way xy", "way z"]
+    names = ["start", "move xy", "move z"]
     names += ["tool change"] if _TOOL_CHANGE in codes else []
     names += [f"M{code}" for code in sorted(codes - {_TOOL_CHANGE})]
     if spins and codes & {3, 4}:
@@ -503,7 +503,7 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
 
 
 def _spans(run: ObservedRun) -> list[_Span]:
-    """Readings next to each other with a function between, and whole ways from cut to cut; start and end of the run."""
+    """Readings next to each other with a function between, and all between two cuts; start and end of the run."""
     line, time_s, function = run.line, run.time_s, run.timed.function
     spans = []
 
@@ -516,7 +516,7 @@ def _spans(run: ObservedRun) -> list[_Span]:
             spans.append(_Span(run, begin, end, until - since))
 
     cuts = np.flatnonzero(np.isfinite(run.timed.feed_mm_per_s[line]))
-    # How the way to the first cut divides differs from run to run: a control reports its first lines late.
+    # How the time to the first cut divides differs from run to run: a control reports its first lines late.
     for index in range(int(cuts[0]) if len(cuts) else -1, len(line)):
         add(index, index + 1)
     if len(cuts):
@@ -556,7 +556,7 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     # Each stretch is counted about twice: as a whole, and in its readings.
     slope = np.asarray(found.jac)
     spread = np.linalg.pinv(slope.T @ slope) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
-    # A number that changes nothing is not told.
+    # A parameter that changes nothing is not determined.
     unseen = np.abs(slope[: len(spans)]).sum(axis=0) < _UNSEEN
     reach = np.where(unseen, _MAX_S, 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0)))
     low = {name: max(0.0, values[name] - float(each)) for name, each in zip(names, reach, strict=True)}

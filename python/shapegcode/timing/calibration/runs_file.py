@@ -89,7 +89,7 @@ class RunEntry:
             if log in self.shared and any(run.program is None for run in runs):
                 raise RecordError(
                     f"{log}: it is a log of several programs, and a run in it (from line {runs[0].lines[0]}) names "
-                    f"none: whether {self.program.name} made it cannot be told; divide the log"
+                    f"none: whether {self.program.name} made it is not known; divide the log"
                 )
             found += runs
         return tuple(found)
@@ -121,7 +121,7 @@ class _RunsRow(TomlTable):
     logs: Annotated[tuple[_Path, ...], Field(min_length=1)] | None = key(
         "several logs, or patterns, in place of log", default=None
     )
-    use: Use = key('"fit": learned from; "test": predicted only', default="fit")
+    use: Use = key('"fit": calibrated with; "test": predicted only', default="fit")
     feed_unit: Text | None = key("unit of the feed in the logs; left out: by the data", default=None)
     items: dict[Text, Text] | None = key("names of the items in the logs by what they are", default=None)
     format: LogFormat | None = key("of the logs; left out: by their content", default=None)
