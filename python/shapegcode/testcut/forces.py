@@ -359,8 +359,8 @@ def _check(data: MeanForces, chip: FloatArray, count: int, edge: bool) -> None:
     if high / low < MIN_CHIP_RATIO:
         raise ArgumentError(
             f"the exponents cannot be determined: the mean chip is {low * 1e3:.2f} to {high * 1e3:.2f} um thick, a "
-            f"ratio of {high / low:.2f}, and must have one of {MIN_CHIP_RATIO:g} or more: let the radial depth grow from "
-            "0.05 D to 0.35 D (ratio 2.7), or add passes with other feeds"
+            f"ratio of {high / low:.2f}, and must have one of {MIN_CHIP_RATIO:g} or more: let the radial depth grow "
+            "from 0.05 D to 0.35 D (ratio 2.7), or add passes with other feeds"
         )
     if edge and feeds.max() / feeds.min() < MIN_FEED_RATIO:
         raise ArgumentError(

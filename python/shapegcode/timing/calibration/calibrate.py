@@ -83,7 +83,7 @@ def learn_clock(
     """Calibrate the cycle-time model of a machine from what it did.
 
     Logs are laid beside their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
-    to what stretches between functions took, and the one is taken that says best what programs (or runs, where there
+    to what the parts between functions took, and the one is taken that predicts best what programs (or runs, where there
     is one program) took that it was not fitted to. Tool changes, M codes, spindle and unknown travels follow by least
     squares.
 
@@ -269,9 +269,8 @@ def _row(run: ObservedRun, learned: _Learned, other: _Learned | None, spread: fl
     holds = _holds_of(run, starts)
     tools, kinds = _shares(run, starts, holds)
     # Half of the 95 % interval of its time: cuts err together, what lies between them by itself.
-    cut = sum(
-        float(starts[cut_section.lines[1] + 1] - starts[cut_section.lines[0]]) for cut_section in run.cut_sections
-    )
+    lines = (each.lines for each in run.cut_sections)
+    cut = sum(float(starts[last + 1] - starts[first]) for first, last in lines)
     between = len(run.cut_sections) * learned.functions.scatter_s**2
     reach = 2.0 * math.sqrt((spread * cut) ** 2 + between)
     return LearnedRun(

@@ -429,12 +429,12 @@ class FunctionFit:
     low: dict[str, float]  # of the 95 % intervals by name
     high: dict[str, float]
     last_tool_in_spindle: bool  # whether the tool that a program ends with is in the spindle when it starts anew
-    scatter_s: float  # root mean square of what a stretch between two cuts took otherwise
+    scatter_s: float  # root mean square of what the time between two cuts was otherwise
 
 
 @dataclass(frozen=True, eq=False)
 class _Span:
-    """A stretch of a run from one reading to another, with functions between."""
+    """A part of a run from one reading to another, with functions between."""
 
     run: ObservedRun
     begin: int  # line; 0: the start key
@@ -474,7 +474,7 @@ def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float
 
 
 def fit_functions(runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> FunctionFit:
-    """Least squares over the stretches between cuts, robust against what an operator does there."""
+    """Least squares over the times between cuts, robust against what an operator does there."""
     spans = [span for run in runs for span in _spans(run)]
     names = _names(runs)
     kept = (False, True) if any(map(_returns, runs)) else (False,)
@@ -553,7 +553,7 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     values = dict(zip(names, found.x.tolist(), strict=True))
     error = errors(found.x)[: len(spans)] * _READING_S
     middle = float(np.sqrt(np.mean(np.minimum(error**2, 1.0)))) if len(error) else 0.0
-    # Each stretch is counted about twice: as a whole, and in its readings.
+    # Each span is counted about twice: as a whole, and in its readings.
     slope = np.asarray(found.jac)
     spread = np.linalg.pinv(slope.T @ slope) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
     # A parameter that changes nothing is not determined.

@@ -411,7 +411,7 @@ def _require_same(run: ObservedRun, starts: FloatArray) -> None:
     if agreement < 0.3:
         raise RecordError(
             f"{run.log.source}: its lines do not take the time that those of {run.entry.program.name} need "
-            f"(correlation {agreement:.2f} over {groups} stretches, at least 0.3 is expected): log and program do not "
+            f"(correlation {agreement:.2f} over {groups} parts, at least 0.3 is expected): log and program do not "
             "belong together"
         )
 

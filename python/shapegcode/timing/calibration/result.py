@@ -22,7 +22,7 @@ class FamilyScore:
         name: of it.
         meaning: in words.
         fitted_s: how far its times differ from the logs that it was fitted to, s (weighted root mean square over
-            stretches of seconds to minutes).
+            windows of seconds to minutes).
         left_out_s: the same on runs that it was not fitted to; null: too few runs to leave any out.
     """
 
