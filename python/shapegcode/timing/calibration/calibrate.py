@@ -83,9 +83,9 @@ def learn_clock(
     """Calibrate the cycle-time model of a machine from what it did.
 
     Logs are laid beside their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
-    to what the parts between functions took, and the one is taken that predicts best what programs (or runs, where there
-    is one program) took that it was not fitted to. Tool changes, M codes, spindle and unknown travels follow by least
-    squares.
+    to what the parts between functions took, and the one is taken that predicts best what programs (or runs, where
+    there is one program) took that it was not fitted to. Tool changes, M codes, spindle and unknown travels follow by
+    least squares.
 
     Args:
         runs: pairs of program and log, or the file that lists them (RUNS.toml).
