@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import shapegcode as sg
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 
 PART = """%
 O1

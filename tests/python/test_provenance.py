@@ -19,7 +19,8 @@ from shapegcode.cli import main
 from shapegcode.conversion.rests import _Region
 from shapegcode.identification.result import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_modes
-from shapegcode.settings.remarks import origin_of, remarks_of, with_remarks
+from shapegcode.settings.edit import with_remarks
+from shapegcode.settings.remarks import origin_of, remarks_of
 from shapegcode.shaping.grid import choose_grid
 
 DUMP = b"""%

@@ -24,7 +24,7 @@ from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from shapegcode.cli.machine import file_schema
 from shapegcode.demos.path import path_program
 from shapegcode.errors import ArgumentError, MachineError
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.studies import replay as replays
 from shapegcode.studies.replay import DrawsJob, play_all

@@ -112,6 +112,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     scheme.add_argument("kind", choices=FILES, nargs="?", default="machine", help="kind of file")
     scheme.add_argument("-o", "--output", metavar="FILE", default="-", help="file to write (default: standard output)")
+    for action in (init, scheme):
+        action.add_argument("-q", "--quiet", action="store_true", help="only the answer, warnings and errors")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -131,7 +133,8 @@ def _init(args: argparse.Namespace) -> int:
         return 0
     write_new(args, text)
     print(f"wrote {args.output}, the values of {args.name}: inherited or assumed, until you put in your own")
-    print(f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
+    if not args.quiet:
+        print(f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
     return 0
 
 
@@ -192,7 +195,7 @@ def _write_origins(name: str) -> None:
 
     from shapegcode.identification.update import check_updatable
     from shapegcode.machine import Machine
-    from shapegcode.settings.remarks import with_origin_table
+    from shapegcode.settings.edit import with_origin_table
 
     check_updatable(name)
     text = Path(name).read_bytes().decode("utf-8")
@@ -209,7 +212,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
     from shapegcode.conversion.open_axes import open_axes
     from shapegcode.machine import Machine
     from shapegcode.machine.description_result import OpenValue
-    from shapegcode.machine.output import ANY_PRICE
+    from shapegcode.machine.programs import ANY_PRICE
 
     machine, said = Machine.load(args.machine), ""
     with runner.progress(f"converting {args.input}", args):
@@ -266,5 +269,7 @@ def _schema(args: argparse.Namespace) -> int:
         sys.stdout.write(file_schema(args.kind))
     else:
         write_text(args.output, file_schema(args.kind))
-        print(f"wrote {args.output}\nnext: put `#:schema {args.output}` into the first line of a {args.kind} file")
+        print(f"wrote {args.output}")
+        if not args.quiet:
+            print(f"next: put `#:schema {args.output}` into the first line of a {args.kind} file")
     return 0

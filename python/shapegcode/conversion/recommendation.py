@@ -13,7 +13,7 @@ from shapegcode import _core
 from shapegcode.comparison.result import ProgramDifference
 from shapegcode.machine import Machine
 from shapegcode.machine.controller import Controller
-from shapegcode.machine.output import Tolerance
+from shapegcode.machine.programs import Tolerance
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.program.operating import no_room

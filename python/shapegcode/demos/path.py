@@ -15,7 +15,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.conversion.convert import convert
 from shapegcode.machine import Machine
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.model.machine_model import MachineModel, motion_limits
 from shapegcode.program import Program
 from shapegcode.results.figures import largest_xyz_um

@@ -99,7 +99,7 @@ def _split_unit(text: str, names: Names) -> tuple[str, Unit | None, str]:
 
 
 def _is_in(text: str) -> bool:
-    """Whether it is "in": inches behind a way, else a word."""
+    """Whether it is "in": inches behind a length, else a word."""
     return text.strip().lower() == "in"
 
 

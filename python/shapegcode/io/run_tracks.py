@@ -349,7 +349,7 @@ def _program(part: RunPart, tracks: Sequence[Track], notes: FileNotes) -> str | 
         if name is not None:
             for time, text in pairs:
                 if time > _NAME_S and text != name:
-                    said = f"{item.name} is {text} from {time:.2f} s on: a called program, or another one"
-                    notes.add("program", 0, said)
+                    note = f"{item.name} is {text} from {time:.2f} s on: a called program, or another one"
+                    notes.add("program", 0, note)
             return name
     return None

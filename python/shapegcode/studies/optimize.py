@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, DesignError, MachineError
 from shapegcode.machine import Machine
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
 from shapegcode.studies.replay import SHARE, DrawsJob, Replay, play_all

@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine import Machine
-from shapegcode.settings.edit import missing_row
 from shapegcode.settings.keys import toml
+from shapegcode.settings.load import missing_row
 
 Unit = npt.NDArray[np.float64]
 
