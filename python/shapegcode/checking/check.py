@@ -18,8 +18,9 @@ from shapegcode.machine import Machine
 from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
+from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.operating import no_room
-from shapegcode.program.reading import is_program_text, program_bytes, require_memory_for_lines
+from shapegcode.program.reading import is_program_text, program_bytes
 from shapegcode.program.several import index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN
 

@@ -206,7 +206,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
     """With the values that were not measured, by what they do to a program."""
 
     from shapegcode.conversion.convert import convert
-    from shapegcode.conversion.open_axes import open_axes
+    from shapegcode.conversion.sensitivity import rank_unknown_axes
     from shapegcode.machine import Machine
     from shapegcode.machine.description_result import OpenValue
     from shapegcode.machine.output import ANY_PRICE
@@ -220,7 +220,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
             if conversion.worst_case is None:
                 said = f"{args.input}: nothing in it was shaped, so nothing is ranked"
         else:
-            rows = open_axes(args.input, machine)
+            rows = rank_unknown_axes(args.input, machine)
             said = (
                 "no axis has a vibration mode, so there is nothing to shape for: each that may have one was given a "
                 "usual one, and simulated the program as it is"

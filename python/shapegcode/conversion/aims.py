@@ -359,50 +359,39 @@ def plan_curve(
 
 
 class CutCurves:
-    """The curve of each cut of a conversion, planned when it is asked for.
-
-    Args:
-        writer: gives the writer on the grid that is used.
-        program: the original.
-        machine: its tolerance is what was asked for.
-        originals: simulations of the original cuts under way.
-    """
+    """The curve of each cut of a conversion on one grid, planned when it is asked for."""
 
     def __init__(
         self,
-        writer: Callable[[], TextWriter],
+        writer: TextWriter,
         program: Program,
         machine: Machine,
         originals: Sequence[Future[_core.PlaybackFigures]],
     ) -> None:
         self._writer, self._program, self._machine, self._originals = writer, program, machine, originals
-        self._known: dict[int, tuple[object, CutCurve]] = {}  # on one grid
-        self._feed_ratio: dict[int, float] = {}
+        self._known: dict[int, CutCurve] = {}
+
+    def use(self, writer: TextWriter) -> None:
+        """Plan on another grid from now on."""
+        self._writer, self._known = writer, {}
 
     def note(self, written: Written) -> None:
         """Remember cuts that the tolerance does not slow: nothing needs to be planned for them."""
-        grid = self._writer().grid
-        for index in written.unslowed:
-            known = self._known.get(index)
-            if known is None or known[0] is not grid:
-                self._known[index] = (
-                    grid,
-                    CutCurve((max(written.planned_um.get(index, 0.0), 1e-3),), (written.durations_s[index],)),
-                )
+        for index in written.unslowed - self._known.keys():
+            planned_um = max(written.planned_um.get(index, 0.0), 1e-3)
+            self._known[index] = CutCurve((planned_um,), (written.durations_s[index],))
 
     def of(self, index: int) -> CutCurve:
         """The curve of a cut."""
-        writer = self._writer()
-        known = self._known.get(index)
-        if known is not None and known[0] is writer.grid:
-            return known[1]
+        if index in self._known:
+            return self._known[index]
         asked_um = self._machine.tolerance.contour_um * MARGIN
         target = "command" if self._machine.shaping.contour != "response" else "response"
         original_um = getattr(self._originals[index].result(), target).max_abs_mm * 1e3
         path = self._program.regions[index].path
-        curve = plan_curve(path, writer.grid.fir, writer.options(index, 1.0), asked_um, original_um)
-        self._known[index] = writer.grid, curve
-        return curve
+        options = self._writer.options(index)
+        self._known[index] = plan_curve(path, self._writer.grid.fir, options, asked_um, original_um)
+        return self._known[index]
 
 
 def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | None:

@@ -15,16 +15,16 @@ from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.outcome import judge, result_of
 from shapegcode.conversion.plan import ConversionPlan, CutChoice, Progress, Shaped
 from shapegcode.conversion.recommendation import gain_um
-from shapegcode.conversion.rests import Begun, begin_rests
 from shapegcode.conversion.result import Conversion
+from shapegcode.conversion.sensitivity import StartedTrials, start_trials
 from shapegcode.conversion.tables import chosen_cuts
-from shapegcode.conversion.whole_text import TextWriter, Written
+from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
+from shapegcode.program.computer import cores
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
 from shapegcode.shaping.grid import Grid
-from shapegcode.verdict.ahead import cores
 
 if TYPE_CHECKING:
     from shapegcode.conversion.rapids.shape import ShapedRapids
@@ -123,10 +123,7 @@ def read(
     if given := {key: value for key, value in stated.items() if value is not None}:
         machine = machine.with_values(given, source="options of convert")
     program = program_for_conversion(program, machine)
-    if program.stamp is not None:
-        raise _core.ProgramError(
-            f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
-        )
+    program.refuse_shaped("convert the original")
     # A comment of an original that the emitted program would say of its own blocks.
     for mark in (REGION_MARK.encode(), RAPID_MARK.encode(), STAMP_BEGIN):
         if (at := program.core.find(mark)) >= 0:
@@ -160,15 +157,14 @@ def settle(plan: ConversionPlan) -> Shaped:
         if not changed:
             return shaped
         shaped.trackers.clear()  # nobody asks for them any more: they take room beside the next text
-        for run in shaped.begun.values():
+        for run in shaped.started.values():
             run.cancel()
     return simulate(plan, read_back(plan, write(plan, plan.grid)))
 
 
 def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     """Shape the chosen cuts on a grid, and write the whole text."""
-    if plan.writer.grid is not grid:
-        plan.writer = TextWriter(plan.program, plan.model, grid, plan.pool)
+    plan.use_grid(grid)
     # Of what was given up for a budget, or is left unchanged by choice, the table of cuts speaks.
     given_up = {} if plan.spending is None else plan.spending.given_up
     untold = {*given_up, *plan.left, *plan.aims.emitted_s}
@@ -209,16 +205,16 @@ def simulate(plan: ConversionPlan, text: ReadBack, *, ahead: bool = False) -> Sh
     indices = [plan.aims.index(place.region) for place in placed]
     places = [placed[rank] for rank in trackers]
     playing = plan.judge.begin(text.emitted, places, list(trackers.values()), plan.pool)
-    begun: Begun = {}
+    started: StartedTrials = {}
     if ahead and cores() > 1 and len(placed) == len(trackers) == 1:
-        begun = begin_rests(plan.judge, plan.machine, places[0], text.emitted, trackers[0], plan.pool)
+        started = start_trials(plan.judge, plan.machine, places[0], text.emitted, trackers[0], plan.pool)
     originals = [plan.originals[indices[rank]] for rank in trackers]
     found = plan.judge.figures(playing, originals, partial(plan.on_progress, "round trip"))
     for rank, figures in zip(trackers, found, strict=True):
         plan.simulated[indices[rank]] = text.written.texts[rank][0], figures
     return Shaped(
         text.written, text.emitted, [plan.simulated[index][1] for index in indices],
-        [trackers.get(rank) for rank in range(len(placed))], begun,
+        [trackers.get(rank) for rank in range(len(placed))], started,
     )  # fmt: skip
 
 

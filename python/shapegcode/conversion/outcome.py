@@ -22,8 +22,8 @@ from shapegcode.conversion.recommendation import (
     text_warnings,
 )
 from shapegcode.conversion.restart import restart_points
-from shapegcode.conversion.rests import RestsOn, rests_on
 from shapegcode.conversion.result import ChangeProof, Conversion
+from shapegcode.conversion.sensitivity import Sensitivity, parameter_sensitivity
 from shapegcode.conversion.tables import CutOutcome, outcome_of, tools_of_cuts
 from shapegcode.machine import Machine
 from shapegcode.model.modes import machine_warnings, region_range_warnings
@@ -95,7 +95,7 @@ def result_of(plan: ConversionPlan, shaped: Shaped, judged: JudgedProgram) -> Co
     # For a core that waits while the last simulations run.
     mark = plan.pool.submit(lambda: shaped.emitted.mark)
     warnings = _warnings(plan, shaped, judged.figures)
-    rests, tried = _rests_on(plan, shaped)
+    sensitivity, tried = _sensitivity(plan, shaped)
     mark.result()
     emitted = shaped.emitted.with_verdict(
         good=judged.grade != "do not run", better=judged.grade == "better, tolerance not met"
@@ -136,7 +136,7 @@ def result_of(plan: ConversionPlan, shaped: Shaped, judged: JudgedProgram) -> Co
         budget=plan.spending.outcome(plan.grid, shaped.written) if plan.spending is not None else None,
         rapids=shaped.rapids.outcome if shaped.rapids is not None else None,
         least_gain_um=machine.shaping.least_gain_um,
-        rests_on=rests,
+        rests_on=sensitivity,
         unmeasured_tried=tried,
         at_the_control=at_the_control(
             shaped.emitted,
@@ -210,15 +210,15 @@ def _curve(plan: ConversionPlan, times: Pair[float]) -> ToleranceCurve | None:
     return plan.aims.tolerance_curve(times.original, original_um * 1e3)
 
 
-def _rests_on(plan: ConversionPlan, shaped: Shaped) -> tuple[tuple[RestsOn, ...], int]:
+def _sensitivity(plan: ConversionPlan, shaped: Shaped) -> tuple[tuple[Sensitivity, ...], int]:
     """Sensitivity of the shaped cut that comes nearest to a limit."""
     deciding = plan.judge.deciding(shaped.figures, shaped.written.placed)
     if deciding is None:
         return (), 0
     simulated = zip(shaped.written.placed, shaped.figures, shaped.trackers, strict=True)
-    return rests_on(
+    return parameter_sensitivity(
         plan.judge, plan.machine, list(simulated), shaped.emitted, deciding, plan.pool,
-        shaped.begun, partial(plan.on_progress, "sensitivity to unverified parameters"),
+        shaped.started, partial(plan.on_progress, "sensitivity to unverified parameters"),
     )  # fmt: skip
 
 

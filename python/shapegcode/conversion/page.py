@@ -12,7 +12,7 @@ from shapegcode.conversion.aims import curve_table
 from shapegcode.conversion.operating import restart_table
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled import ScheduledConversion
-from shapegcode.conversion.tables import CutOutcome, before_after_table, rests_table
+from shapegcode.conversion.tables import CutOutcome, before_after_table, sensitivity_table
 from shapegcode.machine import Machine
 from shapegcode.results.json import Made
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
@@ -76,7 +76,7 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     if conversion.cases:
         yield _cases(conversion)
     if conversion.rests_on:
-        table = rests_table(conversion.rests_on, conversion.unmeasured_tried)
+        table = sensitivity_table(conversion.rests_on, conversion.unmeasured_tried)
         how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
         yield Section("rests", "Sensitivity to unverified parameters", (table,), how=how)
     yield from _price(conversion, made)

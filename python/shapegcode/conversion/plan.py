@@ -13,12 +13,12 @@ from shapegcode import _core
 from shapegcode.conversion.aims import Aims, CutCurves
 from shapegcode.conversion.budget import Budget, Spending, keepable
 from shapegcode.conversion.recommendation import benefits, most_to_gain_um
-from shapegcode.conversion.rests import Begun
+from shapegcode.conversion.sensitivity import StartedTrials
 from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
-from shapegcode.shaping.grid import choose_grid
+from shapegcode.shaping.grid import Grid, choose_grid
 from shapegcode.verdict.figures import Placed, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures, rapid_vibration_um, simulate_unchanged
 
@@ -53,7 +53,7 @@ class Shaped:
     emitted: Program
     figures: list[RegionFigures]
     trackers: list[_core.ContourTracker | None]  # of its cuts; None: as in the text before
-    begun: Begun  # sensitivity that is simulated ahead of need
+    started: StartedTrials  # sensitivity that is simulated ahead of need
     rapids: ShapedRapids | None = None  # what became of its rapids; None: they were not to be shaped
 
 
@@ -84,7 +84,7 @@ class ConversionPlan:
         self.grid = self.grid_for(block_period_s)
         self.writer = TextWriter(program, self.model, self.grid, pool)
         self.judge = Judge(self.model)
-        self.curves = CutCurves(self.writer_of, program, machine, self.originals)
+        self.curves = CutCurves(self.writer, program, machine, self.originals)
         self.aims = Aims(
             program, machine,
             [
@@ -105,9 +105,11 @@ class ConversionPlan:
         self.original_s = pool.submit(self.model.cycle_time_s, program.core)
         self.rapid_vibration = pool.submit(rapid_vibration_um, program, self.model)
 
-    def writer_of(self) -> TextWriter:
-        """The writer on the grid that is used now."""
-        return self.writer
+    def use_grid(self, grid: Grid) -> None:
+        """Write on this grid from now on."""
+        if self.writer.grid is not grid:
+            self.writer = TextWriter(self.program, self.model, grid, self.pool)
+            self.curves.use(self.writer)
 
     def excess_s(self, shaped: Shaped) -> float:
         """Time above what the price of the program allows."""

@@ -12,7 +12,7 @@ from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.operating import ControlNote, control_table, restart_table
 from shapegcode.conversion.recommendation import FilterAdvice, Grade
 from shapegcode.conversion.restart import RestartPoint
-from shapegcode.conversion.rests import RestsOn
+from shapegcode.conversion.sensitivity import Sensitivity
 from shapegcode.conversion.tables import (
     BeforeAfter,
     CutOutcome,
@@ -21,7 +21,7 @@ from shapegcode.conversion.tables import (
     change_percent,
     cut_table,
     percent,
-    rests_table,
+    sensitivity_table,
 )
 from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.program import Program
@@ -115,7 +115,7 @@ class Conversion(ProgramFigures, Result):
     budget: BudgetOutcome | None = field(default=None, metadata=sparse())
     rapids: RapidsOutcome | None = field(default=None, metadata=sparse())
     least_gain_um: float = 0.0
-    rests_on: tuple[RestsOn, ...] = ()
+    rests_on: tuple[Sensitivity, ...] = ()
     unmeasured_tried: int = 0
     at_the_control: tuple[ControlNote, ...] = ()
     restart_points: tuple[RestartPoint, ...] = ()
@@ -281,7 +281,7 @@ class Conversion(ProgramFigures, Result):
         if self.nothing_shaped:
             return [*cuts, *curve] if any(cut.misses for cut in self.cuts) else cuts
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
-        rests = [rests_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []
+        rests = [sensitivity_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []
         points = [restart_table(self.restart_points)] if self.restart_points else []
         before_after = before_after_table(self.before_after())
         return [before_after, *cuts, *curve, *cases, *rests, control_table(self.at_the_control), *points]

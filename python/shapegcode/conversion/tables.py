@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from shapegcode import _core
-from shapegcode.conversion.rests import RestsOn
+from shapegcode.conversion.sensitivity import Sensitivity
 from shapegcode.program import Program
 from shapegcode.results.result import Pair, Xyz
 from shapegcode.results.table import NO_BREAK, Column, Table
@@ -78,7 +78,7 @@ def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
     return Table("", _BEFORE_AFTER, [row for group in filled for row in group], sections=sections)
 
 
-def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
+def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
     """The sensitivity to unverified parameters as a table."""
     columns = (
         Column("key", left=True),
@@ -95,12 +95,12 @@ def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
     )
 
 
-def _moved(row: RestsOn) -> str:
+def _moved(row: Sensitivity) -> str:
     """What stands in the file, and what was tried instead: four columns of their own do not fit 80 characters."""
     return unbroken(f"{row.value} {row.origin} → {row.moved}")
 
 
-def _figure(row: RestsOn) -> str:
+def _figure(row: Sensitivity) -> str:
     """A short name of the figure, and how far it moves."""
     name = row.figure.replace("residual vibration", "residual").replace("contour error", "contour")
     return f"{name.partition(' of ')[0]} " + f"{row.figure_um:.1f} → {row.moved_um:.1f}".replace(" ", NO_BREAK)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program import MM_PER_INCH, Program, located_error
-from shapegcode.program.reading import require_memory
+from shapegcode.program.computer import require_memory
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -12,13 +12,8 @@ from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode._core import ProgramError
-from shapegcode.program.reading import (
-    Reading,
-    is_program_text,
-    program_bytes,
-    require_memory_for_lines,
-    signs_of_turning,
-)
+from shapegcode.program.computer import require_memory_for_lines
+from shapegcode.program.reading import Reading, is_program_text, program_bytes, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
 
@@ -210,6 +205,18 @@ class Program:
                 f"{self.source} was read with other settings than those of the machine {machine.name}: "
                 f"{'; '.join(differences)}; read it with that machine: machine= of Program.read or Program.from_text"
             )
+
+    def refuse_shaped(self, remedy: str) -> None:
+        """Refuse a program that shapegcode has shaped.
+
+        Args:
+            remedy: what to do instead.
+
+        Raises:
+            ProgramError: its header says so.
+        """
+        if self.stamp is not None:
+            raise ProgramError(f"{self.source}:1:1: shaped by shapegcode already (its header says so): {remedy}")
 
     @property
     def text(self) -> bytes:

@@ -77,9 +77,9 @@ def simulate(
     nominal, verdict = {}, None
     if against is not None:
         against = given_program(against, machine)
-        pairs = paired_regions(program, against)
+        pairs = list(paired_regions(program, against))
         nominal = {mine.first_line: other.path for mine, other in pairs if not mine.path.moves_as(other.path)}
-        verdict = judge_program(program, against, machine, shaped=shaped)
+        verdict = judge_program(program, against, pairs, model, shaped=shaped)
     runs: list[RegionRun] = []
     simulated: list[_core.PlaybackFigures] = []
     of_shaped: list[_core.PlaybackFigures] = []

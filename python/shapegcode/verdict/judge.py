@@ -15,13 +15,11 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import RoundTripError
-from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
-from shapegcode.program.compensation import paired_regions
+from shapegcode.program.computer import cores
 from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_xyz_um
 from shapegcode.results.result import Pair, Xyz
-from shapegcode.verdict.ahead import cores
 from shapegcode.verdict.cases import (
     ALL_MODES,
     BLOCK_ENDS,
@@ -395,12 +393,16 @@ Vector = npt.NDArray[np.float64]
 
 
 def judge_program(
-    emitted: Program, original: Program, machine: Machine, *, shaped: bool | None = None
+    emitted: Program,
+    original: Program,
+    pairs: Sequence[tuple[_core.Region, _core.Region]],
+    model: MachineModel,
+    *,
+    shaped: bool | None = None,
 ) -> ProgramFigures:
-    """An emitted program judged in the operating conditions that count, as `convert` judges its own."""
-    model = MachineModel(machine)
+    """Judge an emitted program, its cuts paired with the original's, in the operating conditions that count."""
+    machine = model.machine
     judge = Judge(model, [case for case in stated_cases(machine) if case.counts or case.nominal])
-    pairs = list(paired_regions(emitted, original))
     is_shaped = [mine.shaped if shaped is None else shaped for mine, _ in pairs]
     placed = [Placed(region, mine.first_line, mine.last_line, mine.path) for mine, region in pairs]
     with ThreadPoolExecutor(max_workers=cores()) as pool:
