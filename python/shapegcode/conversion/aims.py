@@ -270,15 +270,10 @@ _FLAT = 0.002  # of the time: a curve that falls by less has no knee
 
 @dataclass(frozen=True)
 class CutCurve:
-    """Time of one shaped cut over the deviation that it is planned for.
+    """Time of one shaped cut over the deviation that it is planned for."""
 
-    Attributes:
-        planned_um: ascending; the last is what it reaches without slowing.
-        times_s: of the shaped command at each, descending.
-    """
-
-    planned_um: tuple[float, ...]
-    times_s: tuple[float, ...]
+    planned_um: tuple[float, ...]  # ascending; the last is what it reaches without slowing
+    times_s: tuple[float, ...]  # of the shaped command at each, descending
 
     @property
     def loosest_um(self) -> float:

@@ -86,17 +86,11 @@ class Budget:
 
 @dataclass(frozen=True)
 class TransferLoad:
-    """What a shaped region asks of memory, line and control.
+    """What a shaped region asks of memory, line and control."""
 
-    Attributes:
-        extra_bytes: size of its text less that of the original's.
-        baud: what its section with the most blocks per second needs of the line, bit/s.
-        blocks_per_second: blocks in its busiest stretch.
-    """
-
-    extra_bytes: int
-    baud: float
-    blocks_per_second: float
+    extra_bytes: int  # size of its text less that of the original's
+    baud: float  # what its section with the most blocks per second needs of the line, bit/s
+    blocks_per_second: float  # blocks in its busiest stretch
 
 
 @dataclass(frozen=True)

@@ -32,17 +32,11 @@ Progress = Callable[[str, float, int], None]
 
 @dataclass(frozen=True)
 class CutChoice:
-    """What the caller chose.
+    """What the caller chose."""
 
-    Attributes:
-        not_shaped: why a cut is not to be shaped, by its index.
-        shape_all: shape whatever can be shaped.
-        tolerance_curve: work out what other tolerances would cost.
-    """
-
-    not_shaped: dict[int, str]
-    shape_all: bool
-    tolerance_curve: bool
+    not_shaped: dict[int, str]  # why a cut is not to be shaped, by its index
+    shape_all: bool  # shape whatever can be shaped
+    tolerance_curve: bool  # work out what other tolerances would cost
 
 
 @dataclass(frozen=True)

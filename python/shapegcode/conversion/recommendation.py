@@ -59,22 +59,14 @@ LEAST_BETTER = 0.3
 
 @dataclass(frozen=True)
 class Situation:
-    """What the grade is decided by.
+    """What the grade is decided by."""
 
-    Attributes:
-        cuts: all of the program, shaped or left unchanged.
-        shaped: how many of them are shaped.
-        original_within: every cut of the original keeps its limits.
-        could_gain: there is a cut in which shaping gains, or as far as is known would gain, the least gain.
-        benefit: a shaped cut gains enough, see `benefits`.
-        other_changes: what else differs from the original; none, unless shapegcode has a defect.
-    """
-
-    cuts: Sequence[RegionVerdict]
-    shaped: int
-    original_within: bool
-    could_gain: bool
-    benefit: bool
+    cuts: Sequence[RegionVerdict]  # all of the program, shaped or left unchanged
+    shaped: int  # how many of them are shaped
+    original_within: bool  # every cut of the original keeps its limits
+    could_gain: bool  # there is a cut in which shaping gains, or as far as is known would gain, the least gain
+    benefit: bool  # a shaped cut gains enough, see `benefits`
+    # what else differs from the original; none, unless shapegcode has a defect
     other_changes: Sequence[ProgramDifference] = ()
 
 

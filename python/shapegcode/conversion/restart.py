@@ -38,44 +38,26 @@ _TOOL, _CHANGE = re.compile(rb"T *([0-9]+)"), re.compile(rb"M *0*6(?![0-9])")
 
 @dataclass(frozen=True)
 class RestartMark:
-    """A restart point in the text of a region.
+    """A restart point in the text of a region."""
 
-    Attributes:
-        byte: of its N word, from the begin of the text.
-        line: of it, 0 for the first one of the text.
-        time_s: from the begin of the shaped blocks.
-        position_mm: where its block begins.
-        speed_mm_per_s: of the shaped command there.
-        vibration_um: amplitude that a start from rest leaves there, in the slowest mode of each axis.
-        number: N; 0 before the program is put together.
-    """
-
-    byte: int
-    line: int
-    time_s: float
-    position_mm: tuple[float, float, float]
-    speed_mm_per_s: float
-    vibration_um: float
-    number: int = 0
+    byte: int  # of its N word, from the begin of the text
+    line: int  # of it, 0 for the first one of the text
+    time_s: float  # from the begin of the shaped blocks
+    position_mm: tuple[float, float, float]  # where its block begins
+    speed_mm_per_s: float  # of the shaped command there
+    vibration_um: float  # amplitude that a start from rest leaves there, in the slowest mode of each axis
+    number: int = 0  # N; 0 before the program is put together
 
 
 @dataclass(frozen=True)
 class CutRestarts:
-    """Restart points of a region, and what there is to say about them.
+    """Restart points of a region, and what there is to say about them."""
 
-    Attributes:
-        marks: in their order.
-        longest_s: longest time without one.
-        reason: why there can be none; empty: there can.
-        stops: how many of them are stops that were put in for them.
-        stops_s: what these add to the cutting time.
-    """
-
-    marks: tuple[RestartMark, ...] = ()
-    longest_s: float = 0.0
-    reason: str = ""
-    stops: int = 0
-    stops_s: float = 0.0
+    marks: tuple[RestartMark, ...] = ()  # in their order
+    longest_s: float = 0.0  # longest time without one
+    reason: str = ""  # why there can be none; empty: there can
+    stops: int = 0  # how many of them are stops that were put in for them
+    stops_s: float = 0.0  # what these add to the cutting time
 
 
 @dataclass(frozen=True)

@@ -30,23 +30,14 @@ def percent(change: float) -> str:
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """One line of the table: a figure of both programs, or of the emitted one alone.
+    """One line of the table: a figure of both programs, or of the emitted one alone."""
 
-    Attributes:
-        figure: what it is.
-        unit: its unit.
-        original: figure of the original program; None where there is none.
-        emitted: figure of the emitted program.
-        digits: behind the point.
-        limit: what the emitted figure is judged by; None where it is not judged.
-    """
-
-    figure: str
-    unit: str
-    original: float | None
-    emitted: float
-    digits: int = 1
-    limit: float | None = None
+    figure: str  # what it is
+    unit: str  # its unit
+    original: float | None  # figure of the original program; None where there is none
+    emitted: float  # figure of the emitted program
+    digits: int = 1  # behind the point
+    limit: float | None = None  # what the emitted figure is judged by; None where it is not judged
 
     @property
     def change(self) -> str:

@@ -73,36 +73,23 @@ def why_off_grid(program: Program, region: _core.Region, machine: Machine) -> st
 
 @dataclass(frozen=True)
 class Written:
-    """The emitted text before it is judged.
+    """The emitted text before it is judged."""
 
-    Attributes:
-        parts: of the whole text; empty once it was read back.
-        texts: those of its shaped regions, and the byte at which each begins.
-        size: bytes of the whole text.
-        placed: its shaped regions.
-        blocks: shaped blocks in it.
-        kept_warnings: a sentence for every region that is left unchanged.
-        planned_um: per index of a shaped region the deviation that its feed was planned for, µm, where the contour is
-            kept by a target.
-        loads: per index of a shaped region what it asks of memory, line and control.
-        no_room: per index of a region that was to be shaped and is left unchanged why there is no room for it.
-        unslowed: indices of shaped cuts that their contour tolerance does not slow.
-        durations_s: per index of a shaped cut the time of its blocks.
-        restarts: of each shaped region, as in `placed`.
-    """
-
-    parts: list[bytes]
-    texts: list[tuple[RegionText, int]]
-    size: int
-    placed: list[Placed]
-    blocks: int
-    kept_warnings: list[str]
+    parts: list[bytes]  # of the whole text; empty once it was read back
+    texts: list[tuple[RegionText, int]]  # those of its shaped regions, and the byte at which each begins
+    size: int  # bytes of the whole text
+    placed: list[Placed]  # its shaped regions
+    blocks: int  # shaped blocks in it
+    kept_warnings: list[str]  # a sentence for every region that is left unchanged
+    # per index of a shaped region the deviation that its feed was planned for, µm, where the contour is kept by a
+    # target
     planned_um: dict[int, float]
-    loads: dict[int, TransferLoad]
+    loads: dict[int, TransferLoad]  # per index of a shaped region what it asks of memory, line and control
+    # per index of a region that was to be shaped and is left unchanged why there is no room for it
     no_room: dict[int, str]
-    unslowed: set[int]
-    durations_s: dict[int, float]
-    restarts: list[CutRestarts]
+    unslowed: set[int]  # indices of shaped cuts that their contour tolerance does not slow
+    durations_s: dict[int, float]  # per index of a shaped cut the time of its blocks
+    restarts: list[CutRestarts]  # of each shaped region, as in `placed`
 
     def read_back(self, machine: Machine) -> Program:
         """Read the text and hold it against the original; from then on it stands in the program that is given."""

@@ -10,17 +10,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Habit:
-    """One caution.
+    """One caution."""
 
-    Attributes:
-        topic: what it is about, in a word or two.
-        comment: for programs: capitals, 60 characters at most.
-        sentence: the same for people who read.
-    """
-
-    topic: str
-    comment: str
-    sentence: str
+    topic: str  # what it is about, in a word or two
+    comment: str  # for programs: capitals, 60 characters at most
+    sentence: str  # the same for people who read
 
 
 OVERRIDE = Habit(

@@ -41,24 +41,15 @@ _NOT_READ = ("compensation", "material_side")
 
 @dataclass(frozen=True)
 class Reading:
-    """How a program was read.
+    """How a program was read."""
 
-    Attributes:
-        machine: whose controller read it.
-        emitted: shapegcode wrote the text: its arcs are FANUC's, whatever the original's were.
-        keeps_calls: shapegcode has just written it: every call in it was kept.
-        probe_lines: ascending line numbers behind which the modal state is kept.
-        expand_compensation: G41/G42 became plain moves.
-        collect_alarms: the reader went on behind an alarm.
-        called: name and text of programs in other files that it calls, by O number; found when it was read.
-    """
-
-    machine: Machine
-    emitted: bool = False
-    keeps_calls: bool = False
-    probe_lines: tuple[int, ...] = ()
-    expand_compensation: bool = True
-    collect_alarms: bool = False
+    machine: Machine  # whose controller read it
+    emitted: bool = False  # shapegcode wrote the text: its arcs are FANUC's, whatever the original's were
+    keeps_calls: bool = False  # shapegcode has just written it: every call in it was kept
+    probe_lines: tuple[int, ...] = ()  # ascending line numbers behind which the modal state is kept
+    expand_compensation: bool = True  # G41/G42 became plain moves
+    collect_alarms: bool = False  # the reader went on behind an alarm
+    # name and text of programs in other files that it calls, by O number; found when it was read
     called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
     def options(self, folders: Sequence[Path]) -> _core.ReaderOptions:

@@ -19,22 +19,15 @@ _RETURNS, _ENDS = re.compile(rb"M *0*99(?!\d)"), re.compile(rb"M *0*(?:2|30)(?!\
 
 @dataclass(frozen=True)
 class ProgramPlace:
-    """One program of a file.
+    """One program of a file."""
 
-    Attributes:
-        index: how many programs stand before it.
-        address: what picks this one and no other: its number ``O0001``, its name ``<PART>``, either behind its folder
-            (``/USER/O0001``) where it stands in several; ``#3``, the third one, where nothing else tells them apart.
-        first_line: from 1.
-        text_begin: byte at which its lines begin.
-        text_end: byte behind them.
-    """
-
-    index: int
+    index: int  # how many programs stand before it
+    # what picks this one and no other: its number ``O0001``, its name ``<PART>``, either behind its folder
+    # (``/USER/O0001``) where it stands in several; ``#3``, the third one, where nothing else tells them apart
     address: str
-    first_line: int
-    text_begin: int
-    text_end: int
+    first_line: int  # from 1
+    text_begin: int  # byte at which its lines begin
+    text_end: int  # byte behind them
 
 
 def is_subprogram(text: bytes) -> bool:

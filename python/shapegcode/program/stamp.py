@@ -54,31 +54,18 @@ _LINE_HEAD = re.compile(rb"(\n(?:/\d?)?)(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
 
 @dataclass(frozen=True)
 class Stamp:
-    """What the header of an emitted program says; texts are as a comment holds them.
+    """What the header of an emitted program says; texts are as a comment holds them."""
 
-    Attributes:
-        version: of shapegcode.
-        machine: its name.
-        modes: such as "X 46 HZ 0.02", in the order of the machine file.
-        block_period_ms: of the shaped blocks.
-        shaper_ms: duration of the shaper.
-        family: of the shaper; empty: not said.
-        own_filter: how the control itself smooths shaped blocks, such as "24 MS" or "48 MS BELL 24 MS".
-        mark: of the text, see `text_mark`; eight zeros: not yet known.
-        override: which of `OVERRIDES` the text is for.
-        notes: further lines.
-    """
-
-    version: str
-    machine: str
-    modes: tuple[str, ...]
-    block_period_ms: str
-    shaper_ms: str
-    family: str
-    own_filter: str
-    mark: str = _NO_MARK
-    override: str = "ask"
-    notes: tuple[str, ...] = ()
+    version: str  # of shapegcode
+    machine: str  # its name
+    modes: tuple[str, ...]  # such as "X 46 HZ 0.02", in the order of the machine file
+    block_period_ms: str  # of the shaped blocks
+    shaper_ms: str  # duration of the shaper
+    family: str  # of the shaper; empty: not said
+    own_filter: str  # how the control itself smooths shaped blocks, such as "24 MS" or "48 MS BELL 24 MS"
+    mark: str = _NO_MARK  # of the text, see `text_mark`; eight zeros: not yet known
+    override: str = "ask"  # which of `OVERRIDES` the text is for
+    notes: tuple[str, ...] = ()  # further lines
 
     def lines(self) -> list[str]:
         """The header, its verdict still open."""

@@ -34,27 +34,17 @@ _QUANTITIES = {"command": "contour error of the command", "response": "contour e
 
 @dataclass(frozen=True)
 class Case:
-    """One operating condition of the emitted program.
+    """One operating condition of the emitted program."""
 
-    Attributes:
-        name: in words, unique.
-        block_end: "ceil" or "carry"; None where look-ahead plans the blocks anew.
-        counts: it lies in the stated band.
-        override: feed override, 1 = 100 %.
-        mode: the mode that is off its frequency ("x.1": first of the X axis, as in the machine file), "all", or None.
-        shift: by how many of its stated uncertainties, -1 or +1.
-        look_ahead: the controller's look-ahead stays on.
-        starved_s: time for which the block buffer is empty once; 0: never.
-    """
-
-    name: str
-    block_end: str | None
-    counts: bool
-    override: float = 1.0
+    name: str  # in words, unique
+    block_end: str | None  # "ceil" or "carry"; None where look-ahead plans the blocks anew
+    counts: bool  # it lies in the stated band
+    override: float = 1.0  # feed override, 1 = 100 %
+    # the mode that is off its frequency ("x.1": first of the X axis, as in the machine file), "all", or None
     mode: str | None = None
-    shift: float = 0.0
-    look_ahead: bool = False
-    starved_s: float = 0.0
+    shift: float = 0.0  # by how many of its stated uncertainties, -1 or +1
+    look_ahead: bool = False  # the controller's look-ahead stays on
+    starved_s: float = 0.0  # time for which the block buffer is empty once; 0: never
 
     @property
     def nominal(self) -> bool:
@@ -73,51 +63,31 @@ class Case:
 
 @dataclass(frozen=True)
 class CaseFigures:
-    """One region simulated in one operating condition.
+    """One region simulated in one operating condition."""
 
-    Attributes:
-        residual_mm: largest |table - command| while the set-points rest, (3,).
-        command: deviation of the command; None: not measured.
-        response: deviation of the table; None: not measured.
-        time_s: until the set-points rest.
-    """
-
-    residual_mm: Vector
-    command: Deviation | None
-    response: Deviation | None
-    time_s: float
+    residual_mm: Vector  # largest |table - command| while the set-points rest, (3,)
+    command: Deviation | None  # deviation of the command; None: not measured
+    response: Deviation | None  # deviation of the table; None: not measured
+    time_s: float  # until the set-points rest
 
 
 @dataclass(frozen=True)
 class RegionLimits:
-    """What a region is judged by.
+    """What a region is judged by."""
 
-    Attributes:
-        residual_um: per axis, (3,).
-        contour_um: of the targeted deviation.
-        target: which deviation: of the command, or of the table (response).
-    """
-
-    residual_um: Vector
-    contour_um: float
-    target: Target = "command"
+    residual_um: Vector  # per axis, (3,)
+    contour_um: float  # of the targeted deviation
+    target: Target = "command"  # which deviation: of the command, or of the table (response)
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A figure of a case beside its limit, missed or not.
+    """A figure of a case beside its limit, missed or not."""
 
-    Attributes:
-        figure: what it is.
-        value_um: how much.
-        limit_um: how much is allowed.
-        decimals: digits that are worth reading.
-    """
-
-    figure: str
-    value_um: float
-    limit_um: float
-    decimals: int = 2
+    figure: str  # what it is
+    value_um: float  # how much
+    limit_um: float  # how much is allowed
+    decimals: int = 2  # digits that are worth reading
 
     @property
     def share(self) -> float:
@@ -281,41 +251,25 @@ BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 
 @dataclass(frozen=True)
 class SimulatedCase:
-    """An operating condition that was simulated.
+    """An operating condition that was simulated."""
 
-    Attributes:
-        run: its figures.
-        cut_s: how much longer all blocks take in it than at 100 %, before any filter, where only their end was
-            simulated; else 0.
-    """
-
-    run: _core.PlaybackFigures
+    run: _core.PlaybackFigures  # its figures
+    # how much longer all blocks take in it than at 100 %, before any filter, where only their end was simulated; else 0
     cut_s: float
 
 
 @dataclass(frozen=True)
 class CaseSimulation:
-    """Simulates one emitted region; every method is a task of its own.
+    """Simulates one emitted region; every method is a task of its own."""
 
-    Attributes:
-        blocks: what was emitted.
-        path: what was programmed.
-        model: the machine for the core.
-        cases: in which it is simulated.
-        target: what the contour tolerance is about.
-        offset: from the region's positions to the machine's.
-        tracker: of the programmed path.
-        increment_mm: least increment of the text.
-    """
-
-    blocks: _core.Path
-    path: _core.Path
-    model: MachineModel
-    cases: Sequence[Case]
-    target: Target
-    offset: Offset
-    tracker: _core.ContourTracker
-    increment_mm: float
+    blocks: _core.Path  # what was emitted
+    path: _core.Path  # what was programmed
+    model: MachineModel  # the machine for the core
+    cases: Sequence[Case]  # in which it is simulated
+    target: Target  # what the contour tolerance is about
+    offset: Offset  # from the region's positions to the machine's
+    tracker: _core.ContourTracker  # of the programmed path
+    increment_mm: float  # least increment of the text
 
     def nominal(self, rule: _core.BlockEnd) -> _core.PlaybackFigures:
         """Blocks at 100 %; under the controller's own rule also with an empty buffer where a stop excites most."""

@@ -15,19 +15,12 @@ from shapegcode.results.result import Pair, Xyz
 
 @dataclass(frozen=True)
 class Placed:
-    """A region and where its shaped blocks stand in the emitted text.
+    """A region and where its shaped blocks stand in the emitted text."""
 
-    Attributes:
-        region: of the original program.
-        first_line: first emitted line, from 1.
-        last_line: last emitted line.
-        path: the shaped blocks; None: those of these lines.
-    """
-
-    region: _core.Region
-    first_line: int
-    last_line: int
-    path: _core.Path | None = None
+    region: _core.Region  # of the original program
+    first_line: int  # first emitted line, from 1
+    last_line: int  # last emitted line
+    path: _core.Path | None = None  # the shaped blocks; None: those of these lines
 
     @property
     def original_lines(self) -> tuple[int, int]:

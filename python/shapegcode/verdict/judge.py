@@ -55,21 +55,15 @@ Step = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class RegionFigures:
-    """One cut simulated: as programmed, and as emitted in every operating condition of the verdict.
+    """One cut simulated: as programmed, and as emitted in every operating condition of the verdict."""
 
-    Attributes:
-        original: the programmed path under the controller's own motion.
-        emitted: shaped blocks under both rules of block end (ceil, carry); a cut left unchanged once.
-        cases: one entry per operating condition; None: not simulated for a cut left unchanged.
-        slowed_blocks: emitted blocks that the controller's look-ahead limits would slow.
-        is_shaped: False: the cut was left unchanged.
-    """
-
-    original: _core.PlaybackFigures
+    original: _core.PlaybackFigures  # the programmed path under the controller's own motion
+    # shaped blocks under both rules of block end (ceil, carry); a cut left unchanged once
     emitted: tuple[_core.PlaybackFigures, ...]
+    # one entry per operating condition; None: not simulated for a cut left unchanged
     cases: tuple[CaseFigures | None, ...]
-    slowed_blocks: int
-    is_shaped: bool = True
+    slowed_blocks: int  # emitted blocks that the controller's look-ahead limits would slow
+    is_shaped: bool = True  # False: the cut was left unchanged
 
     @property
     def feed_excess(self) -> FeedExcess | None:
@@ -87,21 +81,13 @@ class RegionFigures:
 
 @dataclass(frozen=True)
 class PendingSimulations:
-    """The simulations of one emitted region under way.
+    """The simulations of one emitted region under way."""
 
-    Attributes:
-        player: whose tasks they are.
-        nominal: under both rules of block end.
-        planned: with the look-ahead left on.
-        others: the other cases, in groups.
-        slowed: blocks that the look-ahead limits would slow.
-    """
-
-    player: CaseSimulation
-    nominal: Sequence[Future[_core.PlaybackFigures]]
-    planned: Future[_core.PlaybackFigures | None]
-    others: Sequence[Future[dict[str, SimulatedCase]]]
-    slowed: Future[int]
+    player: CaseSimulation  # whose tasks they are
+    nominal: Sequence[Future[_core.PlaybackFigures]]  # under both rules of block end
+    planned: Future[_core.PlaybackFigures | None]  # with the look-ahead left on
+    others: Sequence[Future[dict[str, SimulatedCase]]]  # the other cases, in groups
+    slowed: Future[int]  # blocks that the look-ahead limits would slow
 
 
 class Judge:

@@ -119,19 +119,12 @@ Vector = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """One step between two cuts, in time.
+    """One step between two cuts, in time."""
 
-    Attributes:
-        motion_s: until the set-points rest, s.
-        arrival_s: wait for in-position behind them, s.
-        settling_s: from the end of the set-points until the table stays within the band, s.
-        command_mm: set-points, one per period, (n, 3); a pause has one.
-    """
-
-    motion_s: float
-    arrival_s: float
-    settling_s: float
-    command_mm: Vector
+    motion_s: float  # until the set-points rest, s
+    arrival_s: float  # wait for in-position behind them, s
+    settling_s: float  # from the end of the set-points until the table stays within the band, s
+    command_mm: Vector  # set-points, one per period, (n, 3); a pause has one
 
     @property
     def clock_s(self) -> float:
