@@ -38,14 +38,7 @@ class _Attempt:
 
 
 class Aims:
-    """Tolerance, feed and price of every cut of one conversion.
-
-    Args:
-        program: the original.
-        machine: its tolerances and prices.
-        reasons: why a cut is left unchanged, per cut; empty: it is shaped. Changed here.
-        curve_of: time of a cut over its tolerance, by its index.
-    """
+    """Tolerance, feed and price of every cut of one conversion."""
 
     def __init__(
         self, program: Program, machine: Machine, reasons: list[str], curve_of: Callable[[int], CutCurve]
@@ -53,7 +46,7 @@ class Aims:
         count = len(program.regions)
         self._machine, self._curve_of = machine, curve_of
         self._places = {id(region): index for index, region in enumerate(program.regions)}
-        self.reasons = reasons
+        self.reasons = reasons  # why a cut is left unchanged; empty: it is shaped; changed here
         self._asked_um = machine.tolerance.contour_um
         self.room_um = [machine.tolerance.contour_um * MARGIN] * count
         """Deviation that its feed is planned for."""
@@ -414,5 +407,5 @@ def curve_table(curve: ToleranceCurve) -> Table:
 
 
 def _remark(point: TolerancePoint) -> str:
-    said = (["knee"] if point.is_knee else []) + ([] if point.is_within_price else ["above the price"])
-    return ", ".join(said)
+    remarks = (["knee"] if point.is_knee else []) + ([] if point.is_within_price else ["above the price"])
+    return ", ".join(remarks)

@@ -139,7 +139,7 @@ def choose_block_period(plan: ConversionPlan) -> None:
     """Another grid where a budget limits the rate of the line."""
     spending = plan.spending
     if spending is not None and spending.budget.limits_rate and not plan.fixed_period:
-        weights = [float(play.result().residual_mm.max()) for play in plan.originals]
+        weights = [float(original.result().residual_mm.max()) for original in plan.originals]
         plan.grid = spending.choose_period(plan.grid, weights, plan.grid_for, partial(write, plan))
 
 
@@ -167,9 +167,9 @@ def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     plan.use_grid(grid)
     # Of what was given up for a budget, or is left unchanged by choice, the table of cuts speaks.
     given_up = {} if plan.spending is None else plan.spending.given_up
-    untold = {*given_up, *plan.left, *plan.aims.emitted_s}
+    unreported = {*given_up, *plan.left, *plan.aims.emitted_s}
     on_progress = partial(plan.on_progress, stage) if stage else lambda _done, _total: None
-    written = plan.writer.write(plan.reasons, plan.aims.room_um, plan.aims.feed_ratio, untold, on_progress)
+    written = plan.writer.write(plan.reasons, plan.aims.room_um, plan.aims.feed_ratio, unreported, on_progress)
     for index, reason in written.no_room.items():
         plan.reasons[index] = reason
     plan.curves.note(written)
@@ -204,12 +204,12 @@ def simulate(plan: ConversionPlan, text: ReadBack, *, ahead: bool = False) -> Sh
     placed, trackers = text.written.placed, text.trackers
     indices = [plan.aims.index(place.region) for place in placed]
     places = [placed[rank] for rank in trackers]
-    playing = plan.judge.begin(text.emitted, places, list(trackers.values()), plan.pool)
+    running = plan.judge.begin(text.emitted, places, list(trackers.values()), plan.pool)
     started: StartedTrials = {}
     if ahead and cores() > 1 and len(placed) == len(trackers) == 1:
         started = start_trials(plan.judge, plan.machine, places[0], text.emitted, trackers[0], plan.pool)
     originals = [plan.originals[indices[rank]] for rank in trackers]
-    found = plan.judge.figures(playing, originals, partial(plan.on_progress, "round trip"))
+    found = plan.judge.figures(running, originals, partial(plan.on_progress, "round trip"))
     for rank, figures in zip(trackers, found, strict=True):
         plan.simulated[indices[rank]] = text.written.texts[rank][0], figures
     return Shaped(

@@ -55,8 +55,8 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
     turning = [row.key for row in conversion.rests_on if row.moved_um > row.limit_um]
     if turning:
         return "amber", f"an unverified parameter of this machine could change the verdict: {turning[0]}"
-    if said := len(conversion.warnings):
-        return "amber", f"{said} warning{'s' if said > 1 else ''} to settle first"
+    if count := len(conversion.warnings):
+        return "amber", f"{count} warning{'s' if count > 1 else ''} to resolve first"
     return "green", f"every tolerance is kept in all {sum(case.counts for case in conversion.cases)} cases that count"
 
 
@@ -197,12 +197,12 @@ def _cases(conversion: Conversion) -> Section:
 def _case(rank: int, case: CaseVerdict, axes: list[str], conversion: Conversion) -> HeatRow:
     errors = (case.contour_error_um.command, case.contour_error_um.response)
     share = None if case.share_of_limit is None else case.share_of_limit * 100.0
-    judged = ("command", "response").index(conversion.limits.contour_target)
+    target_rank = ("command", "response").index(conversion.limits.contour_target)
     limit = conversion.limits.contour_um
     shares: list[float | None] = [None, None]
-    error = errors[judged]
+    error = errors[target_rank]
     if error is not None and limit > 0.0:
-        shares[judged] = error / limit
+        shares[target_rank] = error / limit
     residuals: list[float | None] = []
     for axis in axes:
         bound = conversion.residual_limit_um(axis)

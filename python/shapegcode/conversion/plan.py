@@ -161,9 +161,9 @@ class ConversionPlan:
     def _leave_what_has_nothing_to_gain(self) -> None:
         """Where the original vibrates and errs by less than the least gain, shaping is not even tried."""
         least = self.machine.shaping.least_gain_um
-        for index, (reason, play) in enumerate(zip(self.reasons, self.originals, strict=True)):
+        for index, (reason, original) in enumerate(zip(self.reasons, self.originals, strict=True)):
             if not reason and keepable(self.program.regions[index], self.machine):
-                most = most_to_gain_um(play.result())
+                most = most_to_gain_um(original.result())
                 if most < least:
                     self.leave(index, f"nothing there to gain: {most:.1f} µm", most)
 

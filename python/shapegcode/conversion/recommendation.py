@@ -16,7 +16,7 @@ from shapegcode.machine.controller import Controller
 from shapegcode.machine.output import Tolerance
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
-from shapegcode.program.operating import no_room
+from shapegcode.program.stamp import no_room
 from shapegcode.verdict.figures import Placed, ProgramFigures, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures
 
@@ -203,7 +203,7 @@ def open_axes(program: Program, machine: Machine) -> list[str]:
         for rank, (letter, axis) in enumerate(zip("xyz", machine.axes.as_tuple(), strict=True))
         if not axis.modes
         and not (axis.rigid and f"axes.{letter}.rigid" in stated)
-        and any(ways[rank] > 0.0 for ways in reach)
+        and any(extent_mm[rank] > 0.0 for extent_mm in reach)
     ]
 
 

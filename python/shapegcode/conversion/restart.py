@@ -32,8 +32,6 @@ _FIRST_NUMBER, _END_NUMBER = 10_000, 100_000  # five digits, as `PLACEHOLDER`
 _ROUND = 1000
 _CHUNK = 1 << 20  # bytes
 _N_WORD = re.compile(rb"N *0*([0-9]{1,8})")
-_COMMENT = re.compile(rb"\([^()\r\n]*\)")
-_TOOL, _CHANGE = re.compile(rb"T *([0-9]+)"), re.compile(rb"M *0*6(?![0-9])")
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,7 @@ class RestartPoint:
         speed_mm_per_s: of the shaped command there.
         vibration_um: amplitude that a start from rest leaves there.
         coordinate_system: such as "G54" or "G54.1P3".
-        tool: T number in the spindle; null: no tool change before the cut.
+        tool: T number in the spindle; null: the program names none before it.
         length_offset: H number in force; null: none.
         spindle_rev_per_min: in force; null: none programmed.
     """
@@ -92,11 +90,7 @@ class RestartPoint:
 
 
 class FreeNumbers:
-    """N numbers for restart points that a program does not use itself.
-
-    Args:
-        program: the original; its N words are looked for when the first number is asked for.
-    """
+    """N numbers for restart points that a program does not use itself."""
 
     def __init__(self, program: Program) -> None:
         self._program = program
@@ -133,9 +127,8 @@ def system_of(state: _core.ModalState) -> str:
     return f"G54.1P{state.coordinate_number}" if extra else f"G{state.coordinate_system}"
 
 
-def restart_points(program: Program, places: Iterable[tuple[Placed, CutRestarts]]) -> tuple[RestartPoint, ...]:
-    """The restart points of a program, with what is in force at each."""
-    tools = _Tools(program)
+def restart_points(cuts: Iterable[tuple[Placed, CutRestarts, int | None]]) -> tuple[RestartPoint, ...]:
+    """The restart points of a program, with what is in force at each; the third of a cut is its tool."""
     return tuple(
         RestartPoint(
             number=mark.number,
@@ -146,33 +139,13 @@ def restart_points(program: Program, places: Iterable[tuple[Placed, CutRestarts]
             speed_mm_per_s=mark.speed_mm_per_s,
             vibration_um=mark.vibration_um,
             coordinate_system=system_of(place.region.entry),
-            tool=tools.before(place.region),
+            tool=tool,
             length_offset=place.region.entry.length_number if place.region.entry.length_offset != 49 else None,
             spindle_rev_per_min=place.region.entry.spindle_rev_per_min or None,
         )
-        for place, restarts in places
+        for place, restarts, tool in cuts
         for mark in restarts.marks
     )
-
-
-class _Tools:
-    """The tool in the spindle, region by region; only regions with restart points ask."""
-
-    def __init__(self, program: Program) -> None:
-        self._core, self._at = program.core, 0
-        self._staged: int | None = None
-        self._tool: int | None = None
-
-    def before(self, region: _core.Region) -> int | None:
-        """T number of the last tool change before a region; regions are asked for in their order."""
-        text = _COMMENT.sub(b"", self._core.slice(self._at, region.text_begin)).upper()
-        self._at = max(self._at, region.text_begin)
-        for line in text.splitlines() if b"T" in text or b"M" in text else ():
-            if word := _TOOL.search(line):
-                self._staged = int(word[1])
-            if _CHANGE.search(line):
-                self._tool = self._staged
-        return self._tool
 
 
 FloatArray = npt.NDArray[np.float64]
@@ -188,13 +161,7 @@ _MOTION, _PLANE, _FEED = (
 
 
 class RestartPlaces:
-    """Chooses restart points of one region while its shaped command is given out.
-
-    Args:
-        region: of the original.
-        machine: whose `emission` says how far apart they may be, and whose slowest modes are looked at.
-        period_s: block period.
-    """
+    """Chooses restart points of one region while its shaped command is given out."""
 
     def __init__(self, region: _core.Region, machine: Machine, period_s: float) -> None:
         self._period_s = period_s
@@ -300,15 +267,7 @@ def block_lines(text: bytes, blocks: int) -> tuple[IntArray, IntArray]:
 
 
 class RegionRestarts:
-    """Writes blocks of a region as restart points while it is written, piece by piece.
-
-    Args:
-        places: where they may be.
-        region: of the original.
-        machine: whose `emission` says how long a line may be.
-        fit: how its motion became blocks.
-        decimals: behind the point of a position.
-    """
+    """Writes blocks of a region as restart points while it is written, piece by piece."""
 
     def __init__(
         self, places: RestartPlaces, region: _core.Region, machine: Machine, fit: _core.FitOptions, decimals: int

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from shapegcode.comparison.result import KindCount, ProgramDifference
 from shapegcode.conversion.aims import ToleranceCurve, curve_table
@@ -27,11 +27,13 @@ from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.figures import CONTOURS, ContourError
 from shapegcode.results.json import Made, exact, hidden, sparse
-from shapegcode.results.page.model import Light, Page, Section
 from shapegcode.results.result import Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table
 from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, ProgramFigures, UsedShaper
+
+if TYPE_CHECKING:
+    from shapegcode.results.page.model import Light, Page, Section
 
 _VIBRATIONS = {"residual_vibration_um": "residual vibration", "peak_vibration_um": "peak vibration"}
 _LEAST_SHOWN_UM = 0.05
@@ -215,14 +217,14 @@ class Conversion(ProgramFigures, Result):
         """What is not within its limits: cuts left unchanged first, with their lines and what would cure it."""
         out = [cut for cut in self.cuts if cut.misses]
         out.sort(key=lambda cut: cut.is_shaped)
-        said = []
+        sentences = []
         for cut in out:
             where = "lines {} to {}".format(*cut.lines)
             how = f"left unchanged ({cut.reason})" if not cut.is_shaped else self._cost_of(cut)
-            said.append(f"{where}: {cut.misses[0]}; {how}{': ' + cut.cure if cut.cure else ''}")
-        if len(said) > 1:
-            said[0] += f" (and {len(said) - 1} further cuts out of their limits)"
-        return said
+            sentences.append(f"{where}: {cut.misses[0]}; {how}{': ' + cut.cure if cut.cure else ''}")
+        if len(sentences) > 1:
+            sentences[0] += f" (and {len(sentences) - 1} further cuts out of their limits)"
+        return sentences
 
     def _cost_of(self, cut: CutOutcome) -> str:
         """Why a shaped cut does not keep its tolerance, as far as its price is the reason."""
@@ -334,8 +336,8 @@ class Conversion(ProgramFigures, Result):
             for statistic, suffix in _DEVIATIONS.items():
                 original, emitted = getattr(both.original, statistic), getattr(both.emitted, statistic)
                 if original is not None and emitted is not None:
-                    judged = (track, statistic) == (self.limits.contour_target, "max")
-                    limit = self.limits.contour_um if judged else None
+                    is_judged = (track, statistic) == (self.limits.contour_target, "max")
+                    limit = self.limits.contour_um if is_judged else None
                     rows.append(BeforeAfter(f"{name}, {suffix}", "µm", original, emitted, limit=limit))
             yield rows
 
@@ -398,8 +400,8 @@ class Conversion(ProgramFigures, Result):
             return page
         # It was read back before it had one.
         *others, last = page.scene.variants
-        told = replace(last, text=self.text.decode("utf-8", "replace"))
-        return replace(page, scene=replace(page.scene, variants=(*others, told)))
+        with_verdict = replace(last, text=self.text.decode("utf-8", "replace"))
+        return replace(page, scene=replace(page.scene, variants=(*others, with_verdict)))
 
     def page_sections(self, made: Made | None = None) -> tuple[Section, ...]:
         """What it gains, what that rests on, where the time goes, and the operator's run sheet.

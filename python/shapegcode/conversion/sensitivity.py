@@ -18,7 +18,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.settings.keys import KeyValue
-from shapegcode.verdict.cases import Case, CaseFigures, Judged, RegionLimits, case_figures, judge_region
+from shapegcode.verdict.cases import Case, CaseFigures, LimitCheck, RegionLimits, case_figures, judge_region
 from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge, RegionFigures
 
@@ -118,7 +118,7 @@ class _Region:
         """What it is judged by."""
         return self.judge.limits(figures, self.place)
 
-    def before(self, figures: RegionFigures) -> dict[str, Judged]:
+    def before(self, figures: RegionFigures) -> dict[str, LimitCheck]:
         """Its judged figures as it is meant to run, under the controller's own rule of block timing."""
         own = figures.emitted[0 if self.judge.own_rule == _core.BlockEnd.ceil else 1]
         return {each.figure: each for each in judge_region(case_figures(own), self.limits(figures))}
@@ -164,16 +164,18 @@ def parameter_sensitivity(
         running.append(pool.submit(region.simulate, trial, contour=left_s >= 0.0) if run is None else run)
     rows = []
     for done, ((region, figures, trial), run) in enumerate(zip(trials, running, strict=True), start=1):
-        judged = judge_region(run.result(), region.limits(figures))
-        rows.append(_sensitivity(trial.value, trial.moved, region.before(figures), judged))
+        checks = judge_region(run.result(), region.limits(figures))
+        rows.append(_sensitivity(trial.value, trial.moved, region.before(figures), checks))
         on_step(done, len(trials))
     rows += _from_cases(machine, deciding, decided)
     return _ranked(rows), len({row.key for row in rows})
 
 
-def _sensitivity(value: KeyValue, moved: str, before: Mapping[str, Judged], judged: Sequence[Judged]) -> Sensitivity:
+def _sensitivity(
+    value: KeyValue, moved: str, before: Mapping[str, LimitCheck], checks: Sequence[LimitCheck]
+) -> Sensitivity:
     """The figure that a value moves furthest towards its limit."""
-    after = max(judged, key=lambda each: each.share - before[each.figure].share)
+    after = max(checks, key=lambda each: each.share - before[each.figure].share)
     unit = f" {value.unit}" if value.unit not in ("", "1") and value.value not in ("not set", "[]") else ""
     shown = "none" if value.value == "[]" else value.value + unit
     origin = "assumed" if value.assumed else value.origin

@@ -157,14 +157,7 @@ class Prefetch(Generic[T]):
 
 
 class TextWriter:
-    """Writes a program with its regions shaped on one grid.
-
-    Args:
-        program: the original.
-        model: of the machine; its file says how text is written.
-        grid: block period and shapers.
-        pool: shapes regions that do not touch each other; the text does not depend on its threads.
-    """
+    """Writes a program with its regions shaped on one grid."""
 
     def __init__(self, program: Program, model: MachineModel, grid: Grid, pool: Executor) -> None:
         self._program = program
@@ -177,14 +170,14 @@ class TextWriter:
         # By region: tolerance and feed for which it was shaped, and what it came to.
         self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
         self._loads: dict[int, TransferLoad] = {}
-        self._begun: tuple[dict[int, Aim], Prefetch[EmittedRegion]] | None = None
+        self._started: tuple[dict[int, Aim], Prefetch[EmittedRegion]] | None = None
 
     def begin(self, reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> None:
         """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain."""
         aims = _aims(reasons, room_um, feed_share)
         if len(aims) < cores():
-            self._begun = aims, self._ahead(aims, lambda _done: None)
-            self._begun[1].start()
+            self._started = aims, self._ahead(aims, lambda _done: None)
+            self._started[1].start()
 
     def options(self, index: int) -> _core.ShapingOptions:
         """How a cut is shaped, but for its tolerance and a lowered feed."""
@@ -197,7 +190,7 @@ class TextWriter:
         reasons: Sequence[str],
         room_um: Sequence[float],
         feed_share: Sequence[float],
-        untold: Collection[int] = (),
+        unreported: Collection[int] = (),
         on_progress: Step = lambda _done, _total: None,
     ) -> Written:
         """The whole text."""
@@ -228,7 +221,7 @@ class TextWriter:
                     shaped = None
                     written.no_room[index] = str(error)
             if shaped is None:
-                if index not in untold:
+                if index not in unreported:
                     written.kept_warnings.append(self._keep(region, written.no_room.get(index, reason)))
                 texts: Sequence[bytes] = [core.slice(region.text_begin, region.text_end)]
                 if index in written.no_room:
@@ -279,11 +272,11 @@ class TextWriter:
 
     def _ahead(self, aims: Mapping[int, Aim], on_moves: Callable[[float], None]) -> Prefetch[EmittedRegion]:
         """Regions under way in the pool; one whose tolerance and feed are as in the text before is not shaped again."""
-        if self._begun is not None and aims.items() <= self._begun[0].items():
-            begun = self._begun[1]
-            begun.on_progress = on_moves
-            self._begun = None
-            return begun
+        if self._started is not None and aims.items() <= self._started[0].items():
+            prefetch = self._started[1]
+            prefetch.on_progress = on_moves
+            self._started = None
+            return prefetch
         regions = self._program.regions
         # None may have more than the whole program; beside the others it may turn out to be too much nevertheless.
         room = self._room(0, 0)

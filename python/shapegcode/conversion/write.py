@@ -33,9 +33,6 @@ class RegionText:
     """The lines of a region: in parts as they were written, then in the program that was made of them.
 
     So a text of a million lines stands in memory once.
-
-    Args:
-        parts: whole lines each.
     """
 
     def __init__(self, parts: Sequence[bytes]) -> None:
@@ -201,13 +198,7 @@ class _BlockBytes:
 
 
 class RegionWriter:
-    """Shapes regions on one grid and writes them.
-
-    Args:
-        model: of the machine; its file says how motion is shaped and text is written.
-        grid: block period and shapers.
-        mark: comment before each region, where the machine file asks for comments.
-    """
+    """Shapes regions on one grid and writes them."""
 
     def __init__(self, model: MachineModel, grid: Grid, mark: str = REGION_MARK) -> None:
         self._machine = model.machine

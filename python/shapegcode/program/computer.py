@@ -63,8 +63,8 @@ def _of_groups() -> list[int | None]:
         own = Path("/proc/self/cgroup").read_text().partition("::")[2].strip().lstrip("/")
         for folder in {_CGROUP / own, _CGROUP}:
             limit = folder / "memory.max"
-            if limit.is_file() and (said := limit.read_text().strip()) != "max":
-                return [int(said) - int((folder / "memory.current").read_text())]
+            if limit.is_file() and (limit_text := limit.read_text().strip()) != "max":
+                return [int(limit_text) - int((folder / "memory.current").read_text())]
     return []
 
 

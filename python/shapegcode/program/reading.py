@@ -253,5 +253,5 @@ def signs_of_turning(text: bytes) -> tuple[int, str] | None:
     if not sure or len(sure) + len(likely) < 2 or _OF_A_MILL.search(code):
         return None
     signs = sorted((*sure, *likely), key=lambda sign: sign[0].start())
-    said = ", ".join(f"{' '.join(found[0].decode('latin-1').split())} ({meaning})" for found, meaning in signs)
-    return code.count(b"\n", 0, signs[0][0].start()) + 1, said
+    sentence = ", ".join(f"{' '.join(found[0].decode('latin-1').split())} ({meaning})" for found, meaning in signs)
+    return code.count(b"\n", 0, signs[0][0].start()) + 1, sentence

@@ -68,10 +68,10 @@ def place_of(text: bytes, wanted: str, source: str) -> int:
     if len(found) == 1:
         return found[0]
     known = ", ".join(places[index].address for index in found) or _listed([place.address for place in places])
-    said = (
+    reason = (
         f"holds several programs {wanted}: say which, {known}" if found else f"holds no program {wanted} (but {known})"
     )
-    raise _core.ProgramError(f"{source}:1:1: the file {said}")
+    raise _core.ProgramError(f"{source}:1:1: the file {reason}")
 
 
 def index_of(text: bytes, wanted: int | str, source: str) -> int | None:

@@ -159,10 +159,10 @@ def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apar
 
 def _style(number: int, curve: FloatArray, polyline: FloatArray) -> dict[str, Any]:
     """Colour and width of a curve; one that oscillates is finer, so that its cycles do not run together."""
-    swings = float(np.nansum(np.linalg.norm(np.diff(curve, axis=0), axis=1)))
-    way = float(np.linalg.norm(np.diff(polyline, axis=0), axis=1).sum())
+    drawn_mm = float(np.nansum(np.linalg.norm(np.diff(curve, axis=0), axis=1)))
+    length_mm = float(np.linalg.norm(np.diff(polyline, axis=0), axis=1).sum())
     style = line_style(number)
-    return style if swings < _SWINGS * way else style | {"linewidth": 0.6}
+    return style if drawn_mm < _SWINGS * length_mm else style | {"linewidth": 0.6}
 
 
 def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: bool) -> str:
@@ -341,10 +341,10 @@ class SimulatedRegion:
     ) -> SimulatedRegion:
         """The region that vibrates most, as the core simulated it."""
         traces = tuple(_trace(label, run, period_s) for label, run in runs.items())
-        said = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
+        parts = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
         if not traces[0].stops:
-            said.append(f"first {traces[0].times_s[-1]:.0f} s of {next(iter(runs.values())).duration_s:.0f} s")
-        return cls(traces, path, "; ".join(said))
+            parts.append(f"first {traces[0].times_s[-1]:.0f} s of {next(iter(runs.values())).duration_s:.0f} s")
+        return cls(traces, path, "; ".join(parts))
 
 
 def _trace(label: str, run: _core.PlaybackFigures, period_s: float) -> Trace:

@@ -81,7 +81,7 @@ class RegionLimits:
 
 
 @dataclass(frozen=True)
-class Judged:
+class LimitCheck:
     """A figure of a case beside its limit, missed or not."""
 
     figure: str  # what it is
@@ -114,12 +114,12 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
             name, damping = f"{axis} {mode.frequency_hz:.4g} Hz", mode.damping_uncertainty_percent
             less = f", damping {-damping:.3g} %" if damping else ""
             if percent := mode.frequency_uncertainty_percent:
-                ways = [(f"{name} {shift * percent:+.3g} %{less}", shift) for shift in (-1.0, 1.0)]
+                variants = [(f"{name} {shift * percent:+.3g} %{less}", shift) for shift in (-1.0, 1.0)]
             elif damping:
-                ways = [(f"{name}{less}", -1.0)]
+                variants = [(f"{name}{less}", -1.0)]
             else:
                 continue
-            found.append((f"{axis.lower()}.{number}", ways))
+            found.append((f"{axis.lower()}.{number}", variants))
     return found
 
 
@@ -143,11 +143,11 @@ def stated_cases(machine: Machine) -> list[Case]:
     ends = sorted({low, high} - {100.0}) if turns else []
     cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, *ends} - {100.0}) if turns]
     modes = _uncertain_modes(machine)
-    for mode, ways in modes:
-        cases += [Case(words, own, band.mode_uncertainty, mode=mode, shift=shift) for words, shift in ways]
+    for mode, variants in modes:
+        cases += [Case(words, own, band.mode_uncertainty, mode=mode, shift=shift) for words, shift in variants]
     if modes:
         together = [(-1.0, "all modes low")]
-        if any(len(ways) > 1 for _, ways in modes):
+        if any(len(variants) > 1 for _, variants in modes):
             together.append((1.0, "all modes high"))
         cases += [Case(words, own, band.mode_uncertainty, mode=ALL_MODES, shift=shift) for shift, words in together]
         cases += [
@@ -161,31 +161,31 @@ def stated_cases(machine: Machine) -> list[Case]:
     return cases
 
 
-def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[Judged]:
+def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[LimitCheck]:
     """Every judged figure of a region in one case, beside its limit: residuals, and the targeted deviation."""
-    judged = [
-        Judged(f"residual vibration {axis}", float(now), float(limit))
+    check = [
+        LimitCheck(f"residual vibration {axis}", float(now), float(limit))
         for axis, now, limit in zip("XYZ", figures.residual_mm * 1e3, limits.residual_um, strict=True)
     ]
     deviation = figures.command if limits.target == "command" else figures.response
     if deviation is not None:
-        judged.append(Judged(_QUANTITIES[limits.target], deviation.largest_mm * 1e3, limits.contour_um, decimals=1))
-    return judged
+        check.append(LimitCheck(_QUANTITIES[limits.target], deviation.largest_mm * 1e3, limits.contour_um, decimals=1))
+    return check
 
 
 def region_misses(
     cases: Sequence[Case], figures: Sequence[CaseFigures | None], limits: RegionLimits
-) -> list[tuple[str, Judged]]:
+) -> list[tuple[str, LimitCheck]]:
     """Every figure of a cut that leaves its limit in a condition that counts: the worst condition of each, in words."""
-    worst: dict[str, tuple[Judged, Case]] = {}
+    worst: dict[str, tuple[LimitCheck, Case]] = {}
     for case, simulated in zip(cases, figures, strict=True):
-        for judged in judge_region(simulated, limits) if case.counts and simulated is not None else ():
-            if judged.figure not in worst or judged.value_um > worst[judged.figure][0].value_um:
-                worst[judged.figure] = (judged, case)
+        for check in judge_region(simulated, limits) if case.counts and simulated is not None else ():
+            if check.figure not in worst or check.value_um > worst[check.figure][0].value_um:
+                worst[check.figure] = (check, case)
     return [
-        (str(judged) if case.nominal else f"{judged} ({case.name})", judged)
-        for judged, case in worst.values()
-        if judged.is_missed
+        (str(check) if case.nominal else f"{check} ({case.name})", check)
+        for check, case in worst.values()
+        if check.is_missed
     ]
 
 

@@ -126,7 +126,7 @@ class _Reader:
             for kind, index, line in core.steps
             if kind == MOVE and moves[index][1] <= 0.0 and moves[index][0].kind == _core.SegmentKind.rapid
         }
-        # The reader gives no move where it does not know the way.
+        # The reader gives no move where it does not know the path.
         taken = {line for kind, _, line in core.steps if kind == MOVE}
         for region in core.regions:
             taken.update(range(region.first_line, region.last_line + 1))
