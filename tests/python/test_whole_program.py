@@ -18,7 +18,7 @@ from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from judge.in_order import Way, deviation_um, missed_um
 from shapegcode import _core
 from shapegcode.conversion.aims import knee_of
-from shapegcode.conversion.recommendation import Situation, recommend
+from shapegcode.conversion.recommendation import recommend
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.result import Pair, Xyz
@@ -309,30 +309,30 @@ WORTH, BETTER, WITHIN, NONE, NOT = (
     "no benefit: run the original", "do not run",
 )  # fmt: skip
 OUT = ["contour 18 um, limit 15 um"]
-#                    cuts                                              shaped within gain  benefit  grade
+#                    cuts                                              within gain  benefit  grade
 SITUATIONS = [
-    ([cut((40.0, 12.0))], 1, False, True, True, WORTH),
-    ([cut((5.0, 5.0), (20.0, 0.5))], 1, False, True, True, WORTH),
-    ([cut((40.0, 12.0)), cut((4.0, 4.0))], 1, False, True, True, WORTH),
-    ([cut((40.0, 18.0), misses=OUT)], 1, False, True, True, BETTER),
-    ([cut((40.0, 12.0)), cut((18.0, 18.0), misses=OUT)], 1, False, True, True, BETTER),
-    ([cut((10.0, 4.0))], 0, True, True, False, WITHIN),
-    ([cut((10.0, 4.0))], 1, True, True, True, WITHIN),
-    ([cut((1.0, 1.0))], 0, True, False, False, NONE),
-    ([cut((18.0, 18.0), misses=OUT)], 0, False, True, False, NONE),
-    ([cut((18.0, 17.0), misses=OUT)], 0, False, False, False, NONE),
-    ([], 0, True, False, False, NONE),
-    ([cut((10.0, 18.0), misses=OUT, worse=OUT)], 1, True, True, True, NOT),
-    ([cut((40.0, 12.0)), cut((10.0, 18.0), misses=OUT, worse=OUT)], 2, False, True, True, NOT),
-    ([cut((40.0, 12.0), misses=["runs 20 % faster"], worse=["runs 20 % faster"])], 1, False, True, True, NOT),
+    ([cut((40.0, 12.0))], False, True, True, WORTH),
+    ([cut((5.0, 5.0), (20.0, 0.5))], False, True, True, WORTH),
+    ([cut((40.0, 12.0)), cut((4.0, 4.0))], False, True, True, WORTH),
+    ([cut((40.0, 18.0), misses=OUT)], False, True, True, BETTER),
+    ([cut((40.0, 12.0)), cut((18.0, 18.0), misses=OUT)], False, True, True, BETTER),
+    ([cut((10.0, 4.0))], True, True, False, WITHIN),
+    ([cut((10.0, 4.0))], True, True, True, WITHIN),
+    ([cut((1.0, 1.0))], True, False, False, NONE),
+    ([cut((18.0, 18.0), misses=OUT)], False, True, False, NONE),
+    ([cut((18.0, 17.0), misses=OUT)], False, False, False, NONE),
+    ([], True, False, False, NONE),
+    ([cut((10.0, 18.0), misses=OUT, worse=OUT)], True, True, True, NOT),
+    ([cut((40.0, 12.0)), cut((10.0, 18.0), misses=OUT, worse=OUT)], False, True, True, NOT),
+    ([cut((40.0, 12.0), misses=["runs 20 % faster"], worse=["runs 20 % faster"])], False, True, True, NOT),
 ]
 
 
-@pytest.mark.parametrize(("cuts", "shaped", "within", "gain", "benefit", "grade"), SITUATIONS)
+@pytest.mark.parametrize(("cuts", "within", "gain", "benefit", "grade"), SITUATIONS)
 def test_the_grade_of_a_situation(
-    cuts: Sequence[RegionVerdict], shaped: int, within: bool, gain: bool, benefit: bool, grade: str
+    cuts: Sequence[RegionVerdict], within: bool, gain: bool, benefit: bool, grade: str
 ) -> None:
-    found, reason = recommend(Situation(cuts, shaped, within, gain, benefit))
+    found, reason = recommend(cuts, original_within=within, could_gain=gain, benefit=benefit)
     assert found == grade
     assert reason
 

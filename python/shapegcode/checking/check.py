@@ -19,7 +19,7 @@ from shapegcode.model.playable import SimulatedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
 from shapegcode.program.computer import require_memory_for_lines
-from shapegcode.program.reading import is_program_text, program_bytes
+from shapegcode.program.reading import given_text
 from shapegcode.program.several import index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, no_room
 
@@ -65,11 +65,8 @@ def check(
         program.require_machine(machine)
         text, source, folder = program.text, program.source, program.folder
         program_number = program.number if program_number is None else program_number
-    elif is_program_text(program):
-        return check_text(str(program), machine, program_number=program_number)
     else:
-        text = program_bytes(program, machine.controller.max_program_bytes)
-        source, folder = str(program), Path(program).parent
+        text, source, folder = given_text(program, machine)
     return check_text(text, machine, source=source, program_number=program_number, folder=folder)
 
 

@@ -362,7 +362,7 @@ NEEDED = object()
 def add_options(parser: argparse._ActionsContainer, rows: Iterable[tuple[Any, ...]]) -> None:
     """Declare options: names, metavar, type, help and, where it is not None, the default or `NEEDED` of each.
 
-    As type `bool` is a switch, a tuple one of its words, and a list its entry, several times.
+    As type `bool` is a switch, a tuple one of its words, and a list of one type that type, several times.
     """
     for names, metavar, kind, text, *default in rows:
         settings: dict[str, Any] = {"default": default[0]} if default and default[0] is not NEEDED else {}

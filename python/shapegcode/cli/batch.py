@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "these per line",
     )
     add_options(parser, (
-        ("-m --machine", "MACHINE", [str],
+        ("-m --machine", "MACHINE", [None],
          "machine file or built-in machine; more than one -m: every program on each of them", NEEDED),
         ("-o --output", "DIR", None, "folder of the results", NEEDED),
     ))  # fmt: skip

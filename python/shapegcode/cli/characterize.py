@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ))  # fmt: skip
     add_machine_argument(parser)
     add_options(parser, (
-        ("--look-ahead", "KIND", [str],
+        ("--look-ahead", "KIND", [None],
          'with --runs: kind of look-ahead that is tried, for example "speed difference"; several times for several '
          "(default: all; the one that tells left-out runs best is taken)"),
         ("-o --output", "FILE", None, "with --fit, --servo, --runs: machine file to write, with what is known"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import compress
 from pathlib import Path
@@ -147,7 +147,7 @@ def settle(plan: ConversionPlan) -> Shaped:
     """Write, read back and simulate; again where a cut left its tolerance, ran too fast or took too long."""
     for attempt in range(_ATTEMPTS):
         written = write(plan, plan.grid, "shaping" if attempt == 0 else "shaping again, slower")
-        shaped = simulate(plan, read_back(plan, written), ahead=attempt == 0)
+        shaped = simulate(plan, written, read_back(plan, written), prefetch=attempt == 0)
         figures, aims = shaped.figures, plan.aims
         aims.note(written, figures)
         changed = aims.slow_down(written, figures)
@@ -159,7 +159,8 @@ def settle(plan: ConversionPlan) -> Shaped:
         shaped.trackers.clear()  # nobody asks for them any more: they take room beside the next text
         for run in shaped.started.values():
             run.cancel()
-    return simulate(plan, read_back(plan, write(plan, plan.grid)))
+    written = write(plan, plan.grid)
+    return simulate(plan, written, read_back(plan, written))
 
 
 def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
@@ -176,13 +177,8 @@ def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     return written
 
 
-@dataclass(frozen=True)
-class ReadBack:
-    """A text read back and held against the original; trackers of the cuts that were not in the text before."""
-
-    written: Written
-    emitted: Program
-    trackers: dict[int, _core.ContourTracker]  # by the rank of the cut
+ReadBack = tuple[Program, dict[int, _core.ContourTracker]]
+"""The text read, and trackers of the cuts that were not in the text before, by the rank of the cut."""
 
 
 def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
@@ -193,27 +189,27 @@ def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
         if (known := plan.simulated.get(plan.aims.index(place.region))) is None or known[0] is not text
     }
     emitted = written.read_back(plan.machine)
-    return ReadBack(written, emitted, {rank: each.result() for rank, each in following.items()})
+    return emitted, {rank: each.result() for rank, each in following.items()}
 
 
-def simulate(plan: ConversionPlan, text: ReadBack, *, ahead: bool = False) -> Shaped:
+def simulate(plan: ConversionPlan, written: Written, text: ReadBack, *, prefetch: bool = False) -> Shaped:
     """Simulate every shaped cut under the operating conditions; one whose text is as before is not simulated again.
 
-    `ahead`: its sensitivity to unverified parameters too, where which cut decides is known already.
+    `prefetch`: its sensitivity to unverified parameters too, where which cut decides is known already.
     """
-    placed, trackers = text.written.placed, text.trackers
+    placed, (emitted, trackers) = written.placed, text
     indices = [plan.aims.index(place.region) for place in placed]
     places = [placed[rank] for rank in trackers]
-    running = plan.judge.begin(text.emitted, places, list(trackers.values()), plan.pool)
+    running = plan.judge.begin(emitted, places, list(trackers.values()), plan.pool)
     started: StartedTrials = {}
-    if ahead and cores() > 1 and len(placed) == len(trackers) == 1:
-        started = start_trials(plan.judge, plan.machine, places[0], text.emitted, trackers[0], plan.pool)
+    if prefetch and cores() > 1 and len(placed) == len(trackers) == 1:
+        started = start_trials(plan.judge, plan.machine, places[0], emitted, trackers[0], plan.pool)
     originals = [plan.originals[indices[rank]] for rank in trackers]
     found = plan.judge.figures(running, originals, partial(plan.on_progress, "round trip"))
     for rank, figures in zip(trackers, found, strict=True):
-        plan.simulated[indices[rank]] = text.written.texts[rank][0], figures
+        plan.simulated[indices[rank]] = written.texts[rank][0], figures
     return Shaped(
-        text.written, text.emitted, [plan.simulated[index][1] for index in indices],
+        written, emitted, [plan.simulated[index][1] for index in indices],
         [trackers.get(rank) for rank in range(len(placed))], started,
     )  # fmt: skip
 

@@ -13,7 +13,6 @@ from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.plan import ConversionPlan, Shaped
 from shapegcode.conversion.recommendation import (
     Grade,
-    Situation,
     filter_advice,
     most_to_gain_um,
     open_axes,
@@ -79,11 +78,9 @@ def judge(plan: ConversionPlan, shaped: Shaped) -> ProgramVerdict:
     times = _cycle_time_s(plan, shaped, emitted_s.result(), figures.region_time_s())
     proof = None if proving is None else proving.result()
     grade, reason = recommend(
-        Situation(
-            figures.all_cuts, len(shaped.written.placed), original_within=plan.original_within,
-            could_gain=any(cut.gain_um >= machine.shaping.least_gain_um for cut in cuts),
-            benefit=plan.is_benefit(shaped), other_changes=proof.refused if proof is not None else (),
-        )
+        figures.all_cuts, original_within=plan.original_within,
+        could_gain=any(cut.gain_um >= machine.shaping.least_gain_um for cut in cuts),
+        benefit=plan.is_benefit(shaped), other_changes=proof.refused if proof is not None else (),
     )  # fmt: skip
     return ProgramVerdict(figures, cuts, times, proof, grade, reason)
 

@@ -220,7 +220,7 @@ def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
             yield _Trial(unmeasured[key], f"{other:g} s", each, moves_command=True)
 
 
-def _unknown_axes(machine: Machine) -> dict[str, KeyValue]:
+def unknown_axes(machine: Machine) -> dict[str, KeyValue]:
     """Letters of the axes of which it is not known whether they have a mode, and their keys."""
     values = {value.key: value for value in machine.values()}
     return {
@@ -238,7 +238,7 @@ def _with_usual_modes(machine: Machine, letters: Iterable[str]) -> Machine:
 
 def _axis_trials(machine: Machine) -> dict[str, _Trial]:
     """Each unknown axis with a usual mode."""
-    unknown = _unknown_axes(machine)
+    unknown = unknown_axes(machine)
     return {axis: _Trial(value, _USUAL_MODE, _with_usual_modes(machine, axis)) for axis, value in unknown.items()}
 
 
@@ -249,7 +249,7 @@ def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[
     """
     from shapegcode.simulation.simulate import simulate
 
-    unknown = _unknown_axes(machine)
+    unknown = unknown_axes(machine)
     simulated = simulate(program, _with_usual_modes(machine, unknown), record_samples=0)
     rows = [
         Sensitivity(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.computer import require_memory_for_lines
-from shapegcode.program.reading import Reading, is_program_text, program_bytes, signs_of_turning
+from shapegcode.program.reading import Reading, given_text, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
 
@@ -77,22 +77,15 @@ class Program:
         from shapegcode.machine import Machine
 
         machine = Machine.of(machine or "vx500")
-        if is_program_text(path):
-            return cls.from_text(
-                str(path),
-                machine,
-                program_number=program_number,
-                expand_compensation=expand_compensation,
-                collect_alarms=collect_alarms,
-            )
+        text, source, folder = given_text(path, machine)
         return cls.from_text(
-            program_bytes(path, machine.controller.max_program_bytes),
+            text,
             machine,
-            source=str(path),
+            source=source,
             program_number=program_number,
             expand_compensation=expand_compensation,
             collect_alarms=collect_alarms,
-            folder=Path(path).parent,
+            folder=folder,
         )
 
     @classmethod

@@ -214,6 +214,13 @@ def program_bytes(path: str | Path, most: int) -> bytes:
         return file.read(size)
 
 
+def given_text(program: str | Path, machine: Machine) -> tuple[bytes, str, Path | None]:
+    """A program's text where it is given or from its file, its name in messages, and the folder of the file."""
+    if is_program_text(program):
+        return str(program).encode(), "<text>", None
+    return program_bytes(program, machine.controller.max_program_bytes), str(program), Path(program).parent
+
+
 def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[str, bytes] | None]:
     """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix."""
 
