@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -288,6 +289,14 @@ def test_lines_without_a_cut_are_refused(tmp_path: Path, option: str, lines: str
     done = run(tmp_path, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", option, lines)
     assert done.returncode == 2
     assert expected in done.stderr
+
+
+def test_verbose_lists_every_cut(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(part(*[SLOW] * 15))
+    for words, listed in (((), 12), (("-v",), 15)):
+        done = run(tmp_path, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", *words)
+        assert len(re.findall(r"(?m)^\d+-\d+ ", done.stdout)) == listed
+        assert ("3 more in --verbose" in done.stdout) == (listed == 12)
 
 
 # --- the recommendation --------------------------------------------------------------------------------------

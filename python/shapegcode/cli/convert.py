@@ -129,7 +129,8 @@ def run(args: argparse.Namespace) -> int:
         names = ", ".join(place.address for place in needed)
         notes.append(f"calls of {names} were kept: as they are in {args.input}, they stand behind the program")
     content = alone_with(result.emitted.view(), program.text, needed)
-    return runner.finish(result, args, notes=notes, output=(target, content))
+    tables = result.tables(every_cut=args.verbose)
+    return runner.finish(result, args, tables=tables, notes=notes, output=(target, content))
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:

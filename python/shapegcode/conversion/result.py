@@ -276,9 +276,16 @@ class Conversion(ProgramFigures, Result):
             for miss in cut.misses:
                 yield "lines {} to {}: {}".format(*cut.lines, miss)
 
-    def tables(self) -> list[Table]:
-        """Original against emitted; cut by cut; tolerance against time; operating conditions; sensitivity."""
-        cuts = [cut_table(self.cuts)] if len(self.cuts) > 1 else []
+    def tables(self, *, every_cut: bool = False) -> list[Table]:
+        """Original against emitted; cut by cut; tolerance against time; operating conditions; sensitivity.
+
+        Args:
+            every_cut: list all of them; else those that miss a limit or gain most.
+
+        Returns:
+            The tables.
+        """
+        cuts = [cut_table(self.cuts, every=every_cut)] if len(self.cuts) > 1 else []
         curve = [curve_table(self.tolerance_curve)] if self.tolerance_curve is not None else []
         if self.nothing_shaped:
             return [*cuts, *curve] if any(cut.misses for cut in self.cuts) else cuts

@@ -186,7 +186,7 @@ def _cure(reason: str) -> str:
     return "a lower programmed feed there, or --shape-all to see what shaping it does"
 
 
-def cut_table(cuts: Sequence[CutOutcome], *, every: bool = False) -> Table:
+def cut_table(cuts: Sequence[CutOutcome], *, every: bool) -> Table:
     """The cuts: those first that miss a limit, then those with the largest gain."""
     ranked = sorted(cuts, key=lambda cut: (not cut.misses, -cut.gain_um))
     shown = list(cuts) if every else sorted(ranked[:_SHOWN], key=lambda cut: cut.lines)
