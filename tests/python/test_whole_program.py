@@ -249,16 +249,6 @@ def test_the_knee_is_where_the_curve_bends() -> None:
     assert knee_of(tolerances, [5.0] * 7) is None
 
 
-@pytest.mark.parametrize("option", ["--max-time-increase", "--max-cut-time-increase"])
-@pytest.mark.parametrize("value", ["0", "-3", "nan"])
-def test_a_price_of_nothing_is_refused(tmp_path: Path, option: str, value: str) -> None:
-    (tmp_path / "part.nc").write_text(MIXED)
-    done = run(tmp_path, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", option, value)
-    assert done.returncode == 2
-    assert "time" in done.stderr
-    assert not (tmp_path / "out.nc").exists()
-
-
 # --- the choice of cuts --------------------------------------------------------------------------------------
 
 
@@ -277,18 +267,6 @@ def test_only_and_leave_choose_cuts_by_their_lines(tmp_path: Path) -> None:
     report = json.loads((tmp_path / "out.json").read_text())
     assert report["cuts"][0]["is_shaped"] is False
     assert (tmp_path / "out.nc").exists()
-
-
-@pytest.mark.parametrize(
-    ("option", "lines", "expected"),
-    [("--only", "900-950", "has lines 1 to"), ("--leave", "1-2", "no cut that can be shaped there"),
-     ("--only", "5-2", "first to last"), ("--only", "x", "first to last")],
-)  # fmt: skip
-def test_lines_without_a_cut_are_refused(tmp_path: Path, option: str, lines: str, expected: str) -> None:
-    (tmp_path / "part.nc").write_text(MIXED)
-    done = run(tmp_path, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", option, lines)
-    assert done.returncode == 2
-    assert expected in done.stderr
 
 
 def test_verbose_lists_every_cut(tmp_path: Path) -> None:
