@@ -20,6 +20,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.modes import slowest_mode
 from shapegcode.program import Program, between_increments
+from shapegcode.program.stamp import whole_lines
 from shapegcode.verdict.figures import Placed
 
 EXTRA_SYSTEM = 541
@@ -30,7 +31,6 @@ PLACEHOLDER = "N00000"
 
 _FIRST_NUMBER, _END_NUMBER = 10_000, 100_000  # five digits, as `PLACEHOLDER`
 _ROUND = 1000
-_CHUNK = 1 << 20  # bytes
 _N_WORD = re.compile(rb"N *0*([0-9]{1,8})")
 
 
@@ -109,11 +109,8 @@ class FreeNumbers:
 
     def _found(self) -> list[int]:
         used = np.zeros(_END_NUMBER, dtype=bool)
-        core = self._program.core
-        end = 0
-        while end < core.size:
-            begin, end = end, 1 + core.find(b"\n", end + _CHUNK) or core.size
-            numbers = np.array(_N_WORD.findall(core.slice(begin, end).upper()), dtype="S8").astype(np.int64)
+        for lines in whole_lines(self._program.core):
+            numbers = np.array(_N_WORD.findall(lines.upper()), dtype="S8").astype(np.int64)
             used[numbers[numbers < _END_NUMBER]] = True
         last = int(np.flatnonzero(used)[-1]) if used.any() else 0
         begin = max(_FIRST_NUMBER, math.ceil((last + 1) / _ROUND) * _ROUND)

@@ -82,7 +82,10 @@ def refuse_zero_radius(program: Program) -> None:
     for line, _, _, message, file in program.core.warnings:
         if found := _ZERO_RADIUS.match(message):
             number = found[1]
-            what = "write D with the number of the offset behind it" if number == "0" else _radius_of(number)
+            what = (
+                f"give it: --set input.tool_radius_mm.{number}=RADIUS_IN_MM, or G10 L12 P{number} R... in the program"
+            )
+            what = "write D with the number of the offset behind it" if number == "0" else what
             sentence = f"{message.partition(':')[0]} mm: expanded, the tool's centre would run on the contour\n{what}"
             raise located_error(file or program.source, line, 1, sentence)
 
@@ -97,10 +100,6 @@ def _undecided(program: Program, line: int, file: str, sentence: str, machine: M
     command = f"shapegcode convert {shlex.quote(program.source)} -m MACHINE --compensation"
     go_on = f"{command} expand{radius} shapes the path of that radius; --compensation keep leaves these moves unchanged"
     return located_error(file or program.source, line, 1, f"{sentence}\nnext: {go_on}")
-
-
-def _radius_of(number: str) -> str:
-    return f"give it: --set input.tool_radius_mm.{number}=RADIUS_IN_MM, or G10 L12 P{number} R... in the program"
 
 
 def header_lines(radii_mm: Mapping[int, float]) -> list[str]:

@@ -202,14 +202,7 @@ def text_mark(text: bytes) -> str:
     Comments, blanks, kinds of line end, N words, the program's number and `%` do not count: what a control or an
     editor changes in passing.
     """
-
-    def chunks() -> Iterator[bytes]:
-        end = 0
-        while end < len(text):
-            begin, end = end, 1 + text.find(b"\n", end + _CHUNK) or len(text)
-            yield text[begin:end]
-
-    return _mark_of(chunks())
+    return _mark_of(_chunks(len(text), text.find, lambda begin, end: text[begin:end]))
 
 
 def _mark_of(chunks: Iterable[bytes]) -> str:
@@ -259,7 +252,7 @@ def text_with_verdict(text: bytes, *, good: bool, better: bool = False) -> bytes
 
 def mark_of(program: _core.ProgramText) -> str:
     """The mark of a program that was read; see `text_mark`."""
-    return _mark_of(_lines_of(program))
+    return _mark_of(whole_lines(program))
 
 
 def write_verdict(program: _core.ProgramText, mark: str, *, good: bool, better: bool = False) -> None:
@@ -276,8 +269,13 @@ def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: boo
     return [(begin, after) for before, after in wanted if (begin := find(before)) >= 0]
 
 
-def _lines_of(program: _core.ProgramText) -> Iterator[bytes]:
+def whole_lines(program: _core.ProgramText) -> Iterator[bytes]:
+    """The text of a program in chunks of whole lines."""
+    return _chunks(program.size, program.find, program.slice)
+
+
+def _chunks(size: int, find: Callable[[bytes, int], int], part: Callable[[int, int], bytes]) -> Iterator[bytes]:
     end = 0
-    while end < program.size:
-        begin, end = end, 1 + program.find(b"\n", end + _CHUNK) or program.size
-        yield program.slice(begin, end)
+    while end < size:
+        begin, end = end, 1 + find(b"\n", end + _CHUNK) or size
+        yield part(begin, end)

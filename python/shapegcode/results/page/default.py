@@ -101,7 +101,7 @@ def _tables(tables: Sequence[Table]) -> Iterator[Section]:
 
 def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Section]:
     """The pictures, each with a line that says how to read it."""
-    pictures = [Picture(name, plot, how_to_read(name)) for name, plot in result.plots().items()]
+    pictures = [Picture(name, plot, HOW.get(name, UNKNOWN)) for name, plot in result.plots().items()]
     chosen = [each for each in pictures if each.name in printed] or pictures[:_PRINTED_PICTURES]
     if chosen:
         yield Section("pictures", "Pictures", tuple(chosen))
@@ -110,11 +110,6 @@ def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Sectio
     if result.from_json:
         left_out = "Pictures that need the samples of the run are not here: the JSON does not hold them."
         yield Section("no-pictures", "Pictures that are not here", (Text((left_out,)),), printed=False)
-
-
-def how_to_read(name: str) -> str:
-    """How to read a picture."""
-    return HOW.get(name, UNKNOWN)
 
 
 def made_section(made: Made) -> Section:
