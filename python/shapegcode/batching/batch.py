@@ -18,7 +18,7 @@ from shapegcode.batching.result import Batch
 from shapegcode.batching.runs import KeptRows, OnBatch, Runs, summary_lines
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import is_temporary, write_lines
-from shapegcode.verdict.ahead import cores
+from shapegcode.program.computer import cores
 
 _SCRATCH = ".batch-scratch"
 _SUMMARY = "summary.csv"

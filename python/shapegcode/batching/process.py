@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import named_errors
-from shapegcode.program.reading import MEMORY_NEEDED
+from shapegcode.program.computer import MEMORY_NEEDED
 from shapegcode.results.json import this_version
 
 if TYPE_CHECKING:

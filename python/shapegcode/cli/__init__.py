@@ -174,7 +174,7 @@ class _Interrupts:
     """Whether Ctrl-C came: a module that is being loaded may make another error of it."""
 
     def __init__(self, of_process: bool) -> None:
-        self.came = self.told = False
+        self.came = self.reported = False
         self._mine = of_process and signal.getsignal(signal.SIGINT) is signal.default_int_handler
         if self._mine:
             signal.signal(signal.SIGINT, self._handle)
@@ -188,7 +188,7 @@ class _Interrupts:
         raise KeyboardInterrupt
 
     def _stop_now(self, _number: int, _frame: object) -> None:
-        if not self.told:
+        if not self.reported:
             os.write(2, b"shapegcode: stopped\n")
         os._exit(ExitCode.INTERRUPTED)
 
@@ -219,7 +219,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BaseException as error:  # a compiled module may make a panic of Ctrl-C, which is no Exception
         if ctrl_c.came or isinstance(error, KeyboardInterrupt):
             print("shapegcode: stopped", file=sys.stderr)
-            ctrl_c.told = True
+            ctrl_c.reported = True
             return ExitCode.INTERRUPTED
         if _DEBUG in words or not isinstance(error, Exception) or not _expected(error):
             raise

@@ -89,11 +89,10 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
     """
     traces = _traces(schedule)
     loads = [row for row in _LOADS if row[0] in _ALWAYS or np.isfinite(traces.limit[row[0]]).any()]
-    rows = plot.grid(
-        ax, 3 + len(loads), 1, size_inch=(11.0, 1.2 + 1.55 * (3 + len(loads))), sharex=True,
+    panels = plot.column(
+        ax, 3 + len(loads), size_inch=(11.0, 1.2 + 1.55 * (3 + len(loads))),
         title="Feed and force along the cutting path", part=_summary(schedule),
     )  # fmt: skip
-    panels = [row[0] for row in rows]
     along = _Along(traces, groups(traces.distance_mm, _BANDS))
     along.draw(panels[0], traces.radial_depth_mm, plot.COLOURS[2], "radial depth", filled=True)
     along.draw(panels[1], traces.section_mm2, plot.COLOURS[2], "section of the cut", filled=True)
@@ -284,10 +283,7 @@ def draw_walls(
     low, high = min(float(everything.min()), 0.0), max(float(everything.max()), 0.0)
     high = high if high > low else low + 1e-3
     both = _both_sides(low, high)
-    rows = plot.grid(
-        ax, len(maps) + 1, 1, size_inch=(11.0, 1.3 + 1.9 * (len(maps) + 1)), sharex=True, title=title, part=part,
-    )  # fmt: skip
-    panels = [row[0] for row in rows]
+    panels = plot.column(ax, len(maps) + 1, size_inch=(11.0, 1.3 + 1.9 * (len(maps) + 1)), title=title, part=part)
     step = height_mm[1] - height_mm[0]
     levels = np.concatenate([height_mm - 0.5 * step, height_mm[-1:] + 0.5 * step])
     for panel, (name, values) in zip(panels, maps.items(), strict=False):

@@ -83,11 +83,7 @@ def schedule_feed(
     """
     machine = Machine.of(machine)
     program = program_for_conversion(program, machine)
-    if program.stamp is not None:
-        raise _core.ProgramError(
-            f"{program.source}:1:1: shaped by shapegcode already (its header says so), and other feeds would undo it: "
-            "take the original; convert --feed-schedule does both"
-        )
+    program.refuse_shaped("other feeds would undo that; take the original, convert --feed-schedule does both")
 
     def swept(done: int, total: int) -> None:
         on_progress(_SWEEPING * done / max(total, 1))

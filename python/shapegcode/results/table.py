@@ -226,9 +226,9 @@ def _whole(column: Column, cell: str) -> str:
     return cell if column.text or column.left else cell.replace(" ", NO_BREAK)
 
 
-def xyz_columns(cell: Callable[[str, Any], object], *, digits: int | None = None) -> tuple[Column, ...]:
+def xyz_columns(cell: Callable[[str, Any], object]) -> tuple[Column, ...]:
     """Columns of the three axes."""
-    return tuple(Column(axis.upper(), value=partial(cell, axis), digits=digits) for axis in "xyz")
+    return tuple(Column(axis.upper(), value=partial(cell, axis)) for axis in "xyz")
 
 
 def share_percent(part: float, whole: float) -> str:

@@ -96,11 +96,10 @@ def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
     Returns:
         The upper panel.
     """
-    rows = plot.grid(
-        ax, 2, 1, size_inch=(9.0, 7.0), sharex="col", part=", ".join(map(str, result.modes)),
+    upper, lower = plot.column(
+        ax, 2, size_inch=(9.0, 7.0), part=", ".join(map(str, result.modes)),
         title="Duration against what is left: filled = Pareto front, ringed = recommended",
     )  # fmt: skip
-    upper, lower = (row[0] for row in rows)
     families = list(dict.fromkeys(each.family for each in result.designs))
     colours = {family: plot.COLOURS[number % len(plot.COLOURS)] for number, family in enumerate(families)}
     markers = {family: "osD^vP*X"[number // len(plot.COLOURS) % 8] for number, family in enumerate(families)}
@@ -270,10 +269,7 @@ def draw_sensitivity(
 
 def draw_impulses(shapers: Mapping[str, Shaper], ax: Axes | None = None) -> Axes:
     """The taps of each shaper, one panel each."""
-    rows = plot.grid(
-        ax, len(shapers), 1, size_inch=(9.0, 1.2 + 1.35 * len(shapers)), title="Taps", sharex="col"
-    )  # fmt: skip
-    panels = [row[0] for row in rows]
+    panels = plot.column(ax, len(shapers), size_inch=(9.0, 1.2 + 1.35 * len(shapers)), title="Taps")
     unit, scale = _time_unit(max(shaper.duration_s for shaper in shapers.values()))
     for number, (panel, (label, shaper)) in enumerate(zip(panels, shapers.items(), strict=True)):
         colour = plot.COLOURS[number % len(plot.COLOURS)]
@@ -294,11 +290,10 @@ def draw_steps(
     until_s = max(shaper.duration_s for shaper in shapers.values()) + _SWINGS_SHOWN * slowest_s
     period_s = until_s / _SAMPLES_OF_A_STEP
     unit, scale = _time_unit(until_s)
-    rows = plot.grid(
-        ax, 1 + len(modes), 1, size_inch=(9.0, 2.2 + 1.9 * (1 + len(modes))), sharex="col",
+    panels = plot.column(
+        ax, 1 + len(modes), size_inch=(9.0, 2.2 + 1.9 * (1 + len(modes))),
         title="A step behind each shaper, and how the modes follow" + " (grey: unshaped)" * unshaped,
     )  # fmt: skip
-    panels = [row[0] for row in rows]
     drawn = [("", Shaper([0.0], [1.0]), plot.GREY)] if unshaped else []
     for number, (label, shaper) in enumerate(shapers.items()):
         drawn.append((label, shaper, plot.COLOURS[number % len(plot.COLOURS)]))

@@ -109,14 +109,10 @@ def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
     key = study.decides[0].key
     curves = [bins for bins in study.curves if bins.key == key and bins.measure != SHARE][:_PANELS]
     curves = curves or [bins for bins in study.curves if bins.key == key]
-    panels = [
-        row[0]
-        for row in plot.grid(
-            ax, len(curves), 1, size_inch=(8.0, 1.0 + 2.1 * len(curves)), sharex=True,
-            title=f"{study.n} machines: {Path(study.program).name} on {study.machine}",
-            part="median, and the band that holds 90 %",
-        )
-    ]  # fmt: skip
+    panels = plot.column(
+        ax, len(curves), size_inch=(8.0, 1.0 + 2.1 * len(curves)), part="median, and the band that holds 90 %",
+        title=f"{study.n} machines: {Path(study.program).name} on {study.machine}",
+    )  # fmt: skip
     for panel, bins in zip(panels, curves, strict=True):
         _band(panel, bins)
         if (limit := study.limits_um.get(bins.measure)) is not None and limit < 3.0 * max(

@@ -17,9 +17,9 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
+from shapegcode.program.computer import cores
 from shapegcode.results.figures import Deviation
 from shapegcode.studies.varied import drawn_machine
-from shapegcode.verdict.ahead import cores
 from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures
 

@@ -18,11 +18,11 @@ from shapegcode.errors import ArgumentError, DesignError, MachineError
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.program.computer import cores
 from shapegcode.settings.keys import toml
 from shapegcode.studies.replay import CONTOURS, DEFAULT_MEASURES, SHARE, DrawsJob, Replay, checked_measures, play_all
 from shapegcode.studies.result import BinQuantiles, Bins, Decides, MachineStudy, Quantity, RefusedDraws, VariedKey
 from shapegcode.studies.varied import Columns, Listed, Varied, Vary, drawn, drawn_machine, index_problem, varied_values
-from shapegcode.verdict.ahead import cores
 
 Progress = Callable[[str, float], None]
 

@@ -18,7 +18,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_text
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
-from shapegcode.program.operating import OVERRIDE
+from shapegcode.program.stamp import OVERRIDE
 from shapegcode.results.json import to_text
 from shapegcode.testcut.cut import (
     FIGURES,

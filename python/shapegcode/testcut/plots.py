@@ -32,10 +32,10 @@ def plots_of(result: TaperResult | CornerResult | IntervalResult) -> Mapping[str
 
 def _column(ax: Axes | None, rows: int, height: float, title: str, width: float = 8.0) -> list[Axes]:
     """Panels above each other that share their X axis."""
-    grid = plot.grid(ax, rows, 1, size_inch=(width, height), title=title, sharex="col")
-    for row in grid:
-        row[0].margins(x=0.01)
-    return [row[0] for row in grid]
+    panels = plot.column(ax, rows, size_inch=(width, height), title=title)
+    for panel in panels:
+        panel.margins(x=0.01)
+    return panels
 
 
 def plot_taper(result: TaperResult, ax: Axes | None = None) -> Axes:

@@ -46,11 +46,11 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
     tools = [tool for tool in time.tools if tool in longest]
     regions = time.slowest_regions(_REGIONS)
     heights = [max(len(tools), 1), *([len(regions)] if regions else [])]
-    rows = plot.grid(
-        ax, len(heights), 1, size_inch=(9.0, 1.8 + 0.32 * sum(heights) + 0.5 * len(heights)), height_ratios=heights,
+    panels = plot.column(
+        ax, len(heights), sharex=False, height_ratios=heights,
+        size_inch=(9.0, 1.8 + 0.32 * sum(heights) + 0.5 * len(heights)),
         title=f"Where the time goes: {time.cycle_time_s:.1f} s on {time.machine}", part=Path(time.program).name,
     )  # fmt: skip
-    panels = [row[0] for row in rows]
     used = [part for part in PARTS if getattr(time, part) > 0.0]
     _bars(panels[0], [tool_name(tool.tool) for tool in tools], [vars(tool) for tool in tools], used)
     plot.legend_below(panels[-1], of=panels[0])

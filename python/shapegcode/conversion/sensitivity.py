@@ -6,10 +6,11 @@ uncertainty, or by what is usual where none is stated. That takes no more simula
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
+from pathlib import Path
 
 from shapegcode import _core
 from shapegcode.errors import MachineError
@@ -17,7 +18,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.settings.keys import KeyValue
-from shapegcode.verdict.cases import Case, CaseFigures, Judged, RegionLimits, case_figures, judge_region
+from shapegcode.verdict.cases import Case, CaseFigures, LimitCheck, RegionLimits, case_figures, judge_region
 from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge, RegionFigures
 
@@ -29,11 +30,12 @@ _FREE_S = 60.0  # of motion: so much is always simulated
 _FULL_RUNS = 2  # about half as often as a verdict simulates every region with its contour
 _FILTER_S = 0.024  # moving average of 1769 or 1622 on a machining centre, where the file says that there is none
 _MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # of an axis of a machining centre, where none is known
+_USUAL_MODE = f"a mode of {_MODE['frequency_hz']:g} Hz"
 _PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  # where no uncertainty is stated
 
 
 @dataclass(frozen=True)
-class RestsOn:
+class Sensitivity:
     """A value of the machine file that was not measured, and what it would do to the verdict.
 
     Attributes:
@@ -77,7 +79,7 @@ class _Trial:
     moves_command: bool = False
 
 
-Begun = Mapping[tuple[str, str], "Future[CaseFigures]"]
+StartedTrials = Mapping[tuple[str, str], "Future[CaseFigures]"]
 """Simulations under way, by the value and what it is moved to."""
 
 
@@ -90,7 +92,7 @@ class _Region:
     judge: Judge
     tracker: _core.ContourTracker | None
 
-    def play(self, trial: _Trial, *, contour: bool) -> CaseFigures:
+    def simulate(self, trial: _Trial, *, contour: bool) -> CaseFigures:
         """The figures with a value moved; without the contour they come from the end of the region alone."""
         model, path = MachineModel(trial.machine), self.place.region.path
         contour = contour and self.needs_contour(trial)
@@ -110,47 +112,47 @@ class _Region:
     def moving(self) -> str:
         """Letters of the axes that move in it."""
         extent_mm = self.place.region.path.extent_mm
-        return "".join(axis for axis, way in zip("xyz", extent_mm, strict=True) if way > 0.0)
+        return "".join(axis for axis, extent in zip("xyz", extent_mm, strict=True) if extent > 0.0)
 
     def limits(self, figures: RegionFigures) -> RegionLimits:
         """What it is judged by."""
         return self.judge.limits(figures, self.place)
 
-    def before(self, figures: RegionFigures) -> dict[str, Judged]:
+    def before(self, figures: RegionFigures) -> dict[str, LimitCheck]:
         """Its judged figures as it is meant to run, under the controller's own rule of block timing."""
         own = figures.emitted[0 if self.judge.own_rule == _core.BlockEnd.ceil else 1]
         return {each.figure: each for each in judge_region(case_figures(own), self.limits(figures))}
 
 
-def begin_rests(
+def start_trials(
     judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
-) -> Begun:
-    """Begin to play what `rests_on` will play with the contour, where only one region can decide."""
+) -> StartedTrials:
+    """Start what `parameter_sensitivity` will simulate with the contour, where only one region can decide."""
     region = _Region(place, emitted, judge, tracker)
     trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
-    return {_name(trial): pool.submit(region.play, trial, contour=True) for trial in trials}
+    return {_name(trial): pool.submit(region.simulate, trial, contour=True) for trial in trials}
 
 
 def _name(trial: _Trial) -> tuple[str, str]:
     return trial.value.key, trial.moved
 
 
-def rests_on(
+def parameter_sensitivity(
     judge: Judge,
     machine: Machine,
     simulated: Sequence[tuple[Placed, RegionFigures, _core.ContourTracker | None]],
     emitted: Program,
     deciding_lines: tuple[int, int],
     pool: Executor,
-    begun: Begun,
+    started: StartedTrials,
     on_step: Callable[[int, int], None] = lambda _done, _total: None,
-) -> tuple[tuple[RestsOn, ...], int]:
+) -> tuple[tuple[Sensitivity, ...], int]:
     """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit."""
     regions = [(_Region(place, emitted, judge, tracker), figures) for place, figures, tracker in simulated]
     deciding, decided = next(pair for pair in regions if pair[0].place.original_lines == deciding_lines)
     moving = deciding.moving
     trials = [(deciding, decided, trial) for trial in _trials(machine, moving)]
-    for axis, trial in _unknown_axes(machine).items():
+    for axis, trial in _axis_trials(machine).items():
         if axis not in moving:
             pair = next((pair for pair in regions if axis in pair[0].moving), None)
             trials += [(*pair, trial)] if pair is not None else []
@@ -158,30 +160,32 @@ def rests_on(
     running = []
     for region, figures, trial in trials:
         left_s -= figures.emitted_s
-        run = begun.get(_name(trial))
-        running.append(pool.submit(region.play, trial, contour=left_s >= 0.0) if run is None else run)
+        run = started.get(_name(trial))
+        running.append(pool.submit(region.simulate, trial, contour=left_s >= 0.0) if run is None else run)
     rows = []
     for done, ((region, figures, trial), run) in enumerate(zip(trials, running, strict=True), start=1):
-        judged = judge_region(run.result(), region.limits(figures))
-        rows.append(_rests(trial.value, trial.moved, region.before(figures), judged))
+        checks = judge_region(run.result(), region.limits(figures))
+        rows.append(_sensitivity(trial.value, trial.moved, region.before(figures), checks))
         on_step(done, len(trials))
     rows += _from_cases(machine, deciding, decided)
     return _ranked(rows), len({row.key for row in rows})
 
 
-def _rests(value: KeyValue, moved: str, before: Mapping[str, Judged], judged: Sequence[Judged]) -> RestsOn:
+def _sensitivity(
+    value: KeyValue, moved: str, before: Mapping[str, LimitCheck], checks: Sequence[LimitCheck]
+) -> Sensitivity:
     """The figure that a value moves furthest towards its limit."""
-    after = max(judged, key=lambda each: each.share - before[each.figure].share)
+    after = max(checks, key=lambda each: each.share - before[each.figure].share)
     unit = f" {value.unit}" if value.unit not in ("", "1") and value.value not in ("not set", "[]") else ""
     shown = "none" if value.value == "[]" else value.value + unit
     origin = "assumed" if value.assumed else value.origin
     figure_um = before[after.figure].value_um
-    return RestsOn(value.key, shown, origin, moved, after.figure, figure_um, after.value_um, after.limit_um)
+    return Sensitivity(value.key, shown, origin, moved, after.figure, figure_um, after.value_um, after.limit_um)
 
 
-def _ranked(rows: Sequence[RestsOn]) -> tuple[RestsOn, ...]:
+def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
     """The worst of each key, the furthest first; an axis that may have a mode or not is always named."""
-    worst: dict[str, RestsOn] = {}
+    worst: dict[str, Sensitivity] = {}
     for row in rows:
         matters = row.share >= LEAST_SHARE or row.key.endswith(".modes")
         if matters and (row.key not in worst or row.share > worst[row.key].share):
@@ -193,7 +197,7 @@ def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
     """What is tried, the most likely to matter first."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
     yield from _filters(machine, unmeasured)
-    yield from (trial for axis, trial in _unknown_axes(machine).items() if axis in moving)
+    yield from (trial for axis, trial in _axis_trials(machine).items() if axis in moving)
     yield from _frequencies(machine, unmeasured, moving)
     yield from _shares(machine, unmeasured, moving)
     yield from _periods(machine, unmeasured)
@@ -216,47 +220,45 @@ def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
             yield _Trial(unmeasured[key], f"{other:g} s", each, moves_command=True)
 
 
-@dataclass(frozen=True)
-class UnknownAxis:
-    """An axis of which it is not known whether it has a mode.
-
-    Attributes:
-        value: its key of the machine file.
-        moved: the usual mode, in words.
-        modes: that mode, as a value of the key.
-    """
-
-    value: KeyValue
-    moved: str
-    modes: Sequence[Mapping[str, float]]
-
-
-def unknown_axes(machine: Machine) -> dict[str, UnknownAxis]:
-    """Axes of which it is not known whether they have a mode, each with a usual one."""
+def unknown_axes(machine: Machine) -> dict[str, KeyValue]:
+    """Letters of the axes of which it is not known whether they have a mode, and their keys."""
     values = {value.key: value for value in machine.values()}
     return {
-        letter: UnknownAxis(
-            _as_assumed(values[f"axes.{letter}.modes"]), f"a mode of {_MODE['frequency_hz']:g} Hz", [_MODE]
-        )
+        letter: replace(values[f"axes.{letter}.modes"], origin="assumed", assumed=True)
         for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True)
         if not axis.modes and (not axis.rigid or values[f"axes.{letter}.rigid"].unmeasured)
     }
 
 
-def _unknown_axes(machine: Machine) -> dict[str, _Trial]:
-    """Each of them as a trial."""
-    return {
-        letter: _Trial(
-            axis.value,
-            axis.moved,
-            machine.with_values({f"axes.{letter}.rigid": False, f"axes.{letter}.modes": axis.modes}),
+def _with_usual_modes(machine: Machine, letters: Iterable[str]) -> Machine:
+    pairs = ((f"axes.{letter}.rigid", f"axes.{letter}.modes") for letter in letters)
+    values = {key: value for pair in pairs for key, value in zip(pair, (False, [_MODE]), strict=True)}
+    return machine.with_values(values) if values else machine
+
+
+def _axis_trials(machine: Machine) -> dict[str, _Trial]:
+    """Each unknown axis with a usual mode."""
+    unknown = unknown_axes(machine)
+    return {axis: _Trial(value, _USUAL_MODE, _with_usual_modes(machine, axis)) for axis, value in unknown.items()}
+
+
+def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[Sensitivity, ...]:
+    """Axes that may have a mode, by how much a usual one would vibrate behind the program as it is.
+
+    What matters on a machine without a known mode, where there is nothing to shape for: which axis to measure first.
+    """
+    from shapegcode.simulation.simulate import simulate
+
+    unknown = unknown_axes(machine)
+    simulated = simulate(program, _with_usual_modes(machine, unknown), record_samples=0)
+    rows = [
+        Sensitivity(
+            value.key, "none", "assumed", _USUAL_MODE, f"residual vibration {letter.upper()}", 0.0,
+            simulated.residual_vibration_um[letter], machine.tolerance.residual_floor_um,
         )
-        for letter, axis in unknown_axes(machine).items()
-    }
-
-
-def _as_assumed(value: KeyValue) -> KeyValue:
-    return KeyValue(value.key, value.value, value.unit, "assumed", True, value.meaning, value.fanuc, value.remark)
+        for letter, value in unknown.items()
+    ]  # fmt: skip
+    return tuple(sorted(rows, key=lambda row: -row.moved_um))
 
 
 def _modes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, name: str) -> Iterator[tuple[str, int]]:
@@ -300,20 +302,22 @@ def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
             yield _Trial(unmeasured[key], f"{period:g} s", each, moves_command=True)
 
 
-def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[RestsOn]:
+def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[Sensitivity]:
     """What was simulated anyway and does not count: the other rule of block timing, look-ahead on, an underrun."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
     for case, simulated in zip(region.judge.cases, figures.cases, strict=True):
-        key, said = _key_of(case)
+        key, moved = _key_of(case)
         if not case.counts and key in unmeasured and simulated is not None:
-            yield _rests(unmeasured[key], said, region.before(figures), judge_region(simulated, region.limits(figures)))
+            yield _sensitivity(
+                unmeasured[key], moved, region.before(figures), judge_region(simulated, region.limits(figures))
+            )
 
 
 def _key_of(case: Case) -> tuple[str, str]:
     """The value that a case is about, and what it would be; empty where it is about none."""
-    said = f"case {case.name}"
+    name = f"case {case.name}"
     if case.look_ahead:
-        return "controller.motion", said
+        return "controller.motion", name
     if case.starved_s > 0.0:
-        return "controller.block_time_s", f"longer, {said}"
-    return ("controller.block_end", said) if case.nominal else ("", "")
+        return "controller.block_time_s", f"longer, {name}"
+    return ("controller.block_end", name) if case.nominal else ("", "")
