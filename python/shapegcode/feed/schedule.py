@@ -120,7 +120,7 @@ def schedule_survey(
     loads: list[PathLoad | None] = []
     for index, (plan, part) in enumerate(zip(plans, surveyed.regions, strict=True)):
         path = written.regions[index].path
-        loads.append(region_load(part, plan, path, machine, before=ordinary, after=own))
+        loads.append(region_load(part, plan, path, before=ordinary, after=own))
         on_progress(_PLANNING + (1.0 - _PLANNING) * (index + 1) / total)
     return feed_figures(
         surveyed, plans, loads, machine, margin=margin, text=text, written=written,
