@@ -18,7 +18,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
 from shapegcode.results.figures import Deviation
-from shapegcode.studies.varied import drawn_machine
+from shapegcode.studies.varied import sampled_machine
 from shapegcode.verdict.ahead import cores
 from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures
@@ -194,7 +194,7 @@ _KEPT_TEXTS = 4
 
 
 @dataclass(frozen=True)
-class DrawsJob:
+class SamplesJob:
     """Some draws of one text."""
 
     name: str  # of the machine, in messages
@@ -207,22 +207,22 @@ class DrawsJob:
         """Simulate them."""
         found = []
         for row, draw in zip(self.rows, self.draws, strict=True):
-            machine = drawn_machine(replay.machine, row, f"{self.name}, draw {draw}")
+            machine = sampled_machine(replay.machine, row, f"{self.name}, draw {draw}")
             override = machine.times.feed_override_percent / 100.0 if OVERRIDE in row else 1.0
             measured = replay.play(machine, self.wanted, override=override, times=self.times)
             found.append([measured[name] for name in self.wanted])
         return found
 
-    def parts(self, motion_s: float) -> Iterator[DrawsJob]:
+    def parts(self, motion_s: float) -> Iterator[SamplesJob]:
         """The same in tasks."""
         size = max(1, min(_AT_ONCE, int(_PLAYED_S / max(motion_s, 1e-3))))
         for at in range(0, len(self.rows), size):
             rows, draws = self.rows[at : at + size], self.draws[at : at + size]
-            yield DrawsJob(self.name, rows, draws, self.wanted, self.times)
+            yield SamplesJob(self.name, rows, draws, self.wanted, self.times)
 
 
 def play_all(
-    replay: Replay, job: DrawsJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
+    replay: Replay, job: SamplesJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
 ) -> list[list[float]]:
     """Simulate the draws of one text."""
     parts = list(job.parts(replay.time_s))

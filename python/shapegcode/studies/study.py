@@ -19,9 +19,27 @@ from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
-from shapegcode.studies.replay import CONTOURS, DEFAULT_MEASURES, SHARE, DrawsJob, Replay, checked_measures, play_all
-from shapegcode.studies.result import BinQuantiles, Bins, Decides, MachineStudy, Quantity, RefusedDraws, VariedKey
-from shapegcode.studies.varied import Columns, Listed, Varied, Vary, drawn, drawn_machine, index_problem, varied_values
+from shapegcode.studies.replay import CONTOURS, DEFAULT_MEASURES, SHARE, Replay, SamplesJob, checked_measures, play_all
+from shapegcode.studies.result import (
+    PERCENT,
+    BinQuantiles,
+    Bins,
+    Decides,
+    MachineStudy,
+    Quantity,
+    RefusedDraws,
+    VariedKey,
+)
+from shapegcode.studies.varied import (
+    Columns,
+    Listed,
+    Varied,
+    Vary,
+    index_problem,
+    sampled_columns,
+    sampled_machine,
+    varied_values,
+)
 from shapegcode.verdict.ahead import cores
 
 Progress = Callable[[str, float], None]
@@ -42,7 +60,7 @@ def study(
     scheduler: Cluster | str | None = None,
     on_progress: Progress = lambda _stage, _share: None,
 ) -> MachineStudy:
-    """Simulate a program on machines whose values are drawn, and say how likely it stays within tolerance.
+    """Simulate a program on machines whose values are sampled, and compute how likely it stays within tolerance.
 
     The program is converted once, for the machine file. A mode, a drive, a filter, a time of `vary` is that of the
     machine on which it is simulated. A value that only the converter reads, or one that is `known`,
@@ -53,7 +71,7 @@ def study(
     Args:
         program: what is simulated, or its file.
         machine: as its file has it.
-        vary: what each key is drawn from: `normal`, `lognormal`, `uniform`, or a list of values. Modes count from 1.
+        vary: what each key is sampled from: `normal`, `lognormal`, `uniform`, or a list of values. Modes count from 1.
         n: how many draws.
         sampling: "sobol", "lhs" (latin hypercube) or "grid".
         measure: what is measured, see `shapegcode.studies.replay.MEASURES`.
@@ -77,7 +95,7 @@ def study(
     check_probability("at_least", at_least)
     wanted = checked_measures(measure)
     varied = varied_values(machine, vary)
-    columns = drawn(varied, n, sampling, seed, indices=indices)
+    columns = sampled_columns(varied, n, sampling, seed, indices=indices)
     check_ends(machine, varied, columns)
     if isinstance(program, Program):
         program.require_machine(machine)
@@ -100,7 +118,7 @@ def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> 
             ends = {"low": int(numbers.argmin()), "high": int(numbers.argmax())}.values()
         for index in ends:
             row = {one.key: values[index] for one, values in zip(varied, columns, strict=True)}
-            drawn_machine(machine, row, f"{machine.name}, draw {index + 1}")
+            sampled_machine(machine, row, f"{machine.name}, draw {index + 1}")
 
 
 @dataclass(frozen=True)
@@ -125,11 +143,6 @@ class _StudyRun:
         self.count = len(columns[0])
         self.measured = np.full((self.count, len(wanted)), np.nan)
         self.nominal: dict[str, float] = {}
-
-    @property
-    def name(self) -> str:
-        """Of the program."""
-        return self.program.source if isinstance(self.program, Program) else self.program
 
     def play(self) -> list[_Text]:
         """Convert each text and play its draws."""
@@ -156,7 +169,7 @@ class _StudyRun:
         }
 
     def _text(self, draws: tuple[int, ...], values: Mapping[str, object]) -> _Text:
-        machine = drawn_machine(self.machine, values, f"{self.machine.name}, draw {draws[0] + 1}")
+        machine = sampled_machine(self.machine, values, f"{self.machine.name}, draw {draws[0] + 1}")
         try:
             return _Text(draws, values, Replay.of(self.program, machine, shape_all=self.shape_all))
         except (ArgumentError, DesignError) as error:
@@ -166,7 +179,7 @@ class _StudyRun:
 
     def _play(self, text: _Text, before: int) -> None:
         assert text.replay is not None
-        job = DrawsJob(
+        job = SamplesJob(
             self.machine.name,
             tuple(self._row(index, known=False) for index in text.draws),
             tuple(index + 1 for index in text.draws),
@@ -212,7 +225,7 @@ def _result(
     said = ["no contour is measured: within tolerance means its residual vibration alone"] if alone else []
     replays = [text.replay for text in texts if text.replay is not None]
     return MachineStudy(
-        program=run.name,
+        program=run.program.source if isinstance(run.program, Program) else run.program,
         machine=run.machine.name,
         sampling=sampling,
         seed=seed,
@@ -225,7 +238,7 @@ def _result(
         within_interval=interval_of(good, run.count),
         at_least=at_least,
         quantities=tuple(quantity(name, values, run.nominal[name]) for name, values in measured.items()),
-        decides=decides(run.varied, columns, measured, indices=whole, seed=seed),
+        decides=decides(run.varied, columns, shares, indices=whole, seed=seed),
         curves=tuple(
             Bins(each.key, name, bins_of(each, column, values), not isinstance(each.distribution, Listed))
             for each, column in zip(run.varied, columns, strict=True)
@@ -241,7 +254,6 @@ def _result(
     )
 
 
-PERCENT = (5.0, 25.0, 50.0, 75.0, 95.0, 99.0)
 _BINS = 10
 _MIN_IN_BIN = 5
 _WITHIN = 1.0 + 1e-9
@@ -298,13 +310,12 @@ def _bin(at: float, name: str, values: FloatArray) -> BinQuantiles:
 def decides(
     varied: Sequence[Varied],
     columns: Sequence[Sequence[object]],
-    measured: Mapping[str, FloatArray],
+    shares: FloatArray,
     *,
     indices: bool,
     seed: int,
 ) -> tuple[Decides, ...]:
     """Which value moves the share of the limit most."""
-    shares = measured[SHARE]
     found = _indices(varied, shares, seed) if indices else {}
     rows = []
     for each, column in zip(varied, columns, strict=True):

@@ -65,7 +65,7 @@ def _as_table(value: object) -> object:
 
 
 class DrawnValue(InlineTable):
-    """What a value is drawn from."""
+    """What a value is sampled from."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -189,8 +189,8 @@ class StudyFile(TomlTable):
         return self._draws() | {name: getattr(self, name) for name in names} | {"probability": self.at_least}
 
     def _draws(self) -> dict[str, Any]:
-        drawn = {name: value.distribution() for name, value in self.vary.items()}
-        return {"vary": drawn} | ({} if self.n is None else {"n": self.n})
+        sampled = {name: value.distribution() for name, value in self.vary.items()}
+        return {"vary": sampled} | ({} if self.n is None else {"n": self.n})
 
 
 def study_schema(title: str) -> dict[str, Any]:
