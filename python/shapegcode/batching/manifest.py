@@ -43,17 +43,7 @@ def short(text: str) -> bytes:
 
 
 class Manifest:
-    """The manifest of an output folder, held by one batch at a time.
-
-    Args:
-        folder: of the results; it is made.
-        resume: keep the rows that are there; False: forget them.
-        base: folder in which the batch was begun; empty: the current one.
-
-    Raises:
-        ArgumentError: another batch writes into the folder, or the file is no manifest of this version.
-        OSError: it cannot be written.
-    """
+    """The manifest of an output folder, held by one batch at a time."""
 
     def __init__(self, folder: Path, *, resume: bool, base: str = "") -> None:
         folder.mkdir(parents=True, exist_ok=True)

@@ -301,10 +301,7 @@ def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArra
 
 @dataclass(frozen=True)
 class Job:
-    """A region to play, the nominal one, and its sections.
-
-    `joined_mm`: runs shorter than this are one curve, because there were too many of them; 0: as everywhere.
-    """
+    """A region to play, the nominal one, and its sections."""
 
     simulated: _core.Region
     nominal: _core.Region

@@ -116,14 +116,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class OwnFilter:
-    """The control's own filter behind the interpolation, while shaped blocks run.
-
-    Attributes:
-        shape: "linear" (moving averages) or "exponential".
-        time_constant_s: length of the moving average, or time constant; 0: none.
-        bell_time_s: length of the second moving average; 0: none.
-        duration_s: of the answer to a step.
-    """
+    """The control's own filter behind the interpolation, while shaped blocks run."""
 
     shape: str
     time_constant_s: float
@@ -146,12 +139,7 @@ class OwnFilter:
 
 
 class SimulatedController:
-    """A controller that makes a motion of paths: planned by its look-ahead, or block by block.
-
-    Args:
-        model: the controller; `model.motion` says which of the two.
-        override: feed override, 1 = 100 %.
-    """
+    """A controller that makes a motion of paths: planned by its look-ahead, or block by block."""
 
     def __init__(self, model: _core.FanucModel, override: float = 1.0) -> None:
         self.model = model
@@ -198,11 +186,7 @@ class SimulatedController:
 
 
 class MachineModel:
-    """Controller, limits and plant of a machine for the core.
-
-    Args:
-        machine: what the machine file says.
-    """
+    """Controller, limits and plant of a machine for the core."""
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine

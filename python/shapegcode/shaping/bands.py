@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, worst_residual
+from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, WorstResidual, worst_residual
 from shapegcode.results.json import hidden
 
 if TYPE_CHECKING:
@@ -282,16 +282,18 @@ class Design:
 def evaluate(family: str, shaper: Shaper, bands: Sequence[ModeBand], period_s: float | None = None) -> Design:
     """The figures of a shaper for modes and their bands; the worst residual is proven to 1e-6 of it."""
     residual = max(shaper.residual_ratio(band.mode) for band in bands)
-    worst = max(_worst(shaper, band) for band in bands)
+    worst = max(_worst(shaper, band).residual_ratio for band in bands)
     exact = all(shaper.residual_ratio(band.mode) <= _EXACT for band in bands if not band.uncertainty)
     return Design(family, shaper, period_s, residual, worst, exact)
 
 
-def _worst(shaper: Shaper, band: ModeBand) -> float:
-    if band.uncertainty == 0.0:
-        return shaper.residual_ratio(band.mode)
-    ends_hz = (band.shifted(-1.0).frequency_hz, band.shifted(1.0).frequency_hz)
-    return worst_residual(shaper, band.mode, *ends_hz).residual_ratio
+def proven_worst(shaper: Shaper, bands: Sequence[ModeBand]) -> float:
+    """Upper bound on the residual ratio over the bands."""
+    return max(_worst(shaper, band).upper_bound for band in bands)
+
+
+def _worst(shaper: Shaper, band: ModeBand) -> WorstResidual:
+    return worst_residual(shaper, band.mode, band.shifted(-1.0).frequency_hz, band.shifted(1.0).frequency_hz)
 
 
 @dataclass(frozen=True)

@@ -140,10 +140,7 @@ def choose(
     allow_negative: bool = False,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Recommendation:
-    """Design every family on every kind of times, compare, and recommend.
-
-    Source: this project.
-    """
+    """Design every family on every kind of times, compare, and recommend."""
     options = options or DesignOptions()
     _check(bands, periods_s, options, objective)
     rows = _rows(families, options)

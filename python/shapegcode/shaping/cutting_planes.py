@@ -19,7 +19,7 @@ import highspy
 import numpy as np
 from numpy.typing import NDArray
 
-from shapegcode._core import DesignError, Shaper
+from shapegcode._core import DesignError
 from shapegcode.shaping.bands import ModeBand
 
 # Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.
@@ -53,13 +53,7 @@ def _give_back(solver: _Quiet) -> None:
 
 
 class LinearProgram:
-    """Least ``cost @ x`` over x between two bounds, under linear conditions that may be added to.
-
-    Args:
-        lower: (n,) least value of each unknown.
-        upper: (n,) largest value of each unknown; may be infinite.
-        equal: matrix and right-hand side of the equations.
-    """
+    """Least ``cost @ x`` over x between two bounds, under linear conditions that may be added to."""
 
     def __init__(self, lower: FloatArray, upper: FloatArray, equal: tuple[FloatArray, FloatArray]) -> None:
         self._columns = np.arange(len(lower), dtype=np.int32)
@@ -178,8 +172,6 @@ _FEWEST_STEPS = 8
 _MOST_ROUNDS = 60
 _STARTS = 5  # frequencies of a band at which every search begins
 _BOUNDS_SHARE = 0.5  # of the worst residual: a plane that the taps come less close to did not bound them
-_PROOF_SHARE = 1e-4  # of the residual: what a proven sweep may add for what lies between its samples
-_PROOF_SAMPLES = 200_000
 _SAME_VALUE = 1e-6  # relative
 _BESIDE = np.array([-1.0, 0.0, 1.0])
 _QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
@@ -407,34 +399,3 @@ def _within(values: FloatArray, low: float, high: float) -> FloatArray:
 def _ends(band: ModeBand) -> tuple[float, float]:
     omega = 2.0 * math.pi * band.mode.frequency_hz
     return omega * (1.0 - band.uncertainty), omega * (1.0 + band.uncertainty)
-
-
-def proven_worst(shaper: Shaper, bands: Sequence[ModeBand]) -> float:
-    """Upper bound on the residual ratio over the bands, at most 0.01 % above the largest value of a sweep.
-
-    Between two samples a distance h apart, |R| is at most the larger of the two plus ``h²/8*max|R''|``, and R'' is
-    bounded by the taps' magnitudes times |q|²; the sweep is as fine as that asks for.
-    """
-    worst = 0.0
-    for band in bands:
-        worst = max(worst, _proven(shaper, band))
-    return worst
-
-
-def _proven(shaper: Shaper, band: ModeBand) -> float:
-    view = _Band(band, np.asarray(shaper.times_s))
-    taps = np.asarray(shaper.amplitudes)
-    curvature = float(np.abs(taps) @ (np.abs(view.q) ** 2 * np.exp(view.q.real * view.low)))
-    found = float(np.abs(view.terms @ taps).max())
-    width = view.high - view.low
-    allowed = max(_PROOF_SHARE * found, 0.1 * NO_RESIDUAL)
-    steps = math.ceil(width * math.sqrt(curvature / (8.0 * allowed)))
-    if steps > _PROOF_SAMPLES:
-        raise DesignError(f"{steps} samples would be needed to prove the residual of {band}, limit {_PROOF_SAMPLES}")
-    if steps > 0:
-        omegas = np.linspace(view.low, view.high, steps + 1)
-        found = max(
-            float(np.abs(view.residual(taps, part)).max()) for part in np.array_split(omegas, 1 + steps // 4096)
-        )
-        found += (width / steps) ** 2 * curvature / 8.0
-    return found

@@ -201,10 +201,7 @@ def distinct(bands: Sequence[ModeBand]) -> list[ModeBand]:
 
 
 def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None = None) -> list[Design]:
-    """All shapers of a family for some modes, judged, the preferred one first.
-
-    Modes that are given twice are designed for once (:func:`distinct`).
-    """
+    """All shapers of a family for some modes, judged, the preferred one first."""
     options = options or DesignOptions()
     row = family_named(name)
     if not bands:

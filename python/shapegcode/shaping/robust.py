@@ -25,6 +25,7 @@ from shapegcode.shaping.bands import (
     check_times,
     mode_names,
     ms,
+    proven_worst,
     whole_periods,
 )
 from shapegcode.shaping.cutting_planes import (
@@ -33,15 +34,14 @@ from shapegcode.shaping.cutting_planes import (
     Bounds,
     CutPool,
     TapProblem,
-    proven_worst,
 )
 from shapegcode.shaping.grid_designs import (
     RESIDUAL_LIMIT,
     exact_conditions,
-    halved,
     lower_hull,
     refined,
     shortest_non_negative,
+    smallest_enough,
 )
 
 VIBRATION_LIMIT = 0.05
@@ -169,7 +169,7 @@ class RobustDesign:
 
     shaper: Shaper  # the taps; times are multiples of `period_s`
     period_s: float  # period of the grid, s
-    worst_residual: float  # largest residual ratio over the bands, proven: at most 0.01 % above the true one
+    worst_residual: float  # largest residual ratio over the bands, proven
     least_possible: float  # no design of this duration or a shorter one has a smaller worst residual
 
 
@@ -189,9 +189,9 @@ class Task:
         cls,
         bands: Sequence[ModeBand],
         period_s: float,
-        non_negative: bool,
-        max_abs_sum: float,
-        zeros_at_nominal: bool,
+        non_negative: bool = True,
+        max_abs_sum: float = 1.0,
+        zeros_at_nominal: bool = False,
         mirrored: bool = False,
     ) -> Task:
         """The task, its values checked."""
@@ -274,8 +274,7 @@ def _exact(task: Task, max_duration_s: float) -> RobustDesign | None:
         shaper = shortest_non_negative(task.exact, task.period_s, max_duration_s)
     except DesignError:
         return None
-    worst = proven_worst(shaper, task.bands)
-    return RobustDesign(shaper, task.period_s, worst, 0.0)
+    return RobustDesign(shaper, task.period_s, proven_worst(shaper, task.bands), 0.0)
 
 
 def best_within(task: Task, last: int) -> RobustDesign | None:
@@ -319,13 +318,10 @@ def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, pre
     the answer suffices, but may exceed the smallest by that much.
     """
     start = max(1.0, sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s, _GROWTH * too_few)
-    enough = min(most, math.ceil(start))
-    while enough < most and _below(task, enough, limit) is None:
-        too_few, enough = enough, max(enough + 1, math.ceil(_GROWTH * enough))
-    enough = min(enough, most)
-    if enough <= too_few or _below(task, enough, limit) is None:
-        return None
-    return halved(lambda last: _below(task, last, limit) is not None, too_few, enough, precision)
+    return smallest_enough(
+        lambda last: _below(task, last, limit) is not None, math.ceil(start), most, too_few, growth=_GROWTH,
+        precision=precision,
+    )  # fmt: skip
 
 
 def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesign | None:

@@ -28,8 +28,8 @@ from shapegcode._core import (
     repeated_zv,
 )
 from shapegcode.shaping.bands import DesignOptions, ModeBand, mode_names, ms, on_grid
-from shapegcode.shaping.grid_designs import halved
-from shapegcode.shaping.grid_search import RESIDUAL_LIMIT, Conditions, ResidualLimit, Zero, shortest_on_grid
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, halved
+from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid
 
 Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
 """All shapers of a family for some bands, the preferred one first."""
@@ -157,10 +157,7 @@ def user_taps(_bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper
 
 
 def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
-    """Shortest shaper with non-negative impulses at continuous times that cancels every mode.
-
-    Source: this project (numerical optimum over all modes at once).
-    """
+    """Shortest shaper with non-negative impulses at continuous times that cancels every mode."""
     fastest_hz = max(mode.frequency_hz for mode in modes)
     title = f"simultaneous shaper without negative impulses for {mode_names(modes)}"
     conditions = Conditions(zeros=tuple(Zero(mode) for mode in modes))

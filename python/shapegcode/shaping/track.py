@@ -143,10 +143,7 @@ def design_track(
 
 
 def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None) -> Shaper | None:
-    """Non-negative shaper of a mean delay, of least second central moment, that cancels every mode exactly.
-
-    With the mean delay given, the second central moment is linear in the taps: one linear program finds its least.
-    """
+    """Non-negative shaper of a mean delay, of least second central moment, that cancels every mode exactly."""
     found = taps_of_mean(modes, period_s, periods, mean_s)
     if found is None or found[0][0] != 0:
         return None
