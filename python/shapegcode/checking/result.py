@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program.operating import no_room
 from shapegcode.results.json import hidden
 from shapegcode.results.page.model import Figure

@@ -32,7 +32,7 @@ _LOADED = (
 )  # fmt: skip
 _OF_COMMAND = {
     "convert": (
-        "shapegcode.conversion.convert", "shapegcode.shaping", "shapegcode.cli.feed",
+        "shapegcode.conversion.convert", "shapegcode.shaping.registry", "shapegcode.cli.feed",
         "shapegcode.model.signatures",
     ),
     "time": ("shapegcode.timing.cycle_time",),

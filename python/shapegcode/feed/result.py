@@ -11,7 +11,7 @@ from typing import Any
 from shapegcode.feed.load import LOADS, FeedTraces, PathLoad, WallMaps, feed_traces, wall_maps
 from shapegcode.feed.plan import FeedPlan
 from shapegcode.feed.survey import Survey
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.json import hidden
 from shapegcode.results.page.model import Figure, Page

@@ -32,7 +32,7 @@ from shapegcode.feed.result import (
 from shapegcode.feed.survey import COMMENT, Survey, SurveyedMove, SurveyedRegion, survey
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.program.compensation import program_for_conversion
 from shapegcode.results.result import Pair

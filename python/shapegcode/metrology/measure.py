@@ -21,8 +21,7 @@ from shapegcode.metrology.figures import MeasuredSection, WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
-from shapegcode.model.playable import SimulatedPrograms
-from shapegcode.model.shaped_program import shaped_warnings
+from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
 

@@ -29,6 +29,10 @@ _SIZE = r"(?:\d+\.?\d*|\.\d+)"
 _TEXT = re.compile(
     rf"({_NUMBER})(?::({_NUMBER}))?(?:(?:±|\+-|\+/-)({_NUMBER})(%|Hz)?|[-−]({_SIZE})(%|Hz)/?\+({_SIZE})(%|Hz))?"
 )
+VIBRATION_LIMIT = 0.05
+"""Residual ratio that a robust design may leave anywhere in the bands unless another one is asked for."""
+SAME = 0.02
+"""Durations (or, where none is good, worst residuals) that differ by less, relative, give way to a longer period."""
 ON_GRID = 1e-9
 """Periods; forgives the rounding of a quotient."""
 
@@ -303,7 +307,9 @@ class DesignOptions:
     period_s: float | None = None  # grid on which the taps must lie, s; None: continuous times
     max_duration_s: float = 0.25  # longest shaper, s
     max_abs_sum: float = 10.0  # largest sum of the taps' magnitudes
-    vibration_limit: float = 0.05  # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
+    vibration_limit: float = (
+        VIBRATION_LIMIT  # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
+    )
     taps: Shaper | None = None  # the shaper of the family `taps`; no other family uses it
 
     @property

@@ -17,6 +17,8 @@ from shapegcode.model.modes import axis_modes, mode_tables, moving_axis, numbere
 from shapegcode.shaping.bands import (
     NO_MODE,
     ON_GRID,
+    SAME,
+    VIBRATION_LIMIT,
     DesignOptions,
     ModeBand,
     band_names,
@@ -26,19 +28,8 @@ from shapegcode.shaping.bands import (
     whole_periods,
 )
 from shapegcode.shaping.grid_designs import shortest_non_negative
-from shapegcode.shaping.ranking import SAME
-from shapegcode.shaping.registry import design
-from shapegcode.shaping.robust import (
-    VIBRATION_LIMIT,
-    Task,
-    best_within,
-    refusal,
-    shortest_below,
-    unreachable,
-)
 from shapegcode.shaping.track import MovingMode, ShaperTrack, design_per_axis, design_track
 
-_SAME = 0.02  # designs whose durations (or worst residuals) differ by less are equal, relative
 _ASSUMED_TICK_S = 0.001  # interpolation period where no machine states one
 _LONGEST_BLOCK_PERIOD_S = 0.02
 _PERIODS_COMPARED = 3
@@ -122,7 +113,7 @@ def choose_block_period(
         candidates = tuple(_fallback(each, bands, max_duration_s, vibration_limit) for each in candidates)
         found = [(each, each.worst_residual) for each in candidates if each.worst_residual is not None]
         if found:
-            least = (1.0 + _SAME) * min(worst for _, worst in found)
+            least = (1.0 + SAME) * min(worst for _, worst in found)
             near = (each for each, worst in found if worst <= least)
             return _choice(max(near, key=lambda each: each.period_s), candidates)
     raise DesignError(
@@ -176,7 +167,7 @@ def _periods(
 
 def _shortest(candidates: tuple[BlockPeriodCandidate, ...]) -> BlockPeriodChoice:
     durations_s = [each.shaper.duration_s for each in candidates if each.shaper is not None]
-    limit_s = (1.0 + _SAME) * min(durations_s)
+    limit_s = (1.0 + SAME) * min(durations_s)
     short = [each for each in candidates if each.shaper is not None and each.shaper.duration_s <= limit_s]
     return _choice(max(short, key=lambda each: each.period_s), candidates)
 
@@ -196,6 +187,8 @@ def _candidate(
         except DesignError as error:
             return BlockPeriodCandidate(period_s, None, str(error))
         return BlockPeriodCandidate(period_s, shaper)
+    from shapegcode.shaping.robust import Task, refusal, shortest_below
+
     if not 0.0 < limit < 1.0:
         raise ArgumentError(f"vibration_limit is {limit}: it must be above 0 and below 1")
     task = Task.checked(bands, period_s)
@@ -209,6 +202,8 @@ def _fallback(
     refused: BlockPeriodCandidate, bands: Sequence[ModeBand], max_duration_s: float, limit: float
 ) -> BlockPeriodCandidate:
     """The least worst design of the longest duration, and the sentence that says so; else the refusal as it is."""
+    from shapegcode.shaping.robust import Task, best_within, unreachable
+
     task = Task.checked(bands, refused.period_s)
     last = task.periods(max_duration_s)
     found = best_within(task, last) if last and not unreachable(task) else None
@@ -243,6 +238,8 @@ def candidate_periods(
     bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float, vibration_limit: float = 0.05
 ) -> list[float]:
     """The block periods worth comparing, ascending, s: those on which a non-negative shaper is shortest."""
+    from shapegcode.shaping.robust import Task, shortest_below
+
     if machine is not None and machine.emission.block_period_s is not None:
         return [machine.emission.block_period_s]
     if machine is not None:
@@ -397,6 +394,8 @@ def _of_family(
     name: str, bands: list[ModeBand], machine: Machine, period_s: float | None, feed_mm_per_s: float
 ) -> Grid:
     """The shortest shaper of a family, on one grid or on the one on which it is shortest."""
+    from shapegcode.shaping.registry import design
+
     shaping = machine.shaping
     periods_s = (
         [period_s]

@@ -12,13 +12,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shapegcode._core import ArgumentError
-from shapegcode.shaping.bands import Design, ModeBand, ms, spoken
+from shapegcode.shaping.bands import SAME, Design, ModeBand, ms, spoken
 from shapegcode.shaping.registry import FAMILIES
 
 NO_RESIDUAL = 1e-9
 """A residual ratio below this is none: what is left is the rounding of the solver."""
-SAME = 0.02
-"""Durations (or, where none is good, worst residuals) that differ by less, relative, give way to a longer period."""
 
 _CONVERTED = {"non-negative", "robust"}  # what a conversion takes by itself
 _FOR_GRIDS = {row.name for row in FAMILIES if not row.continuous}

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.bands import (
+    VIBRATION_LIMIT,
     ModeBand,
     band_names,
     check_modes_and_times,
@@ -44,8 +45,6 @@ from shapegcode.shaping.grid_designs import (
     smallest_enough,
 )
 
-VIBRATION_LIMIT = 0.05
-"""Residual ratio that a robust design may leave anywhere in the bands unless another one is asked for."""
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # of the refused one: what a refusal looks at
 _HINT_PRECISION = 0.05  # relative, of the duration that would do
