@@ -1,6 +1,6 @@
 """What a batch has done, row by row: a file of JSON lines that outlives it.
 
-The first line says what the file is, and in which folder the batch was begun. Each further one is the row of a run,
+The first line says what the file is, and in which folder the batch was started. Each further one is the row of a run,
 written when its files are complete; of several with one key the last counts. A row that was cut off in the middle is
 not there. Rows stay on the disk: in memory is where they stand.
 """
@@ -28,8 +28,8 @@ _HEAD = {"shapegcode": "batch", "format": 2}
 _FOLDER = "folder"
 
 
-def begun_in(output: str | Path) -> str:
-    """The folder in which the batch of an output folder was begun."""
+def base_folder(output: str | Path) -> str:
+    """The folder in which the batch of an output folder was started."""
     try:
         with (Path(output) / MANIFEST).open("rb") as stream:
             return _base_of(stream, output) or os.getcwd()

@@ -141,10 +141,10 @@ class PathDemo(Result):
     def answer(self) -> str:
         """How many statements of the paper agree."""
         agreements = [row.agreement for row in self.rows]
-        said = f"{self.title}: {agreements.count('agrees')} of {len(self.rows)} statements of {self.paper} agree"
+        first = f"{self.title}: {agreements.count('agrees')} of {len(self.rows)} statements of {self.paper} agree"
         others = {"differs": "DIFFER", "explained": "differ for a known reason", "open": "cannot be compared"}
         counts = [f"{agreements.count(kind)} {words}" for kind, words in others.items() if kind in agreements]
-        return ", ".join([said, *counts])
+        return ", ".join([first, *counts])
 
     @property
     def next_step(self) -> str:
@@ -260,7 +260,7 @@ def _condition(feed: int, reduction: int, machine: Machine) -> PathCondition:
 
 
 def statements(each: PathCondition) -> list[Statement]:
-    """What the paper says of a condition, beside the ideal command."""
+    """What the paper states of a condition, beside the ideal command."""
     name = f"{each.feed_mm_per_s} mm/s, arc −{each.reduction_percent} %"
     published, ours = each.published_orbit_error_percent, each.ideal.orbit_error_percent
     agrees = abs(ours - published) <= _ORBIT_WITHIN_PERCENT
@@ -269,7 +269,7 @@ def statements(each: PathCondition) -> list[Statement]:
         "explained" if each.reduction_percent == 1 else "agrees" if agrees else "differs",
         (ours / published - 1.0) * 100.0, _SHIFTED if each.reduction_percent == 1 else "",
     )  # fmt: skip
-    said, max_percent = _PAPER_TIME[each.reduction_percent]
+    claim, max_percent = _PAPER_TIME[each.reduction_percent]
     longer_percent = each.ideal.time_increase_percent
     longer: Agreement = "agrees" if longer_percent <= max_percent else "differs"
-    return [orbit, Statement("text", f"time: {name}", said, f"+{longer_percent:.1f} %", longer)]
+    return [orbit, Statement("text", f"time: {name}", claim, f"+{longer_percent:.1f} %", longer)]

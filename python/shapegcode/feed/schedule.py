@@ -292,7 +292,7 @@ def _region(part: SurveyedRegion, plan: FeedPlan | None, load: PathLoad | None, 
     track = part.track
     misses = [words for words, _ in _misses(part, plan, load, machine)]
     if load is None and track is not None and track.section_mm2.any():
-        misses = [f"its force is not known: {part.kept or 'nothing is said of it'}"]
+        misses = [f"its force is not known: {part.kept or 'no reason is known'}"]
     removed = None
     if track is not None and len(track) > 0:
         removed = float((np.diff(np.concatenate(([0.0], track.s_mm))) * track.section_mm2).sum())
@@ -326,8 +326,8 @@ def _misses(
             cause = ", where the feed stays as it was: lower it yourself"
         elif plan.holds[worst] == MINIMUM:
             cause = ", at the least feed"
-        said = f"{words} {float(values[worst]):.4g} {unit} in line {line}, limit {limit:.4g} {unit}{cause}"
-        yield said, float(values[helped].max(initial=0.0)) / limit - 1.0
+        message = f"{words} {float(values[worst]):.4g} {unit} in line {line}, limit {limit:.4g} {unit}{cause}"
+        yield message, float(values[helped].max(initial=0.0)) / limit - 1.0
 
 
 # --- loads ------------------------------------------------------------------------------------------------------------
@@ -469,15 +469,15 @@ def _kept_blocks(place: Callable[[int], str], part: SurveyedRegion, plan: FeedPl
 
 
 def _shortened(warnings: Iterable[str], source: str) -> list[str]:
-    """Each warning once; of many that say the same of different lines the first few, and how many more there are."""
+    """Each warning once; of many of one reason in different lines the first few, and how many more there are."""
     shown: list[str] = []
     seen: Counter[str] = Counter()
     for warning in dict.fromkeys(warnings):
-        said = warning.rpartition(": ")[2]
-        seen[said] += 1
-        if seen[said] <= _SHOWN_ALIKE:
+        reason = warning.rpartition(": ")[2]
+        seen[reason] += 1
+        if seen[reason] <= _SHOWN_ALIKE:
             shown.append(warning)
     shown += [
-        f"{source}: {number - _SHOWN_ALIKE} more: {said}" for said, number in seen.items() if number > _SHOWN_ALIKE
+        f"{source}: {number - _SHOWN_ALIKE} more: {reason}" for reason, number in seen.items() if number > _SHOWN_ALIKE
     ]
     return shown

@@ -387,7 +387,7 @@ class MachineModel:
         offset: Offset = NO_OFFSET,
         tracker: _core.ContourTracker | None = None,
     ) -> _core.PlaybackFigures:
-        """Emitted blocks as the look-ahead plans them anew if it is left on, against the programmed path."""
+        """Emitted blocks as the look-ahead plans them again if it is left on, against the programmed path."""
         ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
         filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
         options = self.verdict_options(filters=filters, offset=offset)

@@ -253,7 +253,7 @@ def drive_parameters(
 
 
 def _instability(name: str, drive: _core.FeedDriveParameters, gain_per_s: float) -> list[Problem]:
-    """What says that the loop of an axis grows by itself, dry friction, backlash and force limit left out."""
+    """The problem of a loop of an axis that grows by itself, dry friction, backlash and force limit left out."""
     linear = _core.FeedDriveParameters(
         motor_mass_kg=drive.motor_mass_kg,
         table_mass_kg=drive.table_mass_kg,

@@ -112,14 +112,14 @@ def _other_period(stamp: Stamp, machine: Machine) -> str:
     except ValueError:
         return f"its header gives no block period: {stamp.block_period_ms!r}"
     ticks = period_s / controller.interpolation_period_s
-    said = f"its blocks last {stamp.block_period_ms} ms"
+    blocks = f"its blocks last {stamp.block_period_ms} ms"
     if abs(ticks - round(ticks)) > _WHOLE:
         tick_ms = controller.interpolation_period_s * 1e3
-        return f"{said}, which is no whole number of this control's periods of {tick_ms:g} ms"
+        return f"{blocks}, which is no whole number of this control's periods of {tick_ms:g} ms"
     if period_s < controller.block_time_s * (1.0 - _WHOLE):
-        return f"{said}, this control needs {controller.block_time_s * 1e3:g} ms for a block: buffer underrun"
+        return f"{blocks}, this control needs {controller.block_time_s * 1e3:g} ms for a block: buffer underrun"
     if stated_s is not None and abs(stated_s - period_s) > _WHOLE * period_s:
-        return f"{said}, emission.block_period_s is {stated_s * 1e3:g} ms here"
+        return f"{blocks}, emission.block_period_s is {stated_s * 1e3:g} ms here"
     return ""
 
 

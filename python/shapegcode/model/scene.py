@@ -93,7 +93,7 @@ def scene_of(
     """Simulate a program, and the one that was made of it, for a page."""
     programs = [original, *([emitted] if emitted is not None else [])]
     period_s = MachineModel(machine).period_s
-    variants, spectra, said = [], [], []
+    variants, spectra, notes = [], [], []
     for rank, (program, label) in enumerate(zip(programs, labels, strict=False)):
         key = ("original", "emitted")[rank]
 
@@ -103,14 +103,14 @@ def scene_of(
         variant, lines, kept = _variant(key, label, program, original, machine, plant, most_points, done)
         variants.append(variant)
         spectra += lines
-        said.append(
+        notes.append(
             f"{label}: {len(variant.sample)} of {variant.samples} samples, path within {kept.path_pixels:.1f} pixel of "
             f"{PIXELS_WIDE}, curves within {kept.pixels / PIXELS_HIGH * 100.0:.1f} % of their range"
         )
     return Scene(
         period_s=period_s,
         variants=tuple(variants),
-        thinned=f"Thinned for display, extremes kept ({'; '.join(said)}). The figures are not thinned.",
+        thinned=f"Thinned for display, extremes kept ({'; '.join(notes)}). The figures are not thinned.",
         spectra=tuple(spectra),
         modes=tuple(_mode_lines(machine)),
         link_lines=() if emitted is None else tuple(_links(original, emitted)),

@@ -224,11 +224,11 @@ def _usable(bands: Sequence[ModeBand], periods_s: Sequence[float | None]) -> lis
 def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:
     """Why a mode cannot be cancelled on a grid, empty if all can: at the grid's instants it seems to stand still."""
     for band in bands:
-        swings = abs(band.mode.pole.imag) * period_s / (2.0 * math.pi)
-        if swings > 0.5 and abs(cmath.exp(band.mode.pole * period_s) - 1.0) < _NEAR_ONE:
+        cycles = abs(band.mode.pole.imag) * period_s / (2.0 * math.pi)
+        if cycles > 0.5 and abs(cmath.exp(band.mode.pole * period_s) - 1.0) < _NEAR_ONE:
             return (
                 f"the mode at {band.mode.frequency_hz:g} Hz cannot be cancelled on a grid of {ms(period_s)}: its "
-                f"{swings:.4g} cycles per period look like standing still there; take another period"
+                f"{cycles:.4g} cycles per period look like standing still there; take another period"
             )
     return ""
 

@@ -76,7 +76,7 @@ class LinearProgram:
         self._solver.changeColsCost(len(cost), self._columns, cost)
 
     def bound(self, column: int, lower: float, upper: float) -> None:
-        """Bound one unknown anew."""
+        """Change the bounds of one unknown."""
         self._solver.changeColBounds(column, lower, upper)
 
     def solve(self) -> FloatArray | None:

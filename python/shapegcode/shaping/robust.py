@@ -50,7 +50,7 @@ _OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # of the refused one: what a refus
 _HINT_PRECISION = 0.05  # relative, of the duration that would do
 _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 FloatArray = NDArray[np.float64]
-_NO_TAP = 1e-9  # smaller amplitudes are the solver's dust
+_NO_TAP = 1e-9  # smaller amplitudes are the solver's round-off
 _GROWTH = 1.4  # of the number of periods while it is searched
 _WHOLE = 1e-3  # cycles per period from a whole number
 _LAST_TAP = 1e-3
@@ -233,7 +233,7 @@ class Task:
         return replace(self, period_s=period_s, pool=CutPool.around(self.wide))
 
     def finished(self, taps: FloatArray, lower: float) -> RobustDesign | None:
-        """The taps without dust, their zeros solved again to rounding, judged; None if that breaks them."""
+        """The taps without round-off, their zeros solved again to rounding, judged; None if that breaks them."""
         if self.mirrored:
             taps = 0.5 * (taps + taps[::-1])
         support = np.flatnonzero(np.abs(taps) > _NO_TAP)

@@ -36,8 +36,8 @@ from shapegcode.studies.varied import (
     varied_values,
 )
 
-USUAL_DRAWS = 256  # Machines on which a choice is simulated, if nothing else is said
-USUAL_CONVERSIONS = 300  # Conversions at most, if nothing else is said
+USUAL_DRAWS = 256  # Machines on which a choice is simulated, if nothing else is stated
+USUAL_CONVERSIONS = 300  # Conversions at most, if nothing else is stated
 
 _FRESH = 4  # times as many draws confirm a choice: the best of many has had luck
 _UNLIKELY_S = 1e6  # a candidate that is not likely enough costs more than any program takes

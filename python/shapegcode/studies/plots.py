@@ -83,9 +83,9 @@ def plot_choices(found: Optimum, ax: Axes | None = None) -> Axes:
         share = row.checked if row.checked is not None else row.within
         longer_ms = 1e3 * (time_s - times_s[0])
         panel.barh(place, longer_ms, height=0.6, color=plot.COLOURS[1] if row == found.best else plot.COLOURS[5])
-        said = f"{time_s:.3f} s, " + ("not simulated" if share is None else f"within tolerance on {share * 100:.1f} %")
+        label = f"{time_s:.3f} s, " + ("not simulated" if share is None else f"within tolerance on {share * 100:.1f} %")
         panel.annotate(
-            said, (longer_ms, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8,
+            label, (longer_ms, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8,
             fontweight="bold" if row == found.best else "normal",
         )  # fmt: skip
     panel.set_yticks(range(len(rows)), [", ".join(each.value for each in row.values) for row in rows], fontsize=8)

@@ -29,7 +29,7 @@ MEASURES: Mapping[str, str] = {
     "residual_x_um": "residual vibration X",
     "residual_y_um": "residual vibration Y",
     "residual_z_um": "residual vibration Z",
-    "peak_um": "vibration on the way, worst axis",
+    "peak_um": "vibration while it moves, worst axis",
     "contour_um": "contour error that is judged",
     "command_um": "contour error of the command",
     "response_um": "contour error of the machine table",
@@ -167,17 +167,17 @@ class Replay:
         followed = Deviation.of([run.command]) if command else None
         answered = Deviation.of([run.response]) if contour else None
         figures = CaseFigures(run.residual_mm, followed, answered, run.duration_s)
-        judged = judge_region(figures, part.limits)
+        outcomes = judge_region(figures, part.limits)
         axes = (run.residual_mm * 1e3).tolist()
         measured = {
             "residual_um": max(axes),
             **dict(zip(("residual_x_um", "residual_y_um", "residual_z_um"), axes, strict=True)),
             "peak_um": float(run.peak_mm.max()) * 1e3,
-            "contour_um": judged[-1].value_um if contour else 0.0,
+            "contour_um": outcomes[-1].value_um if contour else 0.0,
             "command_um": run.command.max_abs_mm * 1e3 if command else 0.0,
             "response_um": run.response.max_abs_mm * 1e3 if contour else 0.0,
             "cutting_time_s": run.duration_s,
-            SHARE: max(each.share for each in judged),
+            SHARE: max(each.share for each in outcomes),
         }
         if "original_residual_um" in wanted or "original_contour_um" in wanted:
             was = model.simulate_original(path, offset=offset)

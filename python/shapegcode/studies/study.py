@@ -222,7 +222,7 @@ def _result(
     warnings = [f"{run.count - len(kept)} of {run.count} draws have no text: they count as out of tolerance"]
     warnings += ["no Sobol indices: they need every draw"] if indices else []
     alone = CONTOURS.isdisjoint(run.wanted)
-    said = ["no contour is measured: within tolerance means its residual vibration alone"] if alone else []
+    alone_warnings = ["no contour is measured: within tolerance means its residual vibration alone"] if alone else []
     replays = [text.replay for text in texts if text.replay is not None]
     return MachineStudy(
         program=run.program.source if isinstance(run.program, Program) else run.program,
@@ -245,7 +245,7 @@ def _result(
             for name, values in measured.items()
         ),
         refused=tuple(RefusedDraws(toml(dict(text.values)), len(text.draws), text.why) for text in refused),
-        warnings=(*said, *(warnings if refused else ())),
+        warnings=(*alone_warnings, *(warnings if refused else ())),
         limits_um={
             "residual_um": min(replay.residual_limit_um for replay in replays),
             "contour_um": min(replay.contour_limit_um for replay in replays),

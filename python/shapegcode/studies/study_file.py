@@ -197,8 +197,11 @@ def study_schema(title: str) -> dict[str, Any]:
     """JSON Schema of the file, for editors: keys of the machine file are looked into, limits of values are not."""
     found = toml_schema(StudyFile, title)
     choices: dict[str, Any] = {"type": "array", "minItems": 1}
-    said: dict[str, dict[str, Any]] = {"vary": {"anyOf": [choices, {"$ref": "#/$defs/DrawnValue"}]}, "choose": choices}
-    for table, value in said.items():
+    schemas: dict[str, dict[str, Any]] = {
+        "vary": {"anyOf": [choices, {"$ref": "#/$defs/DrawnValue"}]},
+        "choose": choices,
+    }
+    for table, value in schemas.items():
         meaning = found["properties"][table]["description"]
         found["properties"][table] = keys_schema(Machine, value, table, found["$defs"]) | {"description": meaning}
     return found

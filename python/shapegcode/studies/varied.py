@@ -206,8 +206,8 @@ class Varied:
 def check_keys(name: str, given: object) -> None:
     """Refuse what does not go by keys of the machine file."""
     if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
-        said = f"{name} = {given!r}: must go by keys of the machine file"
-        raise ArgumentError(f'{said}, such as {{"axes.x.modes.1.frequency_hz": ...}}')
+        problem = f"{name} = {given!r}: must go by keys of the machine file"
+        raise ArgumentError(f'{problem}, such as {{"axes.x.modes.1.frequency_hz": ...}}')
 
 
 def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
