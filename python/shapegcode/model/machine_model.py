@@ -398,10 +398,3 @@ class MachineModel:
     def cycle_time_s(self, program: _core.ProgramText) -> float:
         """Time of a whole program in closed form, s; `shapegcode.cycle_time` says where it goes."""
         return float(_core.time_program(program, self.ordinary.model).total_s)
-
-    def other_time_s(self, program: _core.ProgramText) -> float:
-        """Time of everything between the regions, s: rapids, waits for in-position, dwells, kept moves, functions.
-
-        Moves of which an axis' position is not known count with what is known of them.
-        """
-        return _core.time_program(program, self.ordinary.model).outside_regions_s

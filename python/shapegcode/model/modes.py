@@ -204,6 +204,10 @@ _UM = 1e-6  # m
 _N_PER_UM = 1e6  # N/m
 _MM = 1e-3  # m
 _GROWING_PER_S = 1e-3  # real part of a pole above which a loop grows
+_LINEAR = {
+    "acceleration_feed_forward_ratio": 0.0, "backlash_um": 0.0, "torque_limit_n_m": None,
+    "friction_model": "viscous", "friction_coulomb_n": None, "friction_static_n": None,
+}  # fmt: skip
 
 
 def drive_parameters(
@@ -244,28 +248,18 @@ def drive_parameters(
     ]
     unstable = [
         problem
-        for name, drive, gain in zip("xyz", parameters, gains, strict=True)
-        for problem in _instability(name, drive, gain)
+        for name, axis, gain in zip("xyz", machine.axes.as_tuple(), gains, strict=True)
+        if axis.drive is not None
+        for problem in _instability(name, axis.drive, gain)
     ]
     if unstable:
         raise MachineError(machine.name, tuple(unstable))
     return parameters
 
 
-def _instability(name: str, drive: _core.FeedDriveParameters, gain_per_s: float) -> list[Problem]:
+def _instability(name: str, drive: Drive, gain_per_s: float) -> list[Problem]:
     """The problem of a loop of an axis that grows by itself, dry friction, backlash and force limit left out."""
-    linear = _core.FeedDriveParameters(
-        motor_mass_kg=drive.motor_mass_kg,
-        table_mass_kg=drive.table_mass_kg,
-        stiffness_n_per_m=drive.stiffness_n_per_m,
-        damping_n_s_per_m=drive.damping_n_s_per_m,
-        position_gain_per_s=drive.position_gain_per_s,
-        velocity_gain_n_s_per_m=drive.velocity_gain_n_s_per_m,
-        velocity_integral_time_s=drive.velocity_integral_time_s,
-        position_feedback=drive.position_feedback,
-        table_friction=_core.FrictionParameters(viscous_n_s_per_m=drive.table_friction.viscous_n_s_per_m),
-        motor_friction=drive.motor_friction,
-    )
+    linear = _of_axis([], drive.model_copy(update=_LINEAR), gain_per_s, 0.0)
     poles = np.linalg.eigvals(np.array(_core.linear_model(linear)[0]))
     worst = poles[np.argmax(poles.real)]
     if worst.real <= _GROWING_PER_S:
@@ -286,7 +280,6 @@ def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: fl
     motor_mass = drive.motor_inertia_kg_m2 * rad_per_m**2
     reduced_mass = motor_mass * drive.table_mass_kg / (motor_mass + drive.table_mass_kg)
     stiffness = drive.stiffness_n_per_um * _N_PER_UM
-    feedback = _core.PositionFeedback
     return _core.FeedDriveParameters(
         motor_mass_kg=motor_mass,
         table_mass_kg=drive.table_mass_kg,
@@ -297,7 +290,7 @@ def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: fl
         velocity_integral_time_s=drive.velocity_integral_time_s,
         velocity_feed_forward_ratio=ratio,
         acceleration_feed_forward_ratio=drive.acceleration_feed_forward_ratio,
-        position_feedback=feedback.table if drive.position_feedback == "table" else feedback.motor,
+        position_feedback=getattr(_core.PositionFeedback, drive.position_feedback),
         backlash_m=drive.backlash_um * _UM,
         force_limit_n=0.0 if drive.torque_limit_n_m is None else drive.torque_limit_n_m * rad_per_m,
         table_friction=_table_friction(drive),
@@ -309,10 +302,8 @@ def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: fl
 
 
 def _table_friction(drive: Drive) -> _core.FrictionParameters:
-    models = _core.FrictionModel
-    model = {"viscous": models.viscous, "stribeck": models.stribeck, "lugre": models.lugre}[drive.friction_model]
     return _core.FrictionParameters(
-        model,
+        getattr(_core.FrictionModel, drive.friction_model),
         viscous_n_s_per_m=drive.friction_viscous_n_s_per_m,
         coulomb_n=drive.friction_coulomb_n or 0.0,
         static_n=drive.friction_static_n or 0.0,

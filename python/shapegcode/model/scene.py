@@ -87,7 +87,6 @@ def scene_of(
     *,
     labels: tuple[str, str] = ("original", "emitted"),
     plant: str = "modal",
-    most_points: int = MOST_POINTS,
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Scene:
     """Simulate a program, and the one that was made of it, for a page."""
@@ -100,7 +99,7 @@ def scene_of(
         def done(share: float, rank: int = rank) -> None:
             on_progress((rank + share) / len(programs))
 
-        variant, lines, kept = _variant(key, label, program, original, machine, plant, most_points, done)
+        variant, lines, kept = _variant(key, label, program, original, machine, plant, done)
         variants.append(variant)
         spectra += lines
         notes.append(
@@ -124,14 +123,13 @@ def _variant(
     nominal: Program,
     machine: Machine,
     plant: str,
-    most_points: int,
     on_progress: Callable[[float], None],
 ) -> tuple[Variant, list[SceneSpectrum], Kept]:
     period_s = MachineModel(machine).period_s
     whole_s = _core.time_program(program.core, fanuc_model(machine)).total_s or period_s
     cuts = [_Nominal(mine.first_line, mine.last_line, other.path) for mine, other in paired_regions(program, nominal)]
     followed = _Followed(sorted(cuts, key=lambda cut: cut.first_line))
-    thinner, spectrum = Thinner(_scales(nominal), most_points), AccelerationSpectrum(period_s)
+    thinner, spectrum = Thinner(_scales(nominal), MOST_POINTS), AccelerationSpectrum(period_s)
     blocks = _Blocks()
     velocity: FloatArray | None = None
     for chunk in stream(program, machine, plant=plant):

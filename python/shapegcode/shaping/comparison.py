@@ -151,9 +151,10 @@ def choose(
     for done, (row, period_s) in enumerate(work):
         on_progress(done / len(work))
         if row.continuous if period_s is None else row.on_grid:
-            designs, refusal = _designs(row, bands, replace(options, period_s=period_s))
-            found += designs
-            refusals += [Refusal(row.name, period_s, refusal)] if refusal else []
+            try:
+                found += design(row.name, bands, replace(options, period_s=period_s))
+            except ShapegcodeError as error:
+                refusals.append(Refusal(row.name, period_s, str(error)))
     refusals += _never_tried(rows, usable, bands, periods_s)
     least = _least_worst(rows, usable, bands, options, found)
     found += least
@@ -231,14 +232,6 @@ def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:
                 f"{cycles:.4g} cycles per period look like standing still there; take another period"
             )
     return ""
-
-
-def _designs(row: Family, bands: Sequence[ModeBand], options: DesignOptions) -> tuple[list[Design], str]:
-    """The family's designs within the limits, or why there is none."""
-    try:
-        return design(row.name, bands, options), ""
-    except ShapegcodeError as error:
-        return [], str(error)
 
 
 def _least_worst(

@@ -429,9 +429,7 @@ def _track(machine: Machine, period_s: float) -> ShaperTrack | None:
     return None if moving_axis(machine) is None else shaper_track(machine, period_s)
 
 
-def shaper_track(
-    machine: Machine, period_s: float, max_duration_s: float | None = None, *, residual_limit: float = 0.01
-) -> ShaperTrack:
+def shaper_track(machine: Machine, period_s: float) -> ShaperTrack:
     """Shapers for all modes of a machine along the axis over which some of them vary."""
     axis = moving_axis(machine)
     if axis is None:
@@ -442,9 +440,7 @@ def shaper_track(
         for (_, _, mode), table in zip(numbered_modes(machine), tables, strict=True)
     ]
     reached = [position for table in tables for position in table.position_mm]
-    longest = machine.shaping.max_duration_s if max_duration_s is None else max_duration_s
-    span = (min(reached), max(reached))
-    return design_track(modes, axis, span, period_s, longest, residual_limit=residual_limit)
+    return design_track(modes, axis, (min(reached), max(reached)), period_s, machine.shaping.max_duration_s)
 
 
 def override_vibration_um(

@@ -61,9 +61,11 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
     last = smallest_enough(lambda last: _non_negative_solution(modes, period_s, last) is not None, 1, most)
     while last is not None and last <= most:
         for vertex in _vertices(modes, period_s, last):
-            shaper = _polished(vertex, modes, period_s)
-            if shaper is not None:
-                return shaper
+            conditions = exact_conditions(modes, period_s, last)
+            for threshold in _SUPPORT_THRESHOLDS:
+                shaper = polished(vertex, conditions, period_s, threshold, signed=False)
+                if shaper is not None and max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT:
+                    return shaper
         last += 1
     raise DesignError(_none_exists(modes, period_s, max_duration_s))
 
@@ -230,20 +232,17 @@ def _least_between(left: _Corner, right: _Corner) -> float:
     return min(left.variance, right.variance, second - mean**2)
 
 
-def _polished(vertex: FloatArray, modes: Sequence[Mode], period_s: float) -> Shaper | None:
-    """The vertex solved again to rounding on its own taps, or None if that is no non-negative design."""
-    matrix, right = exact_conditions(modes, period_s, len(vertex) - 1)
-    for threshold in _SUPPORT_THRESHOLDS:
-        support = np.flatnonzero(vertex > threshold)
-        columns = matrix[:, support]
-        taps = vertex[support]
-        taps = refined(columns, right, taps)
-        if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT):
-            continue
-        shaper = Shaper(((support - support[0]) * period_s).tolist(), (taps / taps.sum()).tolist())
-        if max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT:
-            return shaper
-    return None
+def polished(
+    taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float, *, signed: bool
+) -> Shaper | None:
+    """Taps above a threshold, solved again to rounding; None if they then miss the sum 1 or change their sign."""
+    matrix, right = conditions
+    support = np.flatnonzero(np.abs(taps) > threshold)
+    amplitudes = refined(matrix[:, support], right, taps[support])
+    total = float(amplitudes.sum())
+    if abs(total - 1.0) > RESIDUAL_LIMIT or not (signed or np.all(amplitudes > 0.0)):
+        return None
+    return Shaper(((support - support[0]) * period_s).tolist(), (amplitudes / total).tolist())
 
 
 def _none_exists(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> str:

@@ -27,7 +27,7 @@ from shapegcode._core import (
     worst_residual,
 )
 from shapegcode.shaping.bands import check_times, ms, whole_periods
-from shapegcode.shaping.cutting_planes import LinearProgram
+from shapegcode.shaping.cutting_planes import TapProgram
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, halved, refined
 
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
@@ -131,7 +131,7 @@ class GridSearch:
         self._conditions = conditions
         self._period_s = period_s
         # By number of periods, with the number of planes that are in it.
-        self._programs: dict[int, tuple[LinearProgram, int]] = {}
+        self._programs: dict[int, tuple[TapProgram, int]] = {}
         self._answers: dict[int, FloatArray | None] = {}
         self._planes = [
             _plane(each, float(frequency_hz), float(direction))
@@ -252,46 +252,24 @@ class GridSearch:
         return None
 
     def _program(self, last: int, cost: FloatArray | None) -> tuple[FloatArray, float] | None:
-        """The taps of least cost, or (None) with the least share of the limits used, and that share.
-
-        The last variable is the share; with a cost it stays below what the margin leaves.
-        """
-        program = self._with_planes(last)
-        is_signed = self._conditions.largest_tap is not None
-        objective = np.zeros(last + 1) if cost is None else cost
-        if is_signed:
-            objective = np.full(2 * last + 2, 0.0 if cost is None else 1.0)
-        program.set_cost(np.append(objective, 1.0 if cost is None else 0.0))
-        program.bound(len(objective), 0.0, math.inf if cost is None else 1.0 - LIMIT_MARGIN)
+        """The taps of least cost, or (None) with the least share of the limits used, and that share."""
+        if cost is not None and self._conditions.largest_tap is not None:
+            cost = np.ones(last + 1)
         try:
-            solution = program.solve()
+            return self._with_planes(last).solve(cost, 1.0 - LIMIT_MARGIN)
         except DesignError:
             return None
-        if solution is None:
-            return None
-        taps = solution[: last + 1]
-        return taps - solution[last + 1 : -1] if is_signed else taps, float(solution[-1])
 
-    def _with_planes(self, last: int) -> LinearProgram:
+    def _with_planes(self, last: int) -> TapProgram:
         """The linear program of a duration, with every plane so far."""
         largest = self._conditions.largest_tap
         program, done = self._programs.get(last, (None, 0))
         if program is None:
-            matrix, right = self._equalities(last)
-            if largest is not None:
-                # a tap is the difference of two that are not negative, so that its magnitude is linear
-                matrix = np.hstack([matrix, -matrix])
-            count = matrix.shape[1]
-            upper = np.full(count + 1, math.inf if largest is None else largest)
-            program = LinearProgram(
-                np.zeros(count + 1), upper, (np.hstack([matrix, np.zeros((len(matrix), 1))]), right)
-            )
+            program = TapProgram(self._equalities(last), signed=largest is not None, largest=largest or math.inf)
         new = self._planes[done:]
         if new:
             planes = self._inequalities(new, last) / np.array([plane.limit for plane in new])[:, None]
-            if largest is not None:
-                planes = np.hstack([planes, -planes])
-            program.add_below(np.hstack([planes, -np.ones((len(new), 1))]), np.zeros(len(new)))
+            program.add_planes(planes, np.zeros(len(new)))
         self._programs[last] = program, len(self._planes)
         return program
 

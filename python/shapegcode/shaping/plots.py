@@ -42,7 +42,7 @@ def plots_of(result: Recommendation) -> dict[str, Plot]:
     return found | ({} if _branches(result) is None else {"shaper-branches": partial(plot_branches, result)})
 
 
-def selected(result: Recommendation, count: int = _CURVES) -> list[Design]:
+def selected(result: Recommendation) -> list[Design]:
     """The designs worth a curve: what is recommended, then one of each family on the Pareto front, from short to long.
 
     Where there is room, one of each other family. Designs with negative impulses are left out where they may not be
@@ -61,7 +61,7 @@ def selected(result: Recommendation, count: int = _CURVES) -> list[Design]:
                 families.add(each.family)
                 drawn.add(_taps(each))
                 others.append(place)
-        room = min(count - len(places), len(others))
+        room = min(_CURVES - len(places), len(others))
         places += [others[round(step)] for step in np.linspace(0, len(others) - 1, room)] if room > 0 else []
     return [result.designs[place] for place in places]
 

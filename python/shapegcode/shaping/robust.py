@@ -40,7 +40,7 @@ from shapegcode.shaping.grid_designs import (
     RESIDUAL_LIMIT,
     exact_conditions,
     lower_hull,
-    refined,
+    polished,
     shortest_non_negative,
     smallest_enough,
 )
@@ -236,14 +236,9 @@ class Task:
         """The taps without round-off, their zeros solved again to rounding, judged; None if that breaks them."""
         if self.mirrored:
             taps = 0.5 * (taps + taps[::-1])
-        support = np.flatnonzero(np.abs(taps) > _NO_TAP)
-        matrix, right = self.conditions(len(taps) - 1)
-        amplitudes = refined(matrix[:, support], right, taps[support])
-        total = float(amplitudes.sum())
-        if abs(total - 1.0) > RESIDUAL_LIMIT or (self.max_abs_sum is None and np.any(amplitudes <= 0.0)):
-            return None
-        shaper = Shaper(((support - support[0]) * self.period_s).tolist(), (amplitudes / total).tolist())
-        if any(shaper.residual_ratio(mode) > RESIDUAL_LIMIT * shaper.abs_sum for mode in self.exact):
+        conditions, signed = self.conditions(len(taps) - 1), self.max_abs_sum is not None
+        shaper = polished(taps, conditions, self.period_s, _NO_TAP, signed=signed)
+        if shaper is None or any(shaper.residual_ratio(mode) > RESIDUAL_LIMIT * shaper.abs_sum for mode in self.exact):
             return None
         worst = proven_worst(shaper, self.bands)
         return RobustDesign(shaper, self.period_s, worst, min(lower, worst))

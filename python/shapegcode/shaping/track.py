@@ -66,17 +66,6 @@ class ShaperTrack:
         """Time of the last tap of the longest shaper, s."""
         return max(node.shaper.duration_s for node in self.nodes)
 
-    @property
-    def variance_s2(self) -> float:
-        """Largest contour cost, s²."""
-        return max(node.shaper.variance_s2 for node in self.nodes)
-
-    @property
-    def mean_spread_s(self) -> float:
-        """Largest difference between the mean delays of two shapers, s."""
-        means = [node.shaper.mean_s for node in self.nodes]
-        return max(means) - min(means)
-
     @cached_property
     def filters(self) -> VaryingFir:
         """The shapers in whole periods."""
