@@ -46,37 +46,29 @@ def row_of(job: BatchJob, outcome: JobOutcome) -> tuple[BatchRow, Mapping[str, b
     # Of a file with several programs (--program all) there is one of each: they have no figures in common.
     several = report if isinstance(report, list) else [report]
     output = next((str(each["output"]) for each in several if "output" in each), "")
-    row = {
-        "program": job.program,
-        "machine": job.machine,
-        "ended": ended,
-        "said": _said(outcome, ended),
+    row = BatchRow(
+        job.program,
+        job.machine,
+        ended,
+        _answer(outcome, ended),
         **figures_of(several[0] if len(several) == 1 else {}),
-        "output": output,
-        "report": job.report if job.report in written else "",
-        "page": next((name for name in written if name.endswith(".html")), ""),
-        "wall_s": outcome.wall_s,
-        "cpu_s": outcome.cpu_s,
-        "peak_bytes": outcome.peak_bytes,
-    }
-    return row_read(row, earlier=False), written
+        output=output,
+        report=job.report if job.report in written else "",
+        page=next((name for name in written if name.endswith(".html")), ""),
+        earlier=False,
+        wall_s=outcome.wall_s,
+        cpu_s=outcome.cpu_s,
+        peak_bytes=outcome.peak_bytes,
+    )
+    return row, written
 
 
-def _said(outcome: JobOutcome, ended: Ended) -> str:
+def _answer(outcome: JobOutcome, ended: Ended) -> str:
     """The answer, or what went wrong."""
     text = outcome.said if ended in ("ok", "not ok") else outcome.complained
     lines = [line for line in text.strip().splitlines() if line]
     first = next((line for line in lines if line.startswith(_PREFIX)), lines[0] if lines else outcome.ending)
     return first.removeprefix(_PREFIX)
-
-
-def row_read(row: Mapping[str, Any], *, earlier: bool) -> BatchRow:
-    """A row of JSON."""
-    pairs: dict[str, Any] = {name: None if row[name] is None else Pair(**row[name]) for name in _PAIRS}
-    values: dict[str, Any] = {
-        field.name: row[field.name] for field in fields(BatchRow) if field.name not in (*_PAIRS, "earlier")
-    }
-    return BatchRow(**values, **pairs, earlier=earlier)
 
 
 class KeptRows(Sequence[BatchRow]):
@@ -114,7 +106,9 @@ class KeptRows(Sequence[BatchRow]):
         job, base = self._planned.job(rank), self._planned.base
         files = {name: base.path_of(row[name]) for name in ("output", "report", "page") if row[name]}
         given = {"program": job.program, "machine": job.machine}
-        return row_read(row | files | given, earlier=bool(self._earlier[rank]))
+        pairs = {name: None if row[name] is None else Pair(**row[name]) for name in _PAIRS}
+        values = {field.name: row[field.name] for field in fields(BatchRow)}
+        return BatchRow(**values | files | given | pairs | {"earlier": bool(self._earlier[rank])})
 
 
 def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
