@@ -101,7 +101,7 @@ def test_exit_code_1_if_the_best_leaves_too_much(capsys: pytest.CaptureFixture[s
         (["--mode", "fast"], "is no mode"),
         (["--mode", "200", "--block-period", "5ms"], "200 Hz cannot be cancelled on a grid of 5 ms"),
         (["--mode", "46", "--family", "magic"], "is no family"),
-        (["--mode", "46", "--taps", "0:.5,10ms"], "is no tap"),
+        (["--mode", "46", "--taps", "0:.5,10ms"], "is no impulse"),
         (["--mode", "46", "--taps", "0:.5,10ms:.6"], "add up to 1.1"),
         (["--mode", "46", "--family", "zv", "--max-duration", "1ms"], "no family has a shaper for 46 Hz within 1 ms"),
         (["--mode", "46", "-m", "vx500"], "give one of both"),

@@ -322,8 +322,8 @@ def test_taps_in_every_form() -> None:
 
 def test_taps_that_are_none() -> None:
     for given, message in (
-        ("", "is no tap"),
-        ("0:0.5,0.01", "is no tap: TIME:AMPLITUDE"),
+        ("", "is no impulse"),
+        ("0:0.5,0.01", "is no impulse: TIME:AMPLITUDE"),
         ("0:0.5,0.01:0.4", "add up to"),
         ("0.01:1", "first time"),
         ("[[0, 1", "no JSON"),
@@ -337,7 +337,7 @@ def test_taps_that_are_none() -> None:
     with pytest.raises(ArgumentError, match="none are"):
         design("taps", [SLOW])
     off = DesignOptions(taps=zv(SLOW.mode), period_s=0.005)
-    with pytest.raises(DesignError, match=r"the tap at 10\.87\d* ms is not on the 5 ms grid, nearest 10 ms"):
+    with pytest.raises(DesignError, match=r"the impulse at 10\.87\d* ms is not on the 5 ms grid, nearest 10 ms"):
         design("taps", [SLOW], off)
 
 

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add(
         "--block-period", metavar="TIME", type=seconds, action="append", default=[],
-        help="block period on which the taps must lie, for example 5ms; may be repeated (default: the machine's, or "
+        help="block period on which the impulses must lie, such as 5ms; may be repeated (default: the machine's, or "
         "the best few)",
     )  # fmt: skip
     add(
@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add(
         "--max-abs-sum", metavar="N", type=positive, default=10.0,
-        help="largest sum of the taps' magnitudes (default: %(default)g)",
+        help="largest sum of the impulses' magnitudes (default: %(default)g)",
     )  # fmt: skip
     add(
         "--vibration-limit", metavar="RATIO", type=ratio,

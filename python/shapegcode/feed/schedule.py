@@ -115,8 +115,8 @@ def schedule_survey(
     own = motion or ordinary
     total = max(len(surveyed.regions), 1)
     plans = _plan_all(surveyed, machine, own, margin, lambda done: on_progress(_PLANNING * done / total))
-    text, places, blocks = _write(program, plans, machine)
-    written = _read_back(text, program, places, machine)
+    text, first_lines, blocks = _write(program, plans, machine)
+    written = _read_back(text, program, first_lines, machine)
     loads: list[PathLoad | None] = []
     for index, (plan, part) in enumerate(zip(plans, surveyed.regions, strict=True)):
         path = written.regions[index].path
@@ -177,13 +177,13 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
     """The text, per region its first line there, and the number of cutting blocks."""
     core = program.core
     parts: list[bytes] = []
-    places: list[int] = []
+    first_lines: list[int] = []
     line, position, blocks = 1, 0, 0
     modal_feed = 0.0  # where it is not that of the original
     for index, (region, plan) in enumerate(zip(program.regions, plans, strict=True)):
         between = core.slice(position, region.text_begin)
         line += between.count(b"\n")
-        places.append(line)
+        first_lines.append(line)
         text = core.slice(region.text_begin, region.text_end)
         if plan is None:
             blocks += region.blocks
@@ -199,7 +199,7 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
         line += text.count(b"\n")
         position = region.text_end
     parts.append(core.slice(position, core.size))
-    return b"".join(parts), places, blocks
+    return b"".join(parts), first_lines, blocks
 
 
 def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index: int) -> bool:
@@ -211,7 +211,7 @@ def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index
     return here.exit.units == following.entry.units and not _NEEDS_FEED.search(between.upper())
 
 
-def _read_back(text: bytes, program: Program, places: Sequence[int], machine: Machine) -> Program:
+def _read_back(text: bytes, program: Program, first_lines: Sequence[int], machine: Machine) -> Program:
     """The written text as a program; its regions must be those of the original, by place, length and end."""
     try:
         emitted = Program.from_text(text, machine, source="the written program", emitted=True)
@@ -219,7 +219,7 @@ def _read_back(text: bytes, program: Program, places: Sequence[int], machine: Ma
         raise RoundTripError(f"the written program cannot be read: {error}") from error
     if len(emitted.regions) != len(program.regions):
         raise RoundTripError(f"{len(program.regions)} regions were read, {len(emitted.regions)} were written")
-    for before, after, line in zip(program.regions, emitted.regions, places, strict=True):
+    for before, after, line in zip(program.regions, emitted.regions, first_lines, strict=True):
         increment = least_increment_mm(machine, before.exit.units)
         off = max(abs(float(d)) for d in before.path[-1].end_mm - after.path[-1].end_mm)
         longer = abs(before.path.length_mm - after.path.length_mm)

@@ -306,7 +306,9 @@ class Job:
     nominal: _core.Region
     path: _core.Path
     sections: list[_core.PathSection]
-    joined_mm: float = 0.0
+    joined_mm: float = (
+        0.0  # runs shorter than this are one curve, because there were too many of them; 0: as everywhere
+    )
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:

@@ -118,10 +118,10 @@ FloatArray = npt.NDArray[np.float64]
 class OwnFilter:
     """The control's own filter behind the interpolation, while shaped blocks run."""
 
-    shape: str
-    time_constant_s: float
-    bell_time_s: float
-    duration_s: float
+    shape: str  # "linear" (moving averages) or "exponential"
+    time_constant_s: float  # length of the moving average, or time constant; 0: none
+    bell_time_s: float  # length of the second moving average; 0: none
+    duration_s: float  # of the response to a step
 
     @property
     def variance_s2(self) -> float:

@@ -45,29 +45,20 @@ _FLAT = {
 }  # a curve within so little is flat
 
 
-@dataclass(frozen=True)
-class _Nominal:
-    """A cut that is simulated, and the path that it shall follow."""
-
-    first_line: int
-    last_line: int
-    path: _core.Path
-
-
 @dataclass
 class _Followed:
     """Follows the cuts of a program along their paths, one after the other."""
 
-    cuts: list[_Nominal]
+    cuts: list[tuple[_core.Region, _core.Path]]  # each with the path that it shall follow, in the order of its lines
     _at: int = -1
     _follower: _core.PathFollower | None = field(default=None, repr=False)
 
     def deviations_mm(self, chunk: Chunk) -> FloatArray:
         """From path to table, (k, 3); from command to table where no path is known."""
         found = chunk.error_mm.copy()
-        firsts = np.array([cut.first_line for cut in self.cuts])
+        firsts = np.array([cut.first_line for cut, _ in self.cuts])
         cut_of = np.searchsorted(firsts, chunk.line, side="right") - 1
-        lasts = np.array([cut.last_line for cut in self.cuts] or [0])
+        lasts = np.array([cut.last_line for cut, _ in self.cuts] or [0])
         cut_of[(cut_of >= 0) & (chunk.line > lasts[np.maximum(cut_of, 0)])] = -1
         borders = np.flatnonzero(np.diff(cut_of)) + 1
         for begin, end in zip([0, *borders], [*borders, len(chunk)], strict=True):
@@ -75,7 +66,7 @@ class _Followed:
             if rank < 0:
                 continue
             if rank != self._at or self._follower is None:
-                self._at, self._follower = rank, _core.PathFollower(self.cuts[rank].path)
+                self._at, self._follower = rank, _core.PathFollower(self.cuts[rank][1])
             found[begin:end] = self._follower.step(chunk.command_mm[begin:end], chunk.response_mm[begin:end])
         return found
 
@@ -127,8 +118,8 @@ def _variant(
 ) -> tuple[Variant, list[SceneSpectrum], Kept]:
     period_s = MachineModel(machine).period_s
     whole_s = _core.time_program(program.core, fanuc_model(machine)).total_s or period_s
-    cuts = [_Nominal(mine.first_line, mine.last_line, other.path) for mine, other in paired_regions(program, nominal)]
-    followed = _Followed(sorted(cuts, key=lambda cut: cut.first_line))
+    cuts = [(mine, other.path) for mine, other in paired_regions(program, nominal)]
+    followed = _Followed(sorted(cuts, key=lambda cut: cut[0].first_line))
     thinner, spectrum = Thinner(_scales(nominal), MOST_POINTS), AccelerationSpectrum(period_s)
     blocks = _Blocks()
     velocity: FloatArray | None = None
@@ -155,7 +146,7 @@ def _variant(
     text = program.expanded_text.decode("utf-8", "replace")
     variant = Variant(
         key, label, program.source, text, kept.sample, line, block, kept.command_mm, kept.deviation_um, channels,
-        thinner.samples, tuple((cut.first_line, cut.last_line) for cut in cuts),
+        thinner.samples, tuple((cut.first_line, cut.last_line) for cut, _ in cuts),
     )  # fmt: skip
     return variant, spectrum.lines(key, most_hz=_most_hz(machine, period_s)), kept
 

@@ -206,7 +206,7 @@ def whole_periods(duration_s: float, period_s: float) -> int:
     return math.floor(duration_s / period_s + ON_GRID)
 
 
-_EXACT = 1e-3  # of the vibration; taps that someone typed have four digits
+_EXACT = 1e-3  # of the vibration; impulses that someone typed have four digits
 _TAP = re.compile(rf"\s*({_NUMBER})\s*(ms|s)?\s*:\s*({_NUMBER})\s*")
 _FORM = "TIME:AMPLITUDE,TIME:AMPLITUDE with times in s or with ms behind them, for example 0:0.5,10.87ms:0.5"
 
@@ -217,7 +217,7 @@ class Design:
 
     Attributes:
         family: name of its row in the registry.
-        shaper: the taps.
+        shaper: its impulses.
         period_s: grid on which its times lie and its zeros are exact, s; None: times are continuous.
         residual: largest residual ratio of the modes at their nominal frequencies.
         worst_residual: the same over the modes' bands.
@@ -245,17 +245,17 @@ class Design:
 
     @property
     def times_s(self) -> tuple[float, ...]:
-        """Times of the taps, s."""
+        """Times of the impulses, s."""
         return tuple(self.shaper.times_s.tolist())
 
     @property
     def amplitudes(self) -> tuple[float, ...]:
-        """Amplitudes of the taps; they add up to 1."""
+        """Amplitudes of the impulses; they add up to 1."""
         return tuple(self.shaper.amplitudes.tolist())
 
     @property
     def duration_s(self) -> float:
-        """Time of the last tap, s."""
+        """Time of the last impulse, s."""
         return self.shaper.duration_s
 
     @property
@@ -265,12 +265,12 @@ class Design:
 
     @property
     def abs_sum(self) -> float:
-        """Sum of the taps' magnitudes: 1 without negative impulses."""
+        """Sum of the impulses' magnitudes: 1 without negative impulses."""
         return self.shaper.abs_sum
 
     @property
     def negative(self) -> bool:
-        """Whether any tap is negative."""
+        """Whether any impulse is negative."""
         return self.shaper.has_negative
 
     @staticmethod
@@ -304,9 +304,9 @@ def _worst(shaper: Shaper, band: ModeBand) -> WorstResidual:
 class DesignOptions:
     """What a design may be."""
 
-    period_s: float | None = None  # grid on which the taps must lie, s; None: continuous times
+    period_s: float | None = None  # grid on which the impulses must lie, s; None: continuous times
     max_duration_s: float = 0.25  # longest shaper, s
-    max_abs_sum: float = 10.0  # largest sum of the taps' magnitudes
+    max_abs_sum: float = 10.0  # largest sum of the impulses' magnitudes
     vibration_limit: float = (
         VIBRATION_LIMIT  # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
     )
@@ -346,7 +346,7 @@ def on_grid(shaper: Shaper, period_s: float) -> Shaper:
         steps = time_s / period_s
         if abs(steps - round(steps)) > ON_GRID * max(1.0, steps):
             raise DesignError(
-                f"the tap at {ms(time_s)} is not on the {ms(period_s)} grid, nearest "
+                f"the impulse at {ms(time_s)} is not on the {ms(period_s)} grid, nearest "
                 f"{ms(round(steps) * period_s)}; rounding would undo the zeros: design on the grid"
             )
     return shaper
@@ -357,7 +357,7 @@ def _from_text(text: str) -> Shaper:
     for part in text.split(","):
         match = _TAP.fullmatch(part)
         if match is None:
-            raise ArgumentError(f"{part.strip()!r} is no tap: {_FORM}")
+            raise ArgumentError(f"{part.strip()!r} is no impulse: {_FORM}")
         times_s.append(float(match[1]) * (1e-3 if match[2] == "ms" else 1.0))
         amplitudes.append(float(match[3]))
     return Shaper(times_s, amplitudes)

@@ -56,6 +56,7 @@ class LinearProgram:
     """Least ``cost @ x`` over x between two bounds, under linear conditions that may be added to."""
 
     def __init__(self, lower: FloatArray, upper: FloatArray, equal: tuple[FloatArray, FloatArray]) -> None:
+        """Bounds of each unknown, (n,); matrix and right-hand side of the equations."""
         self._columns = np.arange(len(lower), dtype=np.int32)
         self._solver = _solver()
         weakref.finalize(self, _give_back, self._solver).atexit = False

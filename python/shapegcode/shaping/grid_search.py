@@ -134,7 +134,7 @@ class GridSearch:
         self._programs: dict[int, tuple[TapProgram, int]] = {}
         self._answers: dict[int, FloatArray | None] = {}
         self._planes = [
-            _plane(each, float(frequency_hz), float(direction))
+            _Plane(Mode(float(frequency_hz), each.mode.damping_ratio).pole, float(direction), each.limit)
             for each in conditions.limits
             for frequency_hz in _frequencies(each, _FIRST_FREQUENCIES)
             for direction in 2.0 * np.pi * np.arange(_FIRST_DIRECTIONS) / _FIRST_DIRECTIONS
@@ -336,10 +336,6 @@ class GridSearch:
             and all(each.worst(shaper)[0] <= each.limit for each in self._conditions.limits)
             and (largest is None or float(np.abs(shaper.amplitudes).max()) <= largest * (1.0 + RESIDUAL_LIMIT))
         )
-
-
-def _plane(limit: ResidualLimit, frequency_hz: float, direction: float) -> _Plane:
-    return _Plane(Mode(frequency_hz, limit.mode.damping_ratio).pole, direction, limit.limit)
 
 
 def _frequencies(limit: ResidualLimit, count: int) -> FloatArray:

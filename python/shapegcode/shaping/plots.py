@@ -48,22 +48,22 @@ def selected(result: Recommendation) -> list[Design]:
     Where there is room, one of each other family. Designs with negative impulses are left out where they may not be
     recommended and there are others.
     """
-    places = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))
+    indices = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))
     negative = result.allow_negative or result.design.negative
-    shown = [place for place in result.shown() if negative or not result.designs[place].negative]
-    families = {result.designs[place].family for place in places}
-    drawn = {_taps(result.designs[place]) for place in places}
+    shown = [index for index in result.shown() if negative or not result.designs[index].negative]
+    families = {result.designs[index].family for index in indices}
+    seen = {_taps(result.designs[index]) for index in indices}
     for pareto in (True, False):
         others = []
-        for place in shown:
-            each = result.designs[place]
-            if each.pareto == pareto and each.family not in families and _taps(each) not in drawn:
+        for index in shown:
+            each = result.designs[index]
+            if each.pareto == pareto and each.family not in families and _taps(each) not in seen:
                 families.add(each.family)
-                drawn.add(_taps(each))
-                others.append(place)
-        room = min(_CURVES - len(places), len(others))
-        places += [others[round(step)] for step in np.linspace(0, len(others) - 1, room)] if room > 0 else []
-    return [result.designs[place] for place in places]
+                seen.add(_taps(each))
+                others.append(index)
+        room = min(_CURVES - len(indices), len(others))
+        indices += [others[round(step)] for step in np.linspace(0, len(others) - 1, room)] if room > 0 else []
+    return [result.designs[index] for index in indices]
 
 
 def _taps(each: Design) -> tuple[float, ...]:
@@ -201,7 +201,7 @@ def plot_impulses(result: Shapers, ax: Axes | None = None) -> Axes:
     """
     shapers, _ = _shapers_and_bands(result, ())
     rows = plot.grid(
-        ax, len(shapers), 1, size_inch=(9.0, 1.2 + 1.35 * len(shapers)), title="Taps", sharex="col"
+        ax, len(shapers), 1, size_inch=(9.0, 1.2 + 1.35 * len(shapers)), title="Impulses", sharex="col"
     )  # fmt: skip
     panels = [row[0] for row in rows]
     unit, scale = _time_unit(max(shaper.duration_s for shaper in shapers.values()))
@@ -280,7 +280,7 @@ def plot_branches(result: Recommendation, ax: Axes | None = None) -> Axes:
     negative = (branches.amplitudes < 0.0).any(axis=2)
     durations_s = branches.times_s[..., 2]
     unit, scale = _time_unit(float(np.nanmax(durations_s)))
-    for has, colour, label in ((True, plot.COLOURS[0], "a negative tap"), (False, plot.COLOURS[1], "none")):
+    for has, colour, label in ((True, plot.COLOURS[0], "a negative impulse"), (False, plot.COLOURS[1], "none")):
         curves = np.where(negative == has, durations_s, np.nan)
         panel.plot(branches.ratios * slow, curves.T * scale, color=colour, linewidth=1.4)
         panel.plot([], [], color=colour, label=label)
@@ -319,10 +319,10 @@ def _time_unit(longest_s: float) -> tuple[str, float]:
 
 
 def shaped_step(shaper: _core.Shaper, period_s: float, until_s: float) -> FloatArray:
-    """A unit step behind a shaper: the staircase of its taps at 0, one period, ... at least `until_s`.
+    """A unit step behind a shaper: the staircase of its impulses at 0, one period, ... at least `until_s`.
 
-    All is one period late, so that the first sample is at rest. A tap between two samples is shared by both so that
-    its time is kept; its step takes two periods.
+    All is one period late, so that the first sample is at rest. An impulse between two samples is shared by both so
+    that its time is kept; its step takes two periods.
     """
     times_s = np.arange(round(until_s / period_s) + 2) * period_s
     after = (times_s[:, None] - shaper.times_s[None, :]) / period_s

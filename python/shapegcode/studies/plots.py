@@ -131,15 +131,15 @@ def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
 
 
 def _band(panel: Axes, bins: Bins) -> None:
-    places = [each.at for each in bins.bins]
+    positions = [each.at for each in bins.bins]
     low, middle, high = ([getattr(each, name) for each in bins.bins] for name in ("low", "median", "high"))
-    if bins.numbers and len(places) > 1:
-        panel.fill_between(places, low, high, color=plot.COLOURS[5], alpha=0.5, linewidth=0.0)
-        panel.plot(places, middle, color=plot.COLOURS[1])
+    if bins.numbers and len(positions) > 1:
+        panel.fill_between(positions, low, high, color=plot.COLOURS[5], alpha=0.5, linewidth=0.0)
+        panel.plot(positions, middle, color=plot.COLOURS[1])
         return
-    for place, bottom, at, top in zip(places, low, middle, high, strict=True):
-        panel.plot([place, place], [bottom, top], color=plot.COLOURS[5], linewidth=8.0, solid_capstyle="butt")
-        panel.plot([place], [at], color=plot.COLOURS[1], marker="o")
+    for position, bottom, at, top in zip(positions, low, middle, high, strict=True):
+        panel.plot([position, position], [bottom, top], color=plot.COLOURS[5], linewidth=8.0, solid_capstyle="butt")
+        panel.plot([position], [at], color=plot.COLOURS[1], marker="o")
     if not bins.numbers:
-        panel.set_xticks(places, [each.name for each in bins.bins])
+        panel.set_xticks(positions, [each.name for each in bins.bins])
         panel.margins(x=0.25)

@@ -78,7 +78,7 @@ class Replay:
         limits: Sequence[RegionLimits],  # of each
         time_s: float,  # cycle time of the text on that machine
     ) -> None:
-        self.machine, self._original, self._emitted, self._places = machine, original, emitted, tuple(parts)
+        self.machine, self._original, self._emitted, self._extents = machine, original, emitted, tuple(parts)
         self.time_s = time_s
         regions = [original.regions[index] for index, _, _ in parts]
         self._parts = [
@@ -113,15 +113,15 @@ class Replay:
         for place in found.placed:
             simulated = judging.simulate_original(place.region.path, offset=judging.offset(place.region))
             limits.append(judge.limits(RegionFigures(simulated, (), (), 0), place))
-        places = [(ranks[id(place.region)], place.first_line, place.last_line) for place in found.placed]
-        return cls(machine, original, found.emitted, places, limits, found.cycle_time_s.emitted)
+        extents = [(ranks[id(place.region)], place.first_line, place.last_line) for place in found.placed]
+        return cls(machine, original, found.emitted, extents, limits, found.cycle_time_s.emitted)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As bytes and numbers, for another process."""
         limits = [part.limits for part in self._parts]
         numbers = tuple((tuple(each.residual_um.tolist()), each.contour_um, each.target) for each in limits)
         texts = self._original.source, self._original.expanded_text, self._emitted.text
-        return _replay, (self.machine.to_toml(short=True), *texts, self._places, numbers, self.time_s)
+        return _replay, (self.machine.to_toml(short=True), *texts, self._extents, numbers, self.time_s)
 
     @property
     def contour_limit_um(self) -> float:
@@ -246,7 +246,7 @@ def _replay(
     source: str,
     original: bytes,
     emitted: bytes,
-    places: tuple[tuple[int, int, int], ...],
+    extents: tuple[tuple[int, int, int], ...],
     limits: tuple[tuple[tuple[float, ...], float, Any], ...],
     time_s: float,
 ) -> Replay:
@@ -254,5 +254,5 @@ def _replay(
     machine = Machine.from_toml(toml)
     read = Program.from_text(original, machine, source=source)
     shaped = Program.from_text(emitted, machine, source=source, emitted=True)
-    judged = [RegionLimits(np.array(residual), contour, target) for residual, contour, target in limits]
-    return Replay(machine, read, shaped, places, judged, time_s)
+    region_limits = [RegionLimits(np.array(residual), contour, target) for residual, contour, target in limits]
+    return Replay(machine, read, shaped, extents, region_limits, time_s)
