@@ -11,8 +11,9 @@ import jsonschema
 import numpy as np
 import pytest
 
+import shapegcode as sg
 from shapegcode import _core
-from shapegcode._core import Mode, Shaper, convolved_zv
+from shapegcode._core import ArgumentError, Mode, Shaper, convolved_zv
 from shapegcode.cli import main
 from shapegcode.results import plot as canvas
 from shapegcode.results.json import schema
@@ -190,6 +191,21 @@ def test_pictures_are_drawn_into_the_caller_s_axes() -> None:
         assert drawn.has_data(), name
         assert drawn.get_window_extent().x0 > 0.5 * figure.bbox.width, name
     assert "shaper-branches" not in plots_of(choose_shaper(["46:0.02"], periods_s=[0.005], families=["zv"]))
+
+
+def test_shapers_by_name_are_drawn_as_those_of_a_comparison() -> None:
+    shapers = {"zv": convolved_zv([Mode(46.0, 0.02)]), "none": Shaper([0.0], [1.0])}
+    sensitivity = sg.plot_sensitivity(shapers, modes=["46:0.02±5%"])
+    steps = sg.plot_steps(shapers, modes=[46])
+    for panel in (sensitivity, steps):
+        assert shapers.keys() <= {line.get_label() for line in panel.get_lines()}
+    assert sg.plot_impulses(shapers["zv"]).get_title(loc="left") == "shaper"
+    # Behind the last impulse the mode keeps what the residual ratio says: here nothing.
+    grey, behind_zv, behind_none = steps.figure.axes[1].get_lines()
+    rest = grey.get_xdata() > 1e3 * shapers["zv"].duration_s + 1.0
+    assert np.abs(behind_zv.get_ydata()[rest] - 1.0).max() < 0.05 < np.abs(behind_none.get_ydata()[rest] - 1.0).max()
+    with pytest.raises(ArgumentError, match="0 given"):
+        sg.plot_steps(shapers)
 
 
 def test_the_same_picture_gives_the_same_bytes(tmp_path: Path) -> None:

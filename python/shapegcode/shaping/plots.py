@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode import _core
-from shapegcode._core import MinimalBranches, Mode, Shaper, minimal_branches
+from shapegcode._core import ArgumentError, MinimalBranches, Mode, Shaper, minimal_branches
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 from shapegcode.shaping.bands import Design, ModeBand, mode_band
@@ -226,8 +226,13 @@ def plot_steps(result: Shapers, ax: Axes | None = None, *, modes: Sequence[float
 
     Returns:
         The upper panel.
+
+    Raises:
+        ArgumentError: a shaper without modes.
     """
     shapers, bands = _shapers_and_bands(result, modes)
+    if not bands:
+        raise ArgumentError("modes: 0 given: a step is drawn with the modes that follow it, at least one")
     nominal = [band.mode for band in bands]
     slowest_s = 1.0 / min(band.mode.frequency_hz for band in bands)
     until_s = max(shaper.duration_s for shaper in shapers.values()) + _SWINGS_SHOWN * slowest_s
