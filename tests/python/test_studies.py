@@ -27,7 +27,7 @@ from shapegcode.errors import ArgumentError, MachineError
 from shapegcode.machine.output import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.studies import replay as replays
-from shapegcode.studies.replay import SamplesJob, play_all
+from shapegcode.studies.replay import SamplesJob, simulate_all
 from shapegcode.studies.study import decides, interval_of
 from shapegcode.studies.study_file import StudyFileError
 from shapegcode.studies.varied import sampled_columns, varied_values
@@ -489,7 +489,7 @@ def test_a_text_that_travels_as_bytes_is_played_to_the_bit() -> None:
     rows = tuple({Y_HZ: 120.0 + draw} for draw in range(70))
     job = SamplesJob("vx500", rows, tuple(range(70)), ("residual_um", "contour_um", "time_s"), times=True)
     with ThreadPoolExecutor(2) as pool:
-        assert play_all(replay, job, pool) == play_all(replay, job, None)
+        assert simulate_all(replay, job, pool) == simulate_all(replay, job, None)
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from shapegcode.machine import Machine
 from shapegcode.machine.output import ANY_PRICE
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
-from shapegcode.studies.replay import SHARE, Replay, SamplesJob, play_all
+from shapegcode.studies.replay import SHARE, Replay, SamplesJob, simulate_all
 from shapegcode.studies.result import Candidate, ChosenValue, Optimum
 from shapegcode.studies.study import check_ends, check_probability, within
 from shapegcode.studies.varied import (
@@ -165,7 +165,9 @@ class _Choosing:
     def _share(self, replay: Replay, which: int) -> float:
         rows = self._rows[which]
         numbers = tuple(range(1, len(rows) + 1))
-        shares = np.array(play_all(replay, SamplesJob(self._machine.name, rows, numbers, (SHARE,), times=False), None))
+        shares = np.array(
+            simulate_all(replay, SamplesJob(self._machine.name, rows, numbers, (SHARE,), times=False), None)
+        )
         return float(within(shares).mean())
 
     def simulated(self, ranks: Ranks) -> Candidate:

@@ -133,7 +133,7 @@ class Replay:
         """The smallest that is allowed of any axis that may vibrate."""
         return min(float(part.limits.residual_um.min()) for part in self._parts)
 
-    def play(
+    def simulate(
         self, machine: Machine, wanted: Collection[str], *, override: float = _FULL, times: bool = True
     ) -> dict[str, float]:
         """Simulate the text."""
@@ -189,7 +189,7 @@ class Replay:
 OVERRIDE = "times.feed_override_percent"  # Where it is varied, the blocks are simulated at it
 
 _AT_ONCE = 64  # draws of a task at most: long enough to be worth one
-_PLAYED_S = 900.0  # of motion in a task: short enough to tell how far it is, and to be stopped
+_SIMULATED_S = 900.0  # of motion in a task: short enough to tell how far it is, and to be stopped
 _KEPT_TEXTS = 4
 
 
@@ -201,34 +201,34 @@ class SamplesJob:
     rows: tuple[Mapping[str, object], ...]  # values of the machine that simulates, by key, a row for each draw
     draws: tuple[int, ...]  # their numbers
     wanted: tuple[str, ...]  # what is measured
-    times: bool  # see `Replay.play`
+    times: bool  # see `Replay.simulate`
 
-    def play(self, replay: Replay) -> list[list[float]]:
+    def simulate(self, replay: Replay) -> list[list[float]]:
         """Simulate them."""
         found = []
         for row, draw in zip(self.rows, self.draws, strict=True):
             machine = sampled_machine(replay.machine, row, f"{self.name}, draw {draw}")
             override = machine.times.feed_override_percent / 100.0 if OVERRIDE in row else 1.0
-            measured = replay.play(machine, self.wanted, override=override, times=self.times)
+            measured = replay.simulate(machine, self.wanted, override=override, times=self.times)
             found.append([measured[name] for name in self.wanted])
         return found
 
     def parts(self, motion_s: float) -> Iterator[SamplesJob]:
         """The same in tasks."""
-        size = max(1, min(_AT_ONCE, int(_PLAYED_S / max(motion_s, 1e-3))))
+        size = max(1, min(_AT_ONCE, int(_SIMULATED_S / max(motion_s, 1e-3))))
         for at in range(0, len(self.rows), size):
             rows, draws = self.rows[at : at + size], self.draws[at : at + size]
             yield SamplesJob(self.name, rows, draws, self.wanted, self.times)
 
 
-def play_all(
+def simulate_all(
     replay: Replay, job: SamplesJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
 ) -> list[list[float]]:
     """Simulate the draws of one text."""
     parts = list(job.parts(replay.time_s))
     found: list[list[float]] = []
     threads = ThreadPoolExecutor(cores())
-    running = [(pool or threads).submit(part.play, replay) for part in parts]
+    running = [(pool or threads).submit(part.simulate, replay) for part in parts]
     try:
         for future, part in zip(running, parts, strict=True):
             found += future.result()

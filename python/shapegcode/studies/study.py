@@ -19,7 +19,15 @@ from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
-from shapegcode.studies.replay import CONTOURS, DEFAULT_MEASURES, SHARE, Replay, SamplesJob, checked_measures, play_all
+from shapegcode.studies.replay import (
+    CONTOURS,
+    DEFAULT_MEASURES,
+    SHARE,
+    Replay,
+    SamplesJob,
+    checked_measures,
+    simulate_all,
+)
 from shapegcode.studies.result import (
     PERCENT,
     BinQuantiles,
@@ -104,7 +112,7 @@ def study(
     with contextlib.ExitStack() as stack:
         pool = None if cluster is None else stack.enter_context(cluster_executor(cluster, cores()))[0]
         run = _StudyRun(source, machine, varied, columns, wanted, pool, shape_all, on_progress)
-        texts = run.play()
+        texts = run.simulate()
     return _result(run, texts, sampling, seed, at_least, indices=indices)
 
 
@@ -144,8 +152,8 @@ class _StudyRun:
         self.measured = np.full((self.count, len(wanted)), np.nan)
         self.nominal: dict[str, float] = {}
 
-    def play(self) -> list[_Text]:
-        """Convert each text and play its draws."""
+    def simulate(self) -> list[_Text]:
+        """Convert each program and simulate its samples."""
         groups: dict[str, list[int]] = {}
         rows = [self._row(index, known=True) for index in range(self.count)]
         for index, row in enumerate(rows):
@@ -155,10 +163,10 @@ class _StudyRun:
             self.on_progress("converting", done / self.count)
             text = self._text(tuple(draws), rows[draws[0]])
             if text.replay is not None:
-                self._play(text, done)
+                self._simulate(text, done)
             done += len(draws)
             texts.append(text)
-        self._play_nominal(texts)
+        self._simulate_nominal(texts)
         return texts
 
     def _row(self, index: int, *, known: bool) -> dict[str, object]:
@@ -177,7 +185,7 @@ class _StudyRun:
                 raise  # there is no other text
             return _Text(draws, values, None, str(error))
 
-    def _play(self, text: _Text, before: int) -> None:
+    def _simulate(self, text: _Text, before: int) -> None:
         assert text.replay is not None
         job = SamplesJob(
             self.machine.name,
@@ -191,11 +199,11 @@ class _StudyRun:
         def tell(more: int) -> None:
             nonlocal done
             done += more
-            self.on_progress("playing", done / self.count)
+            self.on_progress("simulating", done / self.count)
 
-        self.measured[list(text.draws)] = play_all(text.replay, job, self.pool, tell)
+        self.measured[list(text.draws)] = simulate_all(text.replay, job, self.pool, tell)
 
-    def _play_nominal(self, texts: Sequence[_Text]) -> None:
+    def _simulate_nominal(self, texts: Sequence[_Text]) -> None:
         """The text for the machine file on that machine."""
         try:
             held = next((text.replay for text in texts if not text.values), None)
@@ -203,7 +211,7 @@ class _StudyRun:
         except (ArgumentError, DesignError, MachineError):
             self.nominal = dict.fromkeys(self.wanted, float("nan"))
             return
-        self.nominal = replay.play(self.machine, self.wanted, times=False)
+        self.nominal = replay.simulate(self.machine, self.wanted, times=False)
 
 
 def _result(
