@@ -38,7 +38,7 @@ FAILED_CODES = {97: "crashed", 98: "out of memory"}
 
 @dataclass(frozen=True)
 class Base:
-    """The folder in which a batch was begun: a run sees names from there, also when it goes on from another folder."""
+    """The folder in which a batch was started: names are seen from there, also when it goes on from another folder."""
 
     folder: str  # its absolute path
 
@@ -106,7 +106,7 @@ def pack(
 
 _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",  # other runs have the other cores
-    "LD_BIND_NOW": "1",  # functions are linked once, not in each run anew
+    "LD_BIND_NOW": "1",  # functions are linked once, not in each run
     # Memory that is returned comes back page by page: what glibc would find out in a long run stands from the start.
     "MALLOC_ARENA_MAX": "1",
     "MALLOC_MMAP_THRESHOLD_": "33554432",
@@ -175,7 +175,7 @@ class Hosts:
             shutil.rmtree(folder, ignore_errors=True)
 
     def end(self) -> None:
-        """End all of them with what they run; whoever asks later is told that his job was killed."""
+        """End all of them with what they run; whoever asks later gets a job that was killed."""
         with self._lock:
             self._ended = True
             hosts = list(self._all)

@@ -15,8 +15,7 @@ from shapegcode._core import ProgramError
 from shapegcode.checking.result import Check, Finding, FindingCounts, SerialLine, ShortBlocks, ShortRun, StarvedRun
 from shapegcode.checking.runs import BlockTable, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
-from shapegcode.model.playable import SimulatedPrograms
-from shapegcode.model.shaped_program import shaped_warnings
+from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program
 from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.reading import given_text

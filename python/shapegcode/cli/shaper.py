@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--uncertainty", "RATIO", share,
          "how far the frequency of a mode that states no band may be off, for example 5%% (default: 0)", 0.0),
         ("--block-period", "TIME", [seconds],
-         "block period on which the taps must lie, for example 5ms; may be repeated (default: the machine's, or the "
+         "block period on which the impulses must lie, such as 5ms; may be repeated (default: the machine's, or the "
          "best few)", []),
         ("--continuous", None, bool,
          "designs at continuous times, with --block-period beside those on its grid (default: without a machine)"),
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--max-duration", "TIME", seconds,
          "longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if that is "
          "not enough)"),
-        ("--max-abs-sum", "N", positive, "largest sum of the taps' magnitudes (default: %(default)g)", 10.0),
+        ("--max-abs-sum", "N", positive, "largest sum of the impulses' magnitudes (default: %(default)g)", 10.0),
         ("--vibration-limit", "RATIO", ratio,
          "largest share of the vibration that may be left anywhere in the bands (default: the machine's "
          "shaping.vibration_limit, else 5%%)"),

@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulate one program."""
 
-    from shapegcode.model.shaped_program import shaped_note
+    from shapegcode.model.programs import shaped_note
     from shapegcode.program import Program
     from shapegcode.simulation.simulate import play_motion, simulate
 

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Time one program."""
-    from shapegcode.model.shaped_program import shaped_note
+    from shapegcode.model.programs import shaped_note
     from shapegcode.program import Program
     from shapegcode.timing.cycle_time import cycle_time
 

@@ -26,7 +26,7 @@ from shapegcode.conversion.sensitivity import Sensitivity, parameter_sensitivity
 from shapegcode.conversion.tables import CutOutcome, outcome_of, tools_of_cuts
 from shapegcode.machine import Machine
 from shapegcode.model.modes import machine_warnings, region_range_warnings
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid

@@ -23,7 +23,7 @@ from shapegcode.conversion.tables import (
     percent,
     sensitivity_table,
 )
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.figures import CONTOURS, ContourError
 from shapegcode.results.json import Made, exact, hidden, sparse

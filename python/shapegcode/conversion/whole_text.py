@@ -19,7 +19,7 @@ from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionText, 
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.shaped_program import stamp_of_machine
+from shapegcode.model.programs import stamp_of_machine
 from shapegcode.program import Program, end_off_grid_mm, least_increment_mm
 from shapegcode.program.compensation import guard_lines, header_lines
 from shapegcode.program.computer import cores

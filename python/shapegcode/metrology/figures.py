@@ -110,7 +110,7 @@ class MeasuredArc:
         response: through the table's positions, likewise.
         inside_wall: through the wall towards the centre; None where there is none.
         outside_wall: through the other wall, likewise.
-        orbit_error_percent: area between track and arc over the sector; None where it cannot be said.
+        orbit_error_percent: area between track and arc over the sector; None where it is not known.
     """
 
     nominal_radius_mm: float

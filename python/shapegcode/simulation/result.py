@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.figures import CONTOURS, ContourError, Tracks
 from shapegcode.results.json import hidden, sparse
 from shapegcode.results.result import Plot, Result, Xyz

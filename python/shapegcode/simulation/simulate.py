@@ -15,8 +15,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import Offset, machine_warnings, region_range_warnings
-from shapegcode.model.playable import SimulatedPrograms
-from shapegcode.model.shaped_program import shaped_warnings
+from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions

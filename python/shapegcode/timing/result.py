@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.json import hidden
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result

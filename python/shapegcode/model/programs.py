@@ -1,13 +1,59 @@
-"""What the header of an emitted program says, held against its text and against the machine that shall run it."""
+"""Programs on the machine that runs them: what the header of an emitted one says of it, and simulated for a page."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from shapegcode.machine import Machine
 from shapegcode.model.modes import axis_modes
 from shapegcode.program import Program
 from shapegcode.program.stamp import Stamp, text_mark
 
+if TYPE_CHECKING:
+    from shapegcode.results.page.scene import Scene
+
 _WHOLE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedPrograms:
+    """A program, and the one that was made of it.
+
+    Attributes:
+        original: what is simulated.
+        machine: controller and plant.
+        emitted: made of it; None: none.
+        labels: of both, for people.
+        plant: "modal" or "feed-drive".
+    """
+
+    original: Program
+    machine: Machine
+    emitted: Program | None = None
+    labels: tuple[str, str] = ("original", "emitted")
+    plant: str = "modal"
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods of the controller and the plant that play them; see `Result.methods`."""
+        control, drives = self.machine.controller, [axis.drive for axis in self.machine.axes.as_tuple()]
+        used = {
+            "block overlap": control.motion == "after_interpolation",
+            "junction deviation": control.motion == "look_ahead" and control.corner_rule == "junction_deviation",
+            "LuGre friction": self.plant != "modal"
+            and any(drive is not None and drive.friction_model == "lugre" for drive in drives),
+        }
+        return tuple(name for name, is_used in used.items() if is_used)
+
+    def scene(self, on_progress: Callable[[float], None] = lambda _done: None) -> Scene | None:
+        """Simulate them."""
+        from shapegcode.model.scene import scene_of
+
+        return scene_of(
+            self.original, self.machine, self.emitted, labels=self.labels, plant=self.plant, on_progress=on_progress
+        )
 
 
 def stamp_of_machine(machine: Machine, *, version: str = "") -> Stamp:
@@ -66,14 +112,14 @@ def _other_period(stamp: Stamp, machine: Machine) -> str:
     except ValueError:
         return f"its header gives no block period: {stamp.block_period_ms!r}"
     ticks = period_s / controller.interpolation_period_s
-    said = f"its blocks last {stamp.block_period_ms} ms"
+    blocks = f"its blocks last {stamp.block_period_ms} ms"
     if abs(ticks - round(ticks)) > _WHOLE:
         tick_ms = controller.interpolation_period_s * 1e3
-        return f"{said}, which is no whole number of this control's periods of {tick_ms:g} ms"
+        return f"{blocks}, which is no whole number of this control's periods of {tick_ms:g} ms"
     if period_s < controller.block_time_s * (1.0 - _WHOLE):
-        return f"{said}, this control needs {controller.block_time_s * 1e3:g} ms for a block: buffer underrun"
+        return f"{blocks}, this control needs {controller.block_time_s * 1e3:g} ms for a block: buffer underrun"
     if stated_s is not None and abs(stated_s - period_s) > _WHOLE * period_s:
-        return f"{said}, emission.block_period_s is {stated_s * 1e3:g} ms here"
+        return f"{blocks}, emission.block_period_s is {stated_s * 1e3:g} ms here"
     return ""
 
 
