@@ -41,18 +41,19 @@ CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Pyth
   -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"
 # Notebooks call the command and the compiler.
 SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going -n -q -c docs
-PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+# Tests of a file stay in one process, for what they share, until another process has nothing left to do.
+PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .PHONY: help demo test test-all lint bench bench-full bench-realtime coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
-        build-packages test-packages package dev tidy tidy-all release plain sanitize threads clang wheel stub-check \
+        build-packages test-packages package dev tidy tidy-all release plain sanitize threads wheel stub-check \
         test-all-core test-all-python test-linuxcnc fuzz-parameters fuzz-merge
 
 help:
 	@echo 'make demo    build, convert a first program and a real one of some thousand lines; results in demo-output/'
 	@echo 'make test    what must hold, in minutes: lint, C++ tests, stubs, Python tests'
-	@echo 'make test-all  slow tests, sanitizers, the plain build, clang-tidy of everything and the book as well'
+	@echo 'make test-all  slow tests, sanitizers, each source by itself with Clang, clang-tidy of everything and the book as well'
 	@echo 'make test-linuxcnc  the HAL component in LinuxCNC'"'"'s own simulation (installs linuxcnc-uspace); part of test-all'
-	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all'
+	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all and of its users'
 	@echo 'make threads  the controller with a thread for each of its parts, under ThreadSanitizer; part of test-all'
 	@echo 'make coverage  lines of C++ and Python that `make test` runs'
 	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter; bench-full: with all repetitions'
@@ -88,6 +89,7 @@ test:
 test-all:
 	$(MAKE) test
 	$(MAKE) test-all-core
+	$(MAKE) tidy-all
 	$(MAKE) test-all-python
 	$(MAKE) test-linuxcnc
 	$(MAKE) docs
@@ -97,8 +99,6 @@ test-all-core:
 	$(MAKE) plain
 	$(MAKE) sanitize
 	$(MAKE) threads
-	$(MAKE) clang
-	$(MAKE) tidy-all
 
 test-all-python: package dev
 	tests/tools/fetch_rs274.sh
@@ -265,17 +265,12 @@ threads: test-packages .venv/.runtime
 	cmake --build --preset release --target thread_tests
 	TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/thread_tests
 
-# Clang's warnings, with the extension module: compiled only.
-clang: .venv/.runtime
+# Each source and public header by itself, with Clang's warnings as errors: read, not compiled, as GCC compiles them all.
+plain: .venv/.runtime
 	@tests/tools/debian_packages.sh $(CLANG_PACKAGES)
 	cmake --preset $@ -D SHAPEGCODE_BUILD_PYTHON=ON -D Python_EXECUTABLE=$(CURDIR)/$(BIN)/python \
 	  -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"
 	cmake --build --preset $@
-
-# Each source and public header by itself: compiled only.
-plain: test-packages
-	cmake --preset plain
-	cmake --build --preset plain
 
 stub-check: package dev
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml \
