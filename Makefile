@@ -24,8 +24,7 @@ export SUNDIALS_ROOT := $(CURDIR)/.cache/sundials/usr
 BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev python3-dev python3-venv doctest-dev
 TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy chromium chromium-driver fish mandoc pkg-config zsh
 DOCS_PACKAGES := $(BUILD_PACKAGES) doxygen
-FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
-CLANG_PACKAGES := $(BUILD_PACKAGES) clang-14 libomp-14-dev
+CLANG_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev
 FUZZ_SECONDS ?= 600
 WHEEL_PYTHONS ?= $(PYTHON)
 FUZZ_FLAGS := -timeout=5 -rss_limit_mb=2048 -max_len=2000 -dict=tests/fuzz/gcode.dict
@@ -255,6 +254,7 @@ release: test-packages .venv/.runtime
 	ctest --preset $@
 
 sanitize: test-packages
+	@tests/tools/debian_packages.sh $(CLANG_PACKAGES)
 	cmake --preset $@
 	cmake --build --preset $@
 	ctest --preset $@
@@ -277,7 +277,7 @@ stub-check: package dev
 	  --allowlist tests/tools/stubtest_allowlist.txt shapegcode._core
 
 build/fuzz/tests/fuzz/fuzz_reader: $(CORE_SOURCES) $(CPP_HEADERS) $(wildcard tests/fuzz/*.[ch]pp) tests/fuzz/CMakeLists.txt
-	@tests/tools/debian_packages.sh $(FUZZ_PACKAGES)
+	@tests/tools/debian_packages.sh $(CLANG_PACKAGES)
 	@tests/tools/fetch_sundials.sh
 	cmake --preset fuzz
 	cmake --build --preset fuzz

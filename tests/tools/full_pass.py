@@ -3,8 +3,8 @@
 `write` puts a hash of each group of files that the long checks guard into tests/full_pass.txt, which is committed: a
 folder of cpp/, or all of another place. `changed` prints what must run again (core, python) because a file of it is
 new, gone or another one; nothing: all of it passed as it is. `files` prints the sources and headers of the core's
-folders that changed or include a header of one that did, for clang-tidy, which reads a folder as one: what it has to say
-of the others it said before. A change of the core counts for the Python tests too.
+folders that changed or include a header of one that did, for clang-tidy, which reads a folder as one and finds in the
+others what it found before. A change of the core counts for the Python tests too.
 """
 
 from __future__ import annotations
