@@ -98,9 +98,10 @@ void ContourSolver::extend_factor(std::size_t rows) {
     std::reverse_copy(column_.begin(), column_.end(), row);
     factor_row(row, band_, factor_rows_);
     if (factor_rows_ > band_) {
+      const double* before = row - width;
       double change = 0.0;
       for (std::size_t j = 0; j < width; ++j) {
-        change = std::max(change, std::abs(row[j] - row[j - width]));
+        change = std::max(change, std::abs(row[j] - before[j]));
       }
       is_settled_ = change <= settling_change * row[band_];
     }

@@ -66,9 +66,9 @@ class Input(TomlTable):
     )
     tool_length_wear_mm: _Lengths = key("wear of the length by offset number H", default={})
     compensation: Literal["refuse", "expand", "keep"] = key(
-        'what `convert` does with cutter compensation G41/G42. "refuse": says so and stops; "expand": shapes the tool '
-        'path of the radius given here: the offset in the control no longer acts; "keep": leaves these moves as they '
-        "are. The clock and the pictures always use the expanded path where the radius is known",
+        'what `convert` does with cutter compensation G41/G42. "refuse": reports it and stops; "expand": shapes '
+        'the tool path of the given radius: the offset in the control no longer acts; "keep": leaves these moves as '
+        "they are. Cycle time and plots always use the expanded path where the radius is known",
         default="refuse",
     )
     compensation_start_up: Literal["A", "B"] = key(

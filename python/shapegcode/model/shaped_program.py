@@ -1,4 +1,4 @@
-"""What the header of an emitted program says, held against its text and against the machine that shall run it."""
+"""The header of an emitted program, checked against its text and against the machine that is to run it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What expanding a program makes of it."""
+"""The result of expanding a program."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from shapegcode.results.result import Result
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Expansion(Result):
-    """The plain program that calls, macros and coordinate modes come to.
+    """The expanded program: calls, macros and coordinate modes resolved.
 
     Attributes:
         program: name of the program.

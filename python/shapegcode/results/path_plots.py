@@ -236,7 +236,7 @@ def follow(
 ) -> tuple[FloatArray, FloatArray]:
     """Where on a polyline are samples that follow it?
 
-    Where the polyline passes a place twice, the distance that the command has gone decides.
+    Where the polyline passes a point twice, the distance that the command has travelled decides.
     """
     vertices = _refine(polyline_mm)
     lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
@@ -409,7 +409,7 @@ class _Scene:
 
 @dataclass(frozen=True, eq=False)
 class _Worst:
-    """The neighbourhood of the place where the first trace is furthest from the path."""
+    """The neighbourhood of the point where the first trace is furthest from the path."""
 
     traces: tuple[Trace, ...]  # the stretches of all traces that pass it; each is there at time 0
     piece: FloatArray  # of the programmed path, (m, 3), mm

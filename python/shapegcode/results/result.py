@@ -107,7 +107,7 @@ class Result(Outcome):
         """The result as a page.
 
         Args:
-            motion: play the programs again for the picture that one can turn; else the page has none.
+            motion: simulate the programs again for the picture that one can turn; else the page has none.
             made: of what the result was made; None: from Python, it is not known.
             problems: what is not as it should be with the page, such as a program that was changed since.
             on_progress: called with the share that is done.

@@ -31,7 +31,7 @@ class KeyProblem(ValueError):
 
 
 def syntax_problem(message: str, text: str) -> Problem:
-    """The place of a TOML syntax error, which tomllib only tells in words."""
+    """Line and column of a TOML syntax error, read from tomllib's message."""
     found = re.search(r"\s*\(at line (\d+), column (\d+)\)$", message)
     if found:
         return Problem("", "", f"{message[: found.start()]} (column {found[2]})", int(found[1]))
@@ -72,7 +72,7 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
 
 
 def further_problems(count: int) -> tuple[Problem, ...]:
-    """That there are more than the first `MAX_PROBLEMS`, where there are: to find the line of each takes time."""
+    """Note that there are more than `MAX_PROBLEMS` problems; finding the line of each takes time."""
     more = count - MAX_PROBLEMS
     return (Problem("", "", f"{more} further problems are not listed"),) if more > 0 else ()
 

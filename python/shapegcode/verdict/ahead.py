@@ -1,4 +1,4 @@
-"""Parts of one piece of work in a pool, taken up in their order: at any number of threads the same results."""
+"""Tasks of one job in a thread pool, collected in order: the same results with any number of threads."""
 
 from __future__ import annotations
 
