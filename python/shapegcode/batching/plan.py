@@ -70,7 +70,7 @@ def _each(given: Iterable[str], avoid: Path) -> Iterator[Source]:
 
 
 def _listed(file: Path, avoid: Path) -> Iterator[Source]:
-    """What a list names; a message says where it stands."""
+    """The entries of a list; error messages give the line of each."""
     try:
         text = read_file(file, MAX_SETTINGS_BYTES).decode()
     except UnicodeDecodeError:

@@ -53,7 +53,7 @@ class Base:
 
 @dataclass(frozen=True)
 class BatchJob:
-    """A run that is to be done."""
+    """A run that is still to be executed."""
 
     program: str  # what it is of, as it was given
     machine: str
@@ -184,7 +184,7 @@ class Hosts:
             host.end()
 
     def _host(self, command: str) -> _Host | None:
-        """That of this thread; None: there shall be none any more."""
+        """The fork server of this thread; None after shutdown."""
         host: _Host | None = getattr(self._own, "host", None)
         with self._lock:
             if self._ended:
@@ -233,7 +233,7 @@ _of_worker = Hosts()
 
 
 def run_packed(packed: Packed) -> JobOutcome:
-    """`Hosts.run` on a Dask worker, whose hosts last as long as it does."""
+    """`Hosts.run` on a Dask worker, whose fork servers live as long as the worker."""
     return _of_worker.run(packed)
 
 
@@ -339,7 +339,7 @@ def cluster_executor(cluster: Cluster, processes: int) -> Iterator[tuple[Executo
 
 
 def _checked_slots(client: Client, scheduler: str) -> int:
-    """How many jobs the workers run at a time; all of them have this version."""
+    """Check that all workers have this version, and count the jobs that they run at a time."""
     try:
         versions = client.run(this_version)
     except ModuleNotFoundError as error:

@@ -134,7 +134,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class _CtrlC:
-    """Ctrl-C waits while files of one run are written: all of them stand there, or none."""
+    """Delays Ctrl-C while the files of one run are written, so that all of them exist or none."""
 
     def __init__(self) -> None:
         self._asked = self._busy = False

@@ -237,7 +237,7 @@ def _feed_steps(facts: LogFacts, parts: list[PartLog]) -> None:
 
 
 def _followed_share(log: PartLog) -> float | None:
-    """How much of the step the speed follows; None where nothing of the travel is steady."""
+    """Share of the speed step that is followed; None where no part of the move has a constant speed."""
     part = log.part
     top = int(np.argmax(log.travel_mm))  # the turn, which smoothing cuts short
     begin = log.times_s[int(np.argmax(log.travel_mm > max(0.02, 5 * log.noise_mm)))]
@@ -266,7 +266,7 @@ _SHAPE_NOTES = {"linear": "linear", "bell": "the longer of two moving averages",
 
 @dataclass
 class LogFacts(Facts):
-    """What the logs have shown so far; times in s."""
+    """What is known from the logs so far; times in s."""
 
     source: str = "log"
     period: float | None = None  # interpolation period; None: not known

@@ -1,4 +1,4 @@
-"""Facts of a controller with their intervals; what its tests are, and what their results say."""
+"""Parameters of a controller with their intervals, its tests, and what follows from their results."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _WORK_LIMIT = re.compile(r"controller\.max_(program|expansion)_")  # in the mess
 _NOT_AS_WRITTEN = re.compile(r"does not end with M30|^text behind the '%'|^G68 R|byte-order mark")
 _ROUNDING = 1e-9
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
-# Of one reading (most_alarms in the core's reader).
+# Of one reading (max_alarms in the core's reader).
 _MAX_ALARMS = 200
 _MEMORY_PER_LINE = 350  # bytes
 

@@ -201,7 +201,7 @@ class Check(Result):
 
     @property
     def ok(self) -> bool:
-        """Nothing is refused, and all would run as programmed."""
+        """Whether nothing is refused and everything would run as programmed."""
         return not self.refused and self.counts.warning == 0
 
     @property
@@ -260,7 +260,7 @@ class Check(Result):
         return "shapegcode time tells how long it takes, shapegcode simulate how it vibrates."
 
     def tables(self) -> list[Table]:
-        """The findings in the order of places; of many alike the first ones and how many more there are."""
+        """The findings in the order of their positions; of many equal ones the first, and the number of the others."""
         if not self.findings:
             return []
         columns = (

@@ -338,7 +338,7 @@ class CommandParser(argparse.ArgumentParser):
             self.epilog = kept
 
     def epilogue(self) -> str | None:
-        """What stands below the options: examples, and the exit codes."""
+        """Text below the options: examples and exit codes."""
         words = self.prog.split(maxsplit=1)
         lines = EXAMPLES.get(words[1] if len(words) > 1 else "", ())
         if not lines:

@@ -1,4 +1,4 @@
-"""``shapegcode expand``: the plain program that calls, macros and coordinate modes come to."""
+"""``shapegcode expand``: the expanded program: calls, macros and coordinate modes resolved."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def add_amount_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_cluster_arguments(parser: argparse.ArgumentParser, what: str) -> None:
-    """Declare ``--scheduler`` and its certificates; `what` is done there."""
+    """Declare ``--scheduler`` and its certificates; `what` names the work that runs there."""
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
@@ -172,7 +172,7 @@ def file_exists(name: str) -> Exception:
 
 
 def write_new(args: argparse.Namespace, text: str) -> None:
-    """Write the file of ``-o``, which may stand there with ``--force`` alone."""
+    """Write the file of ``-o``; an existing file is replaced only with ``--force``."""
     try:
         write_text(args.output, text, overwrite=args.force)
     except FileExistsError:

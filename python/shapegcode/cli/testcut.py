@@ -1,4 +1,4 @@
-"""``shapegcode testcut``: test cuts as programs, and what their measured forces tell."""
+"""``shapegcode testcut``: test cuts as programs, and cutting-force parameters from their measured forces."""
 
 from __future__ import annotations
 

@@ -284,7 +284,7 @@ class Spending:
         return f"{self._program.source}: given up for the budget: {'; '.join(parts)}" if parts else ""
 
     def _factors(self, loads: Mapping[int, TransferLoad]) -> list[float]:
-        """How many times too fast the regions are that are."""
+        """By what factor each region exceeds its limit; regions within it are left out."""
         factors = (self.budget.excess(load) for load in loads.values())
         return [factor for factor in factors if factor > 1.0 + _ROUNDING]
 

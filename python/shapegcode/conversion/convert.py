@@ -275,7 +275,7 @@ def shape_rapids(plan: ConversionPlan, shaped: Shaped) -> Shaped:
 
 
 def _within_price(plan: ConversionPlan, shaped: Shaped, rapids: ShapedRapids) -> ShapedRapids:
-    """The shaped rapids, or none where with them the program would take more time than its price."""
+    """The shaped rapids; none if the program would then take more time than its price allows."""
     price_s = plan.price_s()
     if plan.machine.emission.header:
         added_s = plan.model.cycle_time_s(rapids.emitted.core) - plan.original_s.result()

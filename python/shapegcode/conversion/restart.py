@@ -177,7 +177,7 @@ class RestartPlaces:
         """Why there can be none; empty: there can."""
 
     def low(self, piece: _core.ShapedCommand, at: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Where the command of a piece is slow, and a start from rest leaves the contour within its tolerance."""
+        """Where the commanded speed of a piece is low and a start from rest keeps the contour tolerance."""
         grid = np.asarray(piece.grid_mm)
         at = at[(at > 0) & (at < len(grid) - 1)]
         before, behind = (grid[at] - grid[at - 1]) / self._period_s, (grid[at + 1] - grid[at]) / self._period_s
@@ -253,7 +253,7 @@ def _why_none(region: _core.Region) -> str:
 
 
 def block_lines(text: bytes, blocks: int) -> tuple[IntArray, IntArray]:
-    """Where the lines of blocks stand in a text; comment lines between them are none."""
+    """Lines of the blocks in a text, without comment lines."""
     letters = np.frombuffer(text + b"(", dtype=np.uint8)  # so that there is one behind the last line end
     ends = np.flatnonzero(letters == ord("\n")) + 1
     begins = np.concatenate([[0], ends[:-1]]).astype(np.int64)[: len(ends)]
@@ -318,7 +318,7 @@ class RegionRestarts:
         return written
 
     def result(self, head: bytes, stops: int, stops_s: float) -> CutRestarts:
-        """What the region has of them."""
+        """The restart points of the region."""
         lines = head.count(b"\n")
         marks = tuple(replace(each, byte=each.byte + len(head), line=each.line + lines) for each in self._marks)
         longest_s = self._places.longest * self._fit.block_period_s

@@ -69,7 +69,7 @@ class RegionText:
         self._parts = self._inside = None
 
     def stands_in(self, program: Program, begin: int) -> None:
-        """The text is part of that of a program."""
+        """Whether the text is part of a program's text."""
         self._parts, self._inside = None, (program, begin)
 
     def joined(self) -> bytes:
@@ -142,7 +142,7 @@ def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = m
 
 
 class _WithdrawnError(Exception):
-    """What was written of a region rests on a feed that does not keep its tolerance."""
+    """What was written of a region is void: its feed does not keep the tolerance."""
 
 
 class _Marks:

@@ -154,7 +154,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
 
 @dataclass(frozen=True)
 class _Task:
-    """What the stretches of a region are chosen for."""
+    """Conditions under which the feed sections of a region are chosen."""
 
     path: _core.Path
     stations_mm: Vector

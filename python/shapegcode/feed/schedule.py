@@ -415,7 +415,7 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[HeldLines]:
 
 
 def _feeds_of_segments(plan: FeedPlan, path: _core.Path) -> list[list[float]]:
-    """The feeds that stand in each segment."""
+    """The programmed feeds of each segment."""
     ends = np.array([stretch.end_mm for stretch in plan.stretches])
     feeds = [stretch.feed_mm_per_min for stretch in plan.stretches]
     borders = np.concatenate(([0.0], path.segment_ends_mm))

@@ -59,7 +59,7 @@ def survey(
     resolution_mm: float | None = None,
     on_progress: Progress = lambda _done, _total: None,
 ) -> Survey:
-    """What the tool meets along a program.
+    """Compute the tool engagement along a program.
 
     Args:
         program: what to sweep, or its file.

@@ -32,7 +32,7 @@ class Draft:
         self.remarks: dict[str, str] = {}  # per dotted key, where its value comes from
 
     def problem(self, number: int, message: str) -> None:
-        """Something that makes the dump useless; the line is that of the parameter."""
+        """Report a parameter that makes the dump useless, with its line."""
         line = next((entry.line for (n, _), entry in self.dump.entries.items() if n == number), None)
         self.values.problems.append(Problem(f"parameter {number}", "", message, line))
 

@@ -129,7 +129,7 @@ def _after_interpolation(draft: Draft) -> None:
 
 
 def _shaped_filter(draft: Draft) -> None:
-    """With the look-ahead off, cutting blocks pass the filter of 1622, whoever wrote them."""
+    """With the look-ahead off, all cutting blocks pass the filter of 1622."""
     found = _after_interpolation_s(draft)
     if found is None:
         if draft.get("controller.shaped_time_constant_s") is None:
@@ -235,7 +235,7 @@ _KEYS = {10: "tool_length_mm", 11: "tool_length_wear_mm", 12: "tool_radius_mm", 
 
 
 def take_tables(draft: Draft, tables: ControlTables) -> None:
-    """Offsets and variables as they stood when they were punched."""
+    """Read offsets and variables as they were when the dump was punched."""
     _tools(draft, tables)
     _systems(draft, tables)
     _variables(draft, tables)

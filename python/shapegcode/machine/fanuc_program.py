@@ -1,4 +1,4 @@
-"""What a parameter dump says about programs: increments, power-on state, offsets, cycles, calls, serial line.
+"""Program settings of a parameter dump: increments, power-on state, offsets, cycles, calls, serial line.
 
 Sources of the meanings stand in docs/reference/parameters.md, with those that no text confirmed.
 """

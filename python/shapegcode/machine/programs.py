@@ -283,7 +283,7 @@ class Shaping(TomlTable):
         "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction", default=1.0
     )
     contour: Literal["response", "command", "off"] = key(
-        "what is brought back to the programmed path behind the shaper, at the highest feed that keeps "
+        "what contour compensation keeps on the programmed path behind the shaper, at the highest feed within "
         'tolerance.contour_um: "response" is the table with its modes, and so the part; "command" the set-points; '
         '"off": neither, the feed alone keeps the command within the tolerance',
         default="response",

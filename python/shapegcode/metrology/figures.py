@@ -58,7 +58,7 @@ class SidedError:
 
     @classmethod
     def of(cls, stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> SidedError:
-        """Of one or several runs together, all zero without any; the figures of the core in mm."""
+        """The figures of one or several runs together; all zero without any. The core's are in mm."""
         whole = ContourError.of(stats)
         return cls(
             whole.max,

@@ -1,4 +1,4 @@
-"""The plain program that calls, macros and coordinate modes come to."""
+"""The expanded program: calls, macros and coordinate modes resolved."""
 
 from __future__ import annotations
 

@@ -398,7 +398,7 @@ def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
 
 
 def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
-    """Which axes rest through a whole region where none of its words leads: nothing may be written of them."""
+    """Axes at rest through a whole region at a position that no word can give: no word of them may be written."""
     off_mm = end_off_grid_mm(region, increment_mm)
     return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 
@@ -411,7 +411,7 @@ def located_error(source: str, line: int, column: int, message: str, alarm: int 
 
 
 def _other_arc_centre(data: bytes, options: _core.ReaderOptions, message: str) -> str:
-    """The other meaning of I, J, K, if it explains an alarm: the whole program reads with it. Never a guess."""
+    """The other meaning of I, J, K, if the whole program can be read with it; else none."""
     if _ARC_OFF_RADIUS not in message:
         return ""
     options.absolute_arc_centres = not options.absolute_arc_centres

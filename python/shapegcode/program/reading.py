@@ -70,7 +70,7 @@ class Reading:
         return options
 
     def differences(self, machine: Machine) -> list[str]:
-        """Settings with which another machine would read the text otherwise."""
+        """Settings by which another machine would read the text differently."""
         if machine is self.machine:
             return []
         unused = {"input.arc_centre"} if self.emitted else set()

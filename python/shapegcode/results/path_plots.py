@@ -241,7 +241,7 @@ def follow(
 ) -> tuple[FloatArray, FloatArray]:
     """Where on a polyline are samples that follow it?
 
-    Where the polyline passes a place twice, the distance that the command has gone decides.
+    Where the polyline passes a point twice, the distance that the command has travelled decides.
     """
     vertices = _refine(polyline_mm)
     gone = _distances(command_mm)
@@ -411,7 +411,7 @@ class _Scene:
 
 @dataclass(frozen=True, eq=False)
 class _Worst:
-    """The neighbourhood of the place where the first trace is furthest from the path."""
+    """The neighbourhood of the point where the first trace is furthest from the path."""
 
     traces: tuple[Trace, ...]  # the stretches of all traces that pass it; each is there at time 0
     piece: FloatArray  # of the programmed path, (m, 3), mm

@@ -90,7 +90,7 @@ class _TomlWriter:
                 self._below(f"[{key}]", field.description or "", value, f"{key}.")
 
     def _below(self, head: str, meaning: str, table: TomlTable, prefix: str) -> None:
-        """A table with its head where it has keys of its own; nothing where nothing is left of it."""
+        """A TOML table with its header, if keys remain in it; else nothing."""
         before = list(self.lines)
         if self.lines and self.lines[-1]:
             self.lines.append("")

@@ -73,7 +73,7 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
 
 
 def further_problems(count: int) -> tuple[Problem, ...]:
-    """That there are more than the first `MAX_PROBLEMS`, where there are: to find the line of each takes time."""
+    """Note that there are more than `MAX_PROBLEMS` problems; finding the line of each takes time."""
     more = count - MAX_PROBLEMS
     return (Problem("", "", f"{more} further problems are not listed"),) if more > 0 else ()
 

@@ -213,7 +213,7 @@ def _with_modes(answers: Answers, axis: str) -> str:
 
 
 def _open(machine: Machine) -> Iterator[OpenQuestion]:
-    """What nobody said and a verdict may rest on: axes without modes first."""
+    """Parameters without an answer to which a verdict may be sensitive: axes without modes first."""
     for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True):
         if not axis.modes and not axis.rigid:
             why = "taken as rigid until it is tapped"

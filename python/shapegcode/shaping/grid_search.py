@@ -199,9 +199,9 @@ class GridSearch:
         return [*sorted(centred, key=variance), *rest]
 
     def _centred(self, last: int, centre: float, seen: list[float]) -> list[FloatArray]:
-        """Taps on the way from a centre (periods) to a local minimum of the second central moment.
+        """Taps of each step from a centre (periods) to a local minimum of the second central moment.
 
-        From a centre that another way has seen it goes on as that one did.
+        From a centre that an earlier search passed it continues as that search did.
         """
         found: list[FloatArray] = []
         for _ in range(_CENTRINGS):
@@ -219,7 +219,7 @@ class GridSearch:
     def _feasible(self, last: int) -> FloatArray | None:
         """Taps at 0 ... `last` periods that meet the conditions, or None.
 
-        With limits: those whose largest share of its limit is least, until it is below 1 or proven not to be.
+        With limits: those whose largest ratio to its limit is smallest, until it is below 1 or proven not to be.
         """
         if self._conditions.limits:  # the planes found since say more
             return self._found_feasible(last)

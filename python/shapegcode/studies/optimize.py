@@ -120,7 +120,7 @@ def optimize(
 
 
 def _check_values(machine: Machine, choices: Choices) -> None:
-    """Every value by itself; two that do not go together are only no candidate."""
+    """Check each value by itself; invalid combinations are left out of the candidates."""
     for key, values in choices.items():
         problems = []
         for value in values:
@@ -188,7 +188,7 @@ class _Choosing:
         return found.time_s if share >= self._probability else _UNLIKELY_S * (1.0 + self._probability - share)
 
     def best(self) -> Candidate | None:
-        """The shortest that is likely enough; of the others only those are simulated that are shorter."""
+        """The shortest candidate with enough probability; longer ones are not simulated."""
         order = sorted(
             (ranks for ranks, each in self.candidates.items() if each.time_s is not None),
             key=lambda ranks: (self.candidates[ranks].time_s, ranks),

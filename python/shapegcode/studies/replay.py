@@ -195,7 +195,7 @@ _KEPT_TEXTS = 4
 
 @dataclass(frozen=True)
 class SamplesJob:
-    """Some draws of one text."""
+    """Some samples of one program."""
 
     name: str  # of the machine, in messages
     rows: tuple[Mapping[str, object], ...]  # values of the machine that simulates, by key, a row for each draw

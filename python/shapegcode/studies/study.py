@@ -1,4 +1,4 @@
-"""A study: one text, many sampled machines, what that does to the verdict."""
+"""A Monte Carlo study: one program on many sampled machines, and their verdicts."""
 
 from __future__ import annotations
 

@@ -194,7 +194,7 @@ class StudyFile(TomlTable):
 
 
 def study_schema(title: str) -> dict[str, Any]:
-    """JSON Schema of the file, for editors: keys of the machine file are looked into, limits of values are not."""
+    """JSON Schema of the file, for editors: it checks the keys of the machine file, not the limits of values."""
     found = toml_schema(StudyFile, title)
     choices: dict[str, Any] = {"type": "array", "minItems": 1}
     schemas: dict[str, dict[str, Any]] = {

@@ -132,7 +132,7 @@ def uniform(low: float, high: float, *, known: bool | None = None) -> Distributi
 
 
 def listed(values: Sequence[object] | npt.NDArray[Any], *, known: bool | None = None) -> Listed:
-    """One of some values; a plain list says the same.
+    """One of some values, each as likely; a plain list means the same.
 
     Args:
         values: as a machine file may have them.

@@ -60,7 +60,7 @@ def fit_test_cut(
     chip_thickness: Thickness = "mean",
     edge_forces: bool = False,
 ) -> TaperResult | CornerResult | IntervalResult:
-    """What the measured forces of a test cut tell.
+    """Fit cutting-force parameters to the measured forces of a test cut.
 
     Args:
         cut: the test cut, or its side file.

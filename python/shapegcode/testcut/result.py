@@ -18,7 +18,7 @@ from shapegcode.testcut.record import Revolutions
 
 @dataclass(frozen=True, repr=False, eq=False)
 class CutDesign(Result):
-    """The design of a test cut.
+    """A designed test cut, before it is run.
 
     Attributes:
         cut: what the side file holds.
@@ -318,7 +318,7 @@ class CornerResult(Result):
 
     @property
     def next_step(self) -> str:
-        """The test cut to do next."""
+        """The next test cut to run."""
         if abs(self.scale - 1.0) > RATIO_LIMIT:
             return "shapegcode testcut taper measures the coefficients"
         return "shapegcode testcut interval shows how often the feed may change"

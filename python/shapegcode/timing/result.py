@@ -19,7 +19,7 @@ AGREEMENT_PERCENT = 0.5  # Closed form and full interpolation agree if they diff
 
 @dataclass(frozen=True, repr=False)
 class TimeParts:
-    """Where the time goes; the parts add up to the whole.
+    """Parts of a duration; they add up to the whole.
 
     Attributes:
         cutting_s: cutting blocks at their feed.

@@ -293,7 +293,7 @@ class CaseSimulation:
         return case.override != 1.0 and case.mode is None and self.model.bounds_deviations
 
     def _whole(self, case: Case) -> bool:
-        """Whether the whole region is simulated for a case alone."""
+        """Whether a case needs a simulation of the whole region for itself."""
         # Behind feed drives each would take a quarter of a conversion: what is only shown makes do with the residual.
         spared = case.override != 1.0 and not case.counts and self.model.machine.verdict.plant != "modal"
         return case.needs_contour(self.target) and not spared and not self._beside(case)

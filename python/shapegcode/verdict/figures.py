@@ -214,10 +214,10 @@ def _share(case: CaseVerdict) -> float:
 
 @dataclass(frozen=True)
 class FeedExcess:
-    """Where the emitted blocks are fastest against the feed that is programmed at the same place of the path.
+    """Where the emitted blocks are fastest against the feed that is programmed at the same position of the path.
 
     The speed is that of the set-points along their own path, over one, four or sixteen shortest blocks, less two
-    increments by which rounding may lengthen it; places are matched by the travel, not by time.
+    increments by which rounding may lengthen it; positions are matched by path length, not by time.
 
     Attributes:
         ratio: speed over programmed feed; 1: as programmed.

@@ -119,7 +119,7 @@ class Judge:
     def begin(
         self, emitted: Program, placed: Sequence[Placed], trackers: Iterable[_core.ContourTracker], pool: Executor
     ) -> list[PendingSimulations]:
-        """Start to simulate every emitted region."""
+        """Start the simulation of every emitted region."""
         limits = self._model.limits()
         running = []
         for place, tracker in zip(placed, trackers, strict=True):

@@ -68,7 +68,7 @@ def shape_rapids(
 
 
 class _RapidShaper:
-    """The rapids of one emitted text on their way to shaped moves."""
+    """Replaces the rapids of one emitted program by shaped moves."""
 
     def __init__(
         self,

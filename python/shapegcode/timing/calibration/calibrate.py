@@ -61,7 +61,7 @@ _CALLS = 2500  # of the misfit that one fit takes, about; for the bar
 
 @dataclass(frozen=True, eq=False)
 class _Learned:
-    """Motion and functions, from some of the runs."""
+    """Motion and function times, calibrated from some of the runs."""
 
     motion: MotionFit
     functions: FunctionFit
