@@ -1,8 +1,4 @@
-<<<<<<< HEAD:python/shapegcode/model/programs.py
 """Programs on the machine that runs them: what the header of an emitted one says of it, and simulated for a page."""
-=======
-"""The header of an emitted program, checked against its text and against the machine that is to run it."""
->>>>>>> h4:python/shapegcode/model/shaped_program.py
 
 from __future__ import annotations
 
