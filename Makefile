@@ -24,8 +24,7 @@ export SUNDIALS_ROOT := $(CURDIR)/.cache/sundials/usr
 BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev python3-dev python3-venv doctest-dev
 TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy chromium chromium-driver fish mandoc pkg-config zsh
 DOCS_PACKAGES := $(BUILD_PACKAGES) doxygen
-FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
-CLANG_PACKAGES := $(BUILD_PACKAGES) clang-14 libomp-14-dev
+CLANG_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev
 FUZZ_SECONDS ?= 600
 WHEEL_PYTHONS ?= $(PYTHON)
 FUZZ_FLAGS := -timeout=5 -rss_limit_mb=2048 -max_len=2000 -dict=tests/fuzz/gcode.dict
@@ -41,18 +40,19 @@ CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Pyth
   -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"
 # Notebooks call the command and the compiler.
 SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going -n -q -c docs
-PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+# Tests of a file stay in one process, for what they share, until another process has nothing left to do.
+PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .PHONY: help demo test test-all lint bench bench-full bench-realtime coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
-        build-packages test-packages package dev tidy tidy-all release plain sanitize threads clang wheel stub-check \
+        build-packages test-packages package dev tidy tidy-all release plain sanitize threads wheel stub-check \
         test-all-core test-all-python test-linuxcnc fuzz-parameters fuzz-merge
 
 help:
 	@echo 'make demo    build, convert a first program and a real one of some thousand lines; results in demo-output/'
 	@echo 'make test    what must hold, in minutes: lint, C++ tests, stubs, Python tests'
-	@echo 'make test-all  slow tests, sanitizers, the plain build, clang-tidy of everything and the book as well'
+	@echo 'make test-all  slow tests, sanitizers, each source by itself with Clang, clang-tidy of everything and the book as well'
 	@echo 'make test-linuxcnc  the HAL component in LinuxCNC'"'"'s own simulation (installs linuxcnc-uspace); part of test-all'
-	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all'
+	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all and of its users'
 	@echo 'make threads  the controller with a thread for each of its parts, under ThreadSanitizer; part of test-all'
 	@echo 'make coverage  lines of C++ and Python that `make test` runs'
 	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter; bench-full: with all repetitions'
@@ -88,6 +88,7 @@ test:
 test-all:
 	$(MAKE) test
 	$(MAKE) test-all-core
+	$(MAKE) tidy-all
 	$(MAKE) test-all-python
 	$(MAKE) test-linuxcnc
 	$(MAKE) docs
@@ -97,8 +98,6 @@ test-all-core:
 	$(MAKE) plain
 	$(MAKE) sanitize
 	$(MAKE) threads
-	$(MAKE) clang
-	$(MAKE) tidy-all
 
 test-all-python: package dev
 	tests/tools/fetch_rs274.sh
@@ -255,6 +254,7 @@ release: test-packages .venv/.runtime
 	ctest --preset $@
 
 sanitize: test-packages
+	@tests/tools/debian_packages.sh $(CLANG_PACKAGES)
 	cmake --preset $@
 	cmake --build --preset $@
 	ctest --preset $@
@@ -265,24 +265,19 @@ threads: test-packages .venv/.runtime
 	cmake --build --preset release --target thread_tests
 	TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/thread_tests
 
-# Clang's warnings, with the extension module: compiled only.
-clang: .venv/.runtime
+# Each source and public header by itself, with Clang's warnings as errors: read, not compiled, as GCC compiles them all.
+plain: .venv/.runtime
 	@tests/tools/debian_packages.sh $(CLANG_PACKAGES)
 	cmake --preset $@ -D SHAPEGCODE_BUILD_PYTHON=ON -D Python_EXECUTABLE=$(CURDIR)/$(BIN)/python \
 	  -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"
 	cmake --build --preset $@
-
-# Each source and public header by itself: compiled only.
-plain: test-packages
-	cmake --preset plain
-	cmake --build --preset plain
 
 stub-check: package dev
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml \
 	  --allowlist tests/tools/stubtest_allowlist.txt shapegcode._core
 
 build/fuzz/tests/fuzz/fuzz_reader: $(CORE_SOURCES) $(CPP_HEADERS) $(wildcard tests/fuzz/*.[ch]pp) tests/fuzz/CMakeLists.txt
-	@tests/tools/debian_packages.sh $(FUZZ_PACKAGES)
+	@tests/tools/debian_packages.sh $(CLANG_PACKAGES)
 	@tests/tools/fetch_sundials.sh
 	cmake --preset fuzz
 	cmake --build --preset fuzz

@@ -1,4 +1,4 @@
-// The one place where the library's errors become Python exceptions.
+// Only here do the library's errors become Python exceptions.
 #include <pybind11/pybind11.h>
 
 #include "register.hpp"

@@ -24,7 +24,7 @@ PYBIND11_MODULE(_core, module) {
   register_metrology(module);
   register_follow(module);
   register_timing(module);
-  register_played_stream(module);
+  register_simulation_stream(module);
   register_engagement(module);
   register_milling(module);
   register_feed_schedule(module);

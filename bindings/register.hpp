@@ -25,7 +25,7 @@ void register_follow(pybind11::module_& module);
 void register_identification(pybind11::module_& module);
 void register_simulation(pybind11::module_& module);
 void register_timing(pybind11::module_& module);
-void register_played_stream(pybind11::module_& module);
+void register_simulation_stream(pybind11::module_& module);
 void register_engagement(pybind11::module_& module);
 void register_milling(pybind11::module_& module);
 void register_feed_schedule(pybind11::module_& module);

@@ -30,7 +30,7 @@ For a free decay the force is a unit impulse at the first sample. Source: paper 
           "iterations", [](const Arma& self) { return self.iterations; }, "Rounds of least squares.")
       .def_property_readonly(
           "converged", [](const Arma& self) { return self.converged; },
-          "True if phi settled; otherwise this is the best of all rounds.");
+          "True if phi converged; otherwise this is the best of all rounds.");
 }
 
 void define_arma_fits(py::module_& m) {
@@ -51,7 +51,7 @@ Args:
     plain: One round of unfiltered least squares, which noise bends, instead of the iterated one.
 
 Returns:
-    The model whose phi settled, or the best of all rounds with converged False.
+    The model whose phi converged, or the best of all rounds with converged False.
 
 Raises:
     ArgumentError: No record, unequal lengths, a value that is not finite, a force that is zero throughout, a number

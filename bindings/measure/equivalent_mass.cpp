@@ -39,7 +39,7 @@ Args:
     stiffness_n_per_m: Stiffness, above 0.
     force_n: Force in N, shape (n,).
     period_s: Time between samples in s, above 0.
-    theta: Stretch of the step over which the acceleration is linear, at least 1; stable from 1.37 on.
+    theta: Section of the step over which the acceleration is linear, at least 1; stable from 1.37 on.
     displacement_m: At the first sample.
     velocity_m_per_s: At the first sample.
 

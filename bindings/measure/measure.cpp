@@ -44,7 +44,7 @@ void register_sections(py::module_& module) {
       .value("arc", SectionKind::arc, "Arcs about one centre.")
       .value("curve", SectionKind::curve, "Anything else.");
 
-  py::class_<PathSection>(module, "PathSection", "A stretch of a path that is measured by itself.")
+  py::class_<PathSection>(module, "PathSection", "A section of a path that is measured by itself.")
       .def_readonly("first", &PathSection::first, "Index of its first segment.")
       .def_readonly("last", &PathSection::last, "Index of its last segment.")
       .def_readonly("begin_mm", &PathSection::begin_mm, "Distance of its start from the path's start, mm.")
@@ -133,7 +133,7 @@ void register_figures(py::module_& module) {
       .def_readonly("least_mm", &WallFigures::least_mm, "mm.")
       .def_readonly("mean_mm", &WallFigures::mean_mm, "mm.")
       .def_readonly("largest_mm", &WallFigures::largest_mm, "mm.")
-      .def_readonly("stations", &WallFigures::stations, "Places at which it could be measured.")
+      .def_readonly("stations", &WallFigures::stations, "Positions at which it could be measured.")
       .def_property_readonly("band_mm", &WallFigures::band_mm, "Largest less least, mm.");
 
   py::class_<ArcFigures>(module, "ArcFigures", "A circle through what was moved or cut on an arc.")

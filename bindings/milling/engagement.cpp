@@ -109,7 +109,7 @@ void register_track(py::module_& module) {
             const auto& track = self.cast<const EngagementTrack&>();
             return arcs_array(track.arcs.data(), track.arcs.size(), self);
           },
-          "Engaged stretches of the circumference, (m, 4): from and to azimuth, rad, bottom and top above the tip, mm.")
+          "Engaged sections of the circumference, (m, 4): from and to azimuth, rad, bottom and top above the tip, mm.")
       .def(
           "arcs_of",
           [](const py::object& self, std::size_t sample) {
@@ -157,7 +157,7 @@ void register_material(py::module_& module) {
       .def_property_readonly("volume_mm3", &Material::volume_mm3, "What is left, mm3.")
       .def_property_readonly("bytes", &Material::bytes, "Memory in use.")
       .def("is_material", &Material::is_material, py::arg("x_mm"), py::arg("y_mm"), py::arg("z_mm"),
-           "Whether there is material at a place.")
+           "Whether there is material at a point.")
       .def(
           "distance_mm",
           [](const Material& self, std::size_t layer, double x, double y) {
@@ -229,7 +229,7 @@ void register_corner(py::module_& module) {
       .value("s3", CornerSection::s3, "On the arc of the finished corner.")
       .value("s4", CornerSection::s4, "On the straight behind it.");
 
-  py::class_<CornerEngagement>(module, "CornerEngagement", "What the tool meets at one place of a corner.")
+  py::class_<CornerEngagement>(module, "CornerEngagement", "What the tool meets at one position of a corner.")
       .def_readonly("section", &CornerEngagement::section, "Section of the path.")
       .def_readonly("x_mm", &CornerEngagement::x_mm, "Of the tool's axis, mm.")
       .def_readonly("y_mm", &CornerEngagement::y_mm, "Of the tool's axis, mm.")
@@ -276,7 +276,7 @@ void register_corner(py::module_& module) {
             return std::make_shared<EngagementTrack>(corner_track(self, axial_depth, step));
           },
           py::arg("axial_depth_mm"), py::arg("step_mm"),
-          "The closed form as a track with samples at most `step_mm` apart; at a sharp vertex two share one place.");
+          "The closed form as a track with samples at most `step_mm` apart; at a sharp vertex two share one position.");
 }
 
 }  // namespace

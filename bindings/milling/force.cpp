@@ -305,7 +305,7 @@ void define_largest_feeds(py::module_& module) {
 }
 
 void define_surface(py::module_& module) {
-  py::enum_<WallSide>(module, "WallSide", "The wall that a tool finishes beside its way, seen along the feed.")
+  py::enum_<WallSide>(module, "WallSide", "The wall that a tool finishes beside its path, seen along the feed.")
       .value("right", WallSide::right, "Down milling with a clockwise spindle.")
       .value("left", WallSide::left, "Up milling with a clockwise spindle.");
   module.def(

@@ -201,7 +201,7 @@ void register_pushes(py::class_<PyController>& controller) {
 
 Args:
     segment: It starts where the one before ended, the first at rest.
-    following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the way. None: they
+    following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the path length. None: they
         stay.
 
 Returns:

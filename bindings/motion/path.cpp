@@ -26,7 +26,7 @@ void for_each_point(const Path& path, double step_rad, Take take) {
   if (!(step_rad > 0.0)) {
     throw Error(ErrorKind::argument, "step_rad is " + std::to_string(step_rad) + ", must be > 0");
   }
-  constexpr double most_pieces = 1e7;
+  constexpr double max_pieces = 1e7;
   if (path.size() > 0) take(path.start_mm(0));
   for (std::size_t k = 0; k < path.size(); ++k) {
     if (!path.is_arc(k)) {
@@ -35,7 +35,7 @@ void for_each_point(const Path& path, double step_rad, Take take) {
     }
     const Segment segment = path[k];
     const double steps = std::ceil(std::abs(segment.sweep_rad) / step_rad);
-    if (!(steps <= most_pieces)) {
+    if (!(steps <= max_pieces)) {
       throw Error(ErrorKind::argument, "an arc in steps of step_rad takes more than 10000000 points");
     }
     const int pieces = std::max(1, static_cast<int>(steps));

@@ -81,13 +81,13 @@ void define_model(py::module_& module) {
   py::enum_<FilterShape>(module, "FilterShape", "Shape of the acceleration after interpolation.")
       .value("linear", FilterShape::linear)
       .value("exponential", FilterShape::exponential);
-  py::enum_<RapidPath>(module, "RapidPath", "Way of a rapid (1401#1).")
+  py::enum_<RapidPath>(module, "RapidPath", "Path of a rapid (1401#1).")
       .value("linear", RapidPath::linear)
       .value("non_linear", RapidPath::non_linear);
   py::enum_<InPosition>(module, "InPosition", "Where the wait for in-position comes from.")
       .value("measured", InPosition::measured)
       .value("servo_lag", InPosition::servo_lag);
-  py::enum_<ShapedRegions>(module, "ShapedRegions", "Which cuts of a program are played as shaped blocks.")
+  py::enum_<ShapedRegions>(module, "ShapedRegions", "Which cuts of a program run as shaped blocks.")
       .value("marked", ShapedRegions::marked, "Regions that the program says it of.")
       .value("all", ShapedRegions::all)
       .value("none", ShapedRegions::none);
@@ -117,7 +117,7 @@ void define_model(py::module_& module) {
       .def_readwrite("position_gain_per_s", &FanucModel::position_gain_per_s, "Per axis, 1/s, shape (3,) (1825).")
       .def_readwrite("feed_forward_ratio", &FanucModel::feed_forward_ratio, "Per axis, 0 ... 1, shape (3,) (2092).")
       .def_readwrite("in_position_width_mm", &FanucModel::in_position_width_mm, "Per axis, mm, shape (3,) (1826).")
-      .def_readwrite("shaped_regions", &FanucModel::shaped_regions, "What is played as shaped blocks.")
+      .def_readwrite("shaped_regions", &FanucModel::shaped_regions, "What runs as shaped blocks.")
       .def_readwrite("shaped_filter_shape", &FanucModel::shaped_filter_shape, "Behind shaped blocks.")
       .def_readwrite("shaped_time_constant_s", &FanucModel::shaped_time_constant_s,
                      "Behind shaped blocks, s; 0: no filter.")
@@ -135,7 +135,7 @@ void define_model(py::module_& module) {
       .def_readwrite("m_function_s", &FanucModel::m_function_s, "Every M code without a time of its own, s.")
       .def_readwrite("m_code_s", &FanucModel::m_code_s, "M codes with a time of their own: code -> s.")
       .def_readwrite("unknown_move_s", &FanucModel::unknown_move_s,
-                     "Per axis: a rapid of whose way the program does not tell start or end, s, shape (3,).")
+                     "Per axis: a rapid whose start or end the program does not give, s, shape (3,).")
       .def_property(
           "spindle_start_s", [](const FanucModel& self) { return spindle_rows(self.spindle_start_s); },
           [](FanucModel& self, const SpindleRows& rows) { self.spindle_start_s = spindle_times(rows); },
@@ -168,7 +168,7 @@ void define_model(py::module_& module) {
       },
       py::arg("travel_mm"), py::arg("model"),
       "Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: "
-      "signed way of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.");
+      "signed travel of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.");
   module.def(
       "in_position_wait_s",
       [](const Vector3& travel_mm, const FanucModel& model) {

@@ -17,7 +17,7 @@ namespace py = pybind11;
 namespace shapegcode::bindings {
 namespace {
 
-constexpr Eigen::Index played_columns = 6;
+constexpr Eigen::Index response_columns = 6;
 
 void check_one_axis(const VectorArray& setpoints_mm) {
   if (setpoints_mm.ndim() == 1) return;
@@ -28,27 +28,27 @@ void check_one_axis(const VectorArray& setpoints_mm) {
 py::array play(FeedDrive& drive, const VectorArray& setpoints_mm) {
   check_one_axis(setpoints_mm);
   const double* setpoints = setpoints_mm.data();
-  Eigen::MatrixXd played(setpoints_mm.size(), played_columns);
+  Eigen::MatrixXd response_rows(setpoints_mm.size(), response_columns);
   {
     const py::gil_scoped_release release;
-    for (Eigen::Index i = 0; i < played.rows(); ++i) {
+    for (Eigen::Index i = 0; i < response_rows.rows(); ++i) {
       const double response = drive.step(setpoints[i]);
-      played.row(i) << response, drive.table_mm(), drive.motor_mm(), drive.friction_force_n(), drive.motor_force_n(),
-          drive.spring_force_n();
+      response_rows.row(i) << response, drive.table_mm(), drive.motor_mm(), drive.friction_force_n(),
+          drive.motor_force_n(), drive.spring_force_n();
     }
   }
-  return take(std::move(played));
+  return take(std::move(response_rows));
 }
 
-py::array play_in_real_time(FeedDriveRealTime& drive, const VectorArray& setpoints_mm) {
+py::array simulate_in_real_time(FeedDriveRealTime& drive, const VectorArray& setpoints_mm) {
   check_one_axis(setpoints_mm);
   const double* setpoints = setpoints_mm.data();
-  Eigen::VectorXd played(setpoints_mm.size());
+  Eigen::VectorXd response_rows(setpoints_mm.size());
   {
     const py::gil_scoped_release release;
-    for (Eigen::Index i = 0; i < played.size(); ++i) played[i] = drive.step(setpoints[i]);
+    for (Eigen::Index i = 0; i < response_rows.size(); ++i) response_rows[i] = drive.step(setpoints[i]);
   }
-  return py::cast(std::move(played));
+  return py::cast(std::move(response_rows));
 }
 
 void register_friction(py::module_& module) {
@@ -248,7 +248,7 @@ Raises:
       .def("reset", &FeedDriveRealTime::reset, py::arg("position_mm"), "At rest at a position (mm).")
       .def("step", py::overload_cast<double>(&FeedDriveRealTime::step), py::arg("setpoint_mm"),
            "Next set-point (mm); the response at that instant in mm.")
-      .def("play", &play_in_real_time, py::arg("setpoints_mm"),
+      .def("play", &simulate_in_real_time, py::arg("setpoints_mm"),
            "Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.");
 }
 

@@ -116,7 +116,7 @@ Raises:
 
 Where the region is one run, its parts are given out while they are measured, as if the first plan kept the tolerance.
 Where that turns out to be wrong, next() gives None and is_withdrawn holds: all that was given out is void.)")
-      .def("begin_anew", &RegionShaper::begin_anew,
+      .def("begin_anew", &RegionShaper::restart,
            R"(Give the region out from its begin again, with the feed that the search finds.
 
 Returns:

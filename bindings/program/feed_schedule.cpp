@@ -8,7 +8,7 @@
 #include "register.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/milling/feed.hpp"
-#include "shapegcode/play.hpp"
+#include "shapegcode/simulation.hpp"
 #include "shapegcode/write.hpp"
 
 namespace py = pybind11;
@@ -28,14 +28,14 @@ py::array column(const std::vector<double>& values) {
 }
 
 void register_travel(py::module_& module) {
-  py::class_<Travel>(module, "Travel", "How a path is really travelled, per stretch between two stations.")
+  py::class_<Travel>(module, "Travel", "How a path is really travelled, per section between two stations.")
       .def_property_readonly(
           "highest_mm_per_s", [](const Travel& self) { return column(self.highest_mm_per_s); },
           "Largest travel within a window, over the window, (n,), mm/s: what was travelled in the present direction "
           "and "
-          "in XY, as a way along the path.")
+          "in XY, as travel along the path.")
       .def_property_readonly(
-          "time_s", [](const Travel& self) { return column(self.time_s); }, "Time on each stretch, (n,), s.")
+          "time_s", [](const Travel& self) { return column(self.time_s); }, "Time on each section, (n,), s.")
       .def_readonly("duration_s", &Travel::duration_s, "Until the set-points rest, s.");
 
   module.def(
@@ -65,8 +65,8 @@ void register_travel(py::module_& module) {
       "How blocks at their feed are travelled, followed along `along`; else as travel_path.");
 }
 
-void define_stretches(py::module_& module) {
-  py::class_<FeedStretch>(module, "FeedStretch", "A stretch of one feed.")
+void define_sections(py::module_& module) {
+  py::class_<FeedStretch>(module, "FeedStretch", "A section of one feed.")
       .def(py::init<double, double, double>(), py::arg("begin_mm"), py::arg("end_mm"), py::arg("feed_mm_per_min"))
       .def_readonly("begin_mm", &FeedStretch::begin_mm, "Along the path, mm.")
       .def_readonly("end_mm", &FeedStretch::end_mm, "Along the path, mm.")
@@ -96,7 +96,7 @@ void define_schedule(py::module_& module) {
       py::arg("feeds_mm_per_min"), py::arg("least_length_mm") = FeedScheduleOptions{}.least_length_mm,
       py::arg("most_change_mm_per_min") = FeedScheduleOptions{}.most_change_mm_per_min,
       py::arg("resolution_mm_per_min") = FeedScheduleOptions{}.resolution_mm_per_min,
-      "Feeds of a path in the shortest time that the stations allow: stretches not shorter than the least length, each "
+      "Feeds of a path in the shortest time that the stations allow: sections not shorter than the least length, each "
       "at the lowest feed of its stations. Per block its end (n,), the feed that it keeps (0: it may change) and "
       "whether "
       "it may be divided; feeds (m,) hold up to their station. Raises ArgumentError on values that do not ascend or "
@@ -104,12 +104,12 @@ void define_schedule(py::module_& module) {
       "not above 0.");
   module.def(
       "with_feeds",
-      [](const std::shared_ptr<Path>& path, const std::vector<FeedStretch>& stretches) {
-        return std::make_shared<Path>(with_feeds(*path, stretches));
+      [](const std::shared_ptr<Path>& path, const std::vector<FeedStretch>& sections) {
+        return std::make_shared<Path>(with_feeds(*path, sections));
       },
       py::arg("path").none(false), py::arg("stretches"),
-      "The path with other feeds: segments are divided where a stretch ends within one. Raises ArgumentError if the "
-      "stretches do not cover it.");
+      "The path with other feeds: segments are divided where a section ends within one. Raises ArgumentError if the "
+      "sections do not cover it.");
   module.def(
       "look_ahead_on_load",
       [](const VectorArray& stations, const VectorArray& feeds, const VectorArray& load, const VectorArray& before_s,
@@ -158,17 +158,17 @@ void define_feed_writer(py::module_& module) {
       "Whether F is a feed per minute in every block of a region, in one unit of length.");
   module.def(
       "write_feeds",
-      [](const Program& program, const Region& region, const std::vector<FeedStretch>& stretches,
-         const FeedWriterOptions& options) { return write_feeds(program, region, stretches, options); },
+      [](const Program& program, const Region& region, const std::vector<FeedStretch>& sections,
+         const FeedWriterOptions& options) { return write_feeds(program, region, sections, options); },
       py::arg("program").none(false), py::arg("region"), py::arg("stretches"), py::arg("options"),
-      "The region's lines with the feeds of stretches that cover its path; what else stands in them stays. Raises "
+      "The region's lines with the feeds of sections that cover its path; what else stands in them stays. Raises "
       "ArgumentError if they do not cover it, or end within a block that cannot be divided.");
 }
 
 }  // namespace
 
 void register_feed_schedule(py::module_& module) {
-  define_stretches(module);
+  define_sections(module);
   define_schedule(module);
   define_feed_writer(module);
   register_travel(module);

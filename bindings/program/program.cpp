@@ -243,7 +243,7 @@ void register_gcode(py::module_& module) {
       .def_readwrite("bindings", &ReaderOptions::bindings, "Codes bound to programs.")
       .def_readwrite("program", &ReaderOptions::program, "O number to play of a file with several; -1: the first.")
       .def_readwrite("program_index", &ReaderOptions::program_index,
-                     "The same by its place among `list_programs`, whatever its name, and alone; -1: by number.")
+                     "The same by its index in `list_programs`, whatever its name, and alone; -1: by number.")
       .def_property(
           "load_program", [](const ReaderOptions& self) { return static_cast<bool>(self.load_program); },
           [](ReaderOptions& self, py::object loader) { self.load_program = program_loader(std::move(loader)); },
@@ -309,9 +309,10 @@ void register_gcode(py::module_& module) {
       .def_property_readonly(
           "unexpanded", [](const Program& self) { return py::bytes(self.unexpanded); },
           "The text as handed over, where `text` is what it comes to; else empty.")
-      .def("find", &find, py::arg("what"), py::arg("begin") = 0, "First place of bytes in the text, or -1.")
+      .def("find", &find, py::arg("what"), py::arg("begin") = 0,
+           "Index of the first occurrence of bytes in the text, or -1.")
       .def("overwrite", &overwrite, py::arg("begin"), py::arg("what"),
-           "Put bytes in the place of as many. Raises ArgumentError beyond the text's end.")
+           "Put bytes over as many. Raises ArgumentError beyond the text's end.")
       .def_property_readonly(
           "text", [](const Program& self) { return py::bytes(self.text); }, "The whole text.")
       .def("slice", &slice, py::arg("begin"), py::arg("end"), "Bytes of the text between two offsets.")
@@ -328,7 +329,7 @@ void register_gcode(py::module_& module) {
       .def_property_readonly(
           "regions", [](const Program& self) { return self.regions; }, "Runs of cutting moves in order.")
       .def_property_readonly("other_moves", &other_moves,
-                             "Rapids, cycles and kept moves as (Segment, dwell_s) pairs, for the clock.")
+                             "Rapids, cycles and kept moves as (Segment, dwell_s) pairs, for the cycle time.")
       .def_property_readonly("steps", &steps,
                              "(StepKind, index into regions, other_moves or functions, line) in program order.")
       .def_property_readonly("functions", &functions, "(M codes, T or -1, S or -1) of blocks with M, S or T words.")
@@ -350,7 +351,8 @@ void register_gcode(py::module_& module) {
             return py::make_tuple(origin.line, self.files[origin.file]);
           },
           py::arg("line"), "(line, file) of the source from which a line of `text` comes.")
-      .def_readonly("called", &Program::called, "Places of programs of the file that others called, see list_programs.")
+      .def_readonly("called", &Program::called,
+                    "Positions of programs of the file that others called, see list_programs.")
       .def_readonly("program_numbers", &Program::program_numbers, "All O numbers in the file.")
       .def_readonly("expanded_radii_mm", &Program::expanded_radii_mm,
                     "D number to radius, mm, where cutter compensation was expanded.")

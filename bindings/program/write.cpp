@@ -39,9 +39,9 @@ void register_emission(py::module_& module) {
       .def_readwrite("most_periods", &FitOptions::most_periods,
                      "Longest block, block periods. 1: all last the same time, for a feed override that is turned.")
       .def_readwrite("equal_above_increments", &FitOptions::equal_above_increments,
-                     "Way per interpolation period up to which blocks may be longer than that, increments.")
+                     "Distance per interpolation period up to which blocks may be longer than that, increments.")
       .def_readwrite("equal_periods", &FitOptions::equal_periods,
-                     "Likewise blocks so far from both ends of a steady stretch, block periods; 0: none.")
+                     "Likewise blocks so far from both ends of a steady section, block periods; 0: none.")
       .def_readwrite("lent_periods", &FitOptions::lent_periods, "Periods that the blocks before did not last.")
       .def_readwrite("modes", &FitOptions::modes,
                      "Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the "
@@ -152,9 +152,9 @@ void register_emission(py::module_& module) {
         return busiest_per_s(durations, given, stretch_s);
       },
       py::arg("durations_s"), py::arg("amounts"), py::arg("stretch_s"),
-      "Largest amount per second in any stretch of a duration; each block's amount is spread evenly over it.\n\n"
+      "Largest amount per second in any time window of a duration; each block's amount is spread evenly over it.\n\n"
       "`durations_s`: of the blocks, s, (n,); `amounts`: what each of them needs, such as its characters, (n,); None: "
-      "one of each; `stretch_s`: the stretch, s; all blocks together if they last less.");
+      "one of each; `stretch_s`: the window, s; all blocks together if they last less.");
 }
 
 }  // namespace shapegcode::bindings

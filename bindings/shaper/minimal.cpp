@@ -21,14 +21,14 @@ void register_search(py::module_& m) {
   py::class_<MinimalShapers>(m, "MinimalShapers", "The minimal shapers of some modes, and what is known about others.")
       .def_readonly("shapers", &MinimalShapers::shapers, "The shapers, ascending in duration, then in the times.")
       .def_readonly("complete", &MinimalShapers::complete,
-                    "True if every box of times was settled: there is no other shaper in the region.")
+                    "True if every box of times was decided: there is no other shaper in the region.")
       .def_readonly("complete_up_to_s", &MinimalShapers::complete_up_to_s,
                     "Duration in s up to which there is no other shaper; 0: nothing is proven.")
       .def_readonly("max_duration_s", &MinimalShapers::max_duration_s, "The region: largest duration in s.")
       .def_readonly("max_abs_sum", &MinimalShapers::max_abs_sum, "The region: largest sum of magnitudes (no unit).")
       .def_readonly("boxes", &MinimalShapers::boxes, "Boxes of times that the proof looked at.")
       .def_readonly("unresolved", &MinimalShapers::unresolved,
-                    "Boxes too small to halve on that could not be settled: solutions there are not isolated.")
+                    "Boxes too small to halve on that could not be decided: solutions there are not isolated.")
       .def_readonly("starts", &MinimalShapers::starts, "Newton starts.")
       .def_readonly("converged", &MinimalShapers::converged, "Starts that reached a shaper in the region.")
       .def_readonly("found_once", &MinimalShapers::found_once,

@@ -76,15 +76,15 @@ Shaper on_grid(const Shaper& shaper, const Mode& mode, double period_s) {
     const std::complex<double> delayed = std::exp(-s * within * period_s);
     const double behind = within <= on_sample ? 0.0 : delayed.imag() / one_sample.imag();
     const double ahead = within <= on_sample ? 1.0 : delayed.real() - behind * one_sample.real();
-    const auto place = static_cast<int>(before);
-    taps[place] += shaper.amplitudes[k] * ahead;
-    if (behind != 0.0) taps[place + 1] += shaper.amplitudes[k] * behind;
+    const auto sample = static_cast<int>(before);
+    taps[sample] += shaper.amplitudes[k] * ahead;
+    if (behind != 0.0) taps[sample + 1] += shaper.amplitudes[k] * behind;
     sum += shaper.amplitudes[k] * (ahead + behind);
   }
   std::vector<double> times;
   std::vector<double> amplitudes;
-  for (const auto& [place, weight] : taps) {
-    times.push_back(place * period_s);
+  for (const auto& [sample, weight] : taps) {
+    times.push_back(sample * period_s);
     amplitudes.push_back(weight / sum);
   }
   return make_shaper(std::move(times), std::move(amplitudes));
@@ -93,7 +93,7 @@ Shaper on_grid(const Shaper& shaper, const Mode& mode, double period_s) {
 Fir design(const Wish& wish, double period_s) {
   if (!wish.enable) return Fir({0}, {1.0});
   std::optional<Shaper> shaper;
-  for (std::size_t k = 0; k < Wish::most_modes; ++k) {
+  for (std::size_t k = 0; k < Wish::max_modes; ++k) {
     if (wish.frequency_hz[k] == 0.0) continue;
     const Mode mode{wish.frequency_hz[k], wish.damping_ratio[k], 1.0};
     const Shaper of_mode = of_one(static_cast<Family>(wish.family), mode, period_s);

@@ -14,12 +14,12 @@ enum class Family { zv = 0, zvd = 1, zvdd = 2, mzv = 3, ei = 4, ei2 = 5, ei3 = 6
 
 /// What the pins of a component ask for.
 struct Wish {
-  static constexpr std::size_t most_modes = 3;
+  static constexpr std::size_t max_modes = 3;
 
   bool enable = false;
   int family = 0;
-  std::array<double, most_modes> frequency_hz{};  ///< 0: no mode
-  std::array<double, most_modes> damping_ratio{};
+  std::array<double, max_modes> frequency_hz{};  ///< 0: no mode
+  std::array<double, max_modes> damping_ratio{};
 };
 
 /// What EI shapers leave of a mode at most.

@@ -25,17 +25,17 @@ namespace {
 using namespace shapegcode;
 using namespace shapegcode::linuxcnc;
 
-static_assert(Wish::most_modes == SHAPEGCODE_HAL_MODES);
+static_assert(Wish::max_modes == SHAPEGCODE_HAL_MODES);
 
 constexpr std::chrono::milliseconds between_looks(10);
 
 /// A wish as plain words that can be compared and handed over one by one.
-using Words = std::array<std::uint64_t, 3 + 2 * Wish::most_modes>;
+using Words = std::array<std::uint64_t, 3 + 2 * Wish::max_modes>;
 
 Words words_of(const shapegcode_hal_settings& settings) noexcept {
   Words words{settings.enabled != 0 ? 1U : 0U, static_cast<std::uint64_t>(settings.family_number),
               std::bit_cast<std::uint64_t>(settings.period_s)};
-  for (std::size_t k = 0; k < Wish::most_modes; ++k) {
+  for (std::size_t k = 0; k < Wish::max_modes; ++k) {
     words[3 + 2 * k] = std::bit_cast<std::uint64_t>(settings.frequency_hz[k]);
     words[4 + 2 * k] = std::bit_cast<std::uint64_t>(settings.damping_ratio[k]);
   }
@@ -44,7 +44,7 @@ Words words_of(const shapegcode_hal_settings& settings) noexcept {
 
 Wish wish_of(const Words& words) noexcept {
   Wish wish{words[0] != 0, static_cast<int>(words[1]), {}, {}};
-  for (std::size_t k = 0; k < Wish::most_modes; ++k) {
+  for (std::size_t k = 0; k < Wish::max_modes; ++k) {
     wish.frequency_hz[k] = std::bit_cast<double>(words[3 + 2 * k]);
     wish.damping_ratio[k] = std::bit_cast<double>(words[4 + 2 * k]);
   }

@@ -34,7 +34,7 @@ struct shapegcode_hal;
  * impossible, from the other thread. Not real-time. */
 struct shapegcode_hal* shapegcode_hal_create(int joints, void (*report)(const char* line));
 
-/* Ends the thread and frees everything. A shapegcode_hal_step that is under way may end first, none may begin. Not
+/* Ends the thread and frees everything. A shapegcode_hal_step that is running may end first, none may begin. Not
  * real-time. */
 void shapegcode_hal_destroy(struct shapegcode_hal* hal);
 

@@ -173,12 +173,10 @@ from shapegcode.metrology.measure import (
 )
 from shapegcode.metrology.plots import plot_part as plot_part, plot_walls as plot_walls
 from shapegcode.metrology.result import Measurement as Measurement
-from shapegcode.model.modes import drive_parameters as drive_parameters
-from shapegcode.model.response import plant_response as plant_response
+from shapegcode.model.modes import drive_parameters as drive_parameters, plant_response as plant_response
 from shapegcode.model.stream import stream as stream
 from shapegcode.program import Program as Program
-from shapegcode.program.expand import expand as expand
-from shapegcode.program.result import Expansion as Expansion
+from shapegcode.program.expand import Expansion as Expansion, expand as expand
 from shapegcode.results.json import schema as schema
 from shapegcode.results.motion_plots import (
     Trace as Trace,

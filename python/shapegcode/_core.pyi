@@ -232,7 +232,7 @@ class MinimalShapers:
     @property
     def complete(self) -> bool:
         """
-        True if every box of times was settled: there is no other shaper in the region.
+        True if every box of times was decided: there is no other shaper in the region.
         """
     @property
     def complete_up_to_s(self) -> float:
@@ -272,7 +272,7 @@ class MinimalShapers:
     @property
     def unresolved(self) -> int:
         """
-        Boxes too small to halve on that could not be settled: solutions there are not isolated.
+        Boxes too small to halve on that could not be decided: solutions there are not isolated.
         """
 class MinimalBranches:
     """
@@ -1194,7 +1194,7 @@ class MotionController:
         
         Args:
             segment: It starts where the one before ended, the first at rest.
-            following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the way. None: they
+            following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the path length. None: they
                 stay.
         
         Returns:
@@ -1853,7 +1853,7 @@ class ReaderOptions:
     @property
     def program_index(self) -> int:
         """
-        The same by its place among `list_programs`, whatever its name, and alone; -1: by number.
+        The same by its index in `list_programs`, whatever its name, and alone; -1: by number.
         """
     @program_index.setter
     def program_index(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2023,7 +2023,7 @@ class ProgramText:
         """
     def find(self, what: bytes, begin: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
         """
-        First place of bytes in the text, or -1.
+        Index of the first occurrence of bytes in the text, or -1.
         """
     def origin(self, line: typing.SupportsInt | typing.SupportsIndex) -> tuple:
         """
@@ -2031,7 +2031,7 @@ class ProgramText:
         """
     def overwrite(self, begin: typing.SupportsInt | typing.SupportsIndex, what: bytes) -> None:
         """
-        Put bytes in the place of as many. Raises ArgumentError beyond the text's end.
+        Put bytes over as many. Raises ArgumentError beyond the text's end.
         """
     def slice(self, begin: typing.SupportsInt | typing.SupportsIndex, end: typing.SupportsInt | typing.SupportsIndex) -> bytes:
         """
@@ -2054,7 +2054,7 @@ class ProgramText:
     @property
     def called(self) -> list[int]:
         """
-        Places of programs of the file that others called, see list_programs.
+        Positions of programs of the file that others called, see list_programs.
         """
     @property
     def compensated_moves(self) -> int:
@@ -2114,7 +2114,7 @@ class ProgramText:
     @property
     def other_moves(self) -> list:
         """
-        Rapids, cycles and kept moves as (Segment, dwell_s) pairs, for the clock.
+        Rapids, cycles and kept moves as (Segment, dwell_s) pairs, for the cycle time.
         """
     @property
     def probed(self) -> list[ModalState]:
@@ -2687,7 +2687,7 @@ class Arma:
     @property
     def converged(self) -> bool:
         """
-        True if phi settled; otherwise this is the best of all rounds.
+        True if phi converged; otherwise this is the best of all rounds.
         """
     @property
     def iterations(self) -> int:
@@ -3270,7 +3270,7 @@ class FitOptions:
     @property
     def equal_above_increments(self) -> float:
         """
-        Way per interpolation period up to which blocks may be longer than that, increments.
+        Distance per interpolation period up to which blocks may be longer than that, increments.
         """
     @equal_above_increments.setter
     def equal_above_increments(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -3278,7 +3278,7 @@ class FitOptions:
     @property
     def equal_periods(self) -> int:
         """
-        Likewise blocks so far from both ends of a steady stretch, block periods; 0: none.
+        Likewise blocks so far from both ends of a steady section, block periods; 0: none.
         """
     @equal_periods.setter
     def equal_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -3539,7 +3539,7 @@ class PlaybackOptions:
     @property
     def arrived_mm(self) -> float:
         """
-        Drives: the residual is the swing of the table against its motor once that is so near, mm; 0: the whole error from the stop on.
+        Drives: the residual is the vibration of the table against its motor once that is so near, mm; 0: the whole error from the stop on.
         """
     @arrived_mm.setter
     def arrived_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -3563,7 +3563,7 @@ class PlaybackOptions:
     @property
     def feed_slack_mm(self) -> float:
         """
-        Way within that time that rounding may add, mm.
+        Distance within that time that rounding may add, mm.
         """
     @feed_slack_mm.setter
     def feed_slack_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -3706,7 +3706,7 @@ class PlaybackOptions:
         ...
 class FeedExcess:
     """
-    Where a motion is fastest against the programmed feed at the same place.
+    Where a motion is fastest against the programmed feed at the same position.
     """
     @property
     def line(self) -> int:
@@ -3902,7 +3902,7 @@ class SectionKind:
         ...
 class PathSection:
     """
-    A stretch of a path that is measured by itself.
+    A section of a path that is measured by itself.
     """
     @property
     def begin_mm(self) -> float:
@@ -4053,7 +4053,7 @@ class WallFigures:
     @property
     def stations(self) -> int:
         """
-        Places at which it could be measured.
+        Positions at which it could be measured.
         """
 class ArcFigures:
     """
@@ -4441,7 +4441,7 @@ class FilterShape:
         ...
 class RapidPath:
     """
-    Way of a rapid (1401#1).
+    Path of a rapid (1401#1).
     
     Members:
     
@@ -4535,7 +4535,7 @@ class InPosition:
         ...
 class ShapedRegions:
     """
-    Which cuts of a program are played as shaped blocks.
+    Which cuts of a program run as shaped blocks.
     
     Members:
     
@@ -4800,7 +4800,7 @@ class FanucModel:
     @property
     def shaped_regions(self) -> ShapedRegions:
         """
-        What is played as shaped blocks.
+        What runs as shaped blocks.
         """
     @shaped_regions.setter
     def shaped_regions(self, arg0: ShapedRegions) -> None:
@@ -4848,7 +4848,7 @@ class FanucModel:
     @property
     def unknown_move_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Per axis: a rapid of whose way the program does not tell start or end, s, shape (3,).
+        Per axis: a rapid whose start or end the program does not give, s, shape (3,).
         """
     @unknown_move_s.setter
     def unknown_move_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
@@ -5123,7 +5123,7 @@ class InterpolatedTime:
         """
 class PlayedChunk:
     """
-    A stretch of a played motion, one row per period.
+    A section of a simulated motion, one row per period.
     """
     def __len__(self) -> int:
         ...
@@ -5174,7 +5174,7 @@ class PlayedChunk:
         """
 class PlayedStream:
     """
-    A motion played through filters and plant and handed out in pieces.
+    A motion simulated through filters and plant and handed out in pieces.
     """
     @staticmethod
     def of_blocks(blocks: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: PlaybackOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
@@ -5288,7 +5288,7 @@ class EngagementTrack:
     @property
     def arcs(self) -> numpy.ndarray:
         """
-        Engaged stretches of the circumference, (m, 4): from and to azimuth, rad, bottom and top above the tip, mm.
+        Engaged sections of the circumference, (m, 4): from and to azimuth, rad, bottom and top above the tip, mm.
         """
     @property
     def direction_rad(self) -> numpy.ndarray:
@@ -5368,7 +5368,7 @@ class Material:
         """
     def is_material(self, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex, z_mm: typing.SupportsFloat | typing.SupportsIndex) -> bool:
         """
-        Whether there is material at a place.
+        Whether there is material at a point.
         """
     def take_whole_layers(self) -> None:
         """
@@ -5473,7 +5473,7 @@ class CornerSection:
         ...
 class CornerEngagement:
     """
-    What the tool meets at one place of a corner.
+    What the tool meets at one position of a corner.
     """
     @property
     def direction_rad(self) -> float:
@@ -5537,7 +5537,7 @@ class CornerCut:
         """
     def track(self, axial_depth_mm: typing.SupportsFloat | typing.SupportsIndex, step_mm: typing.SupportsFloat | typing.SupportsIndex) -> EngagementTrack:
         """
-        The closed form as a track with samples at most `step_mm` apart; at a sharp vertex two share one place.
+        The closed form as a track with samples at most `step_mm` apart; at a sharp vertex two share one position.
         """
     @property
     def after_mm(self) -> float:
@@ -5988,7 +5988,7 @@ class LimitedFeed:
         """
 class WallSide:
     """
-    The wall that a tool finishes beside its way, seen along the feed.
+    The wall that a tool finishes beside its path, seen along the feed.
     
     Members:
     
@@ -6035,7 +6035,7 @@ class WallSide:
         ...
 class FeedStretch:
     """
-    A stretch of one feed.
+    A section of one feed.
     """
     def __init__(self, begin_mm: typing.SupportsFloat | typing.SupportsIndex, end_mm: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
@@ -6088,7 +6088,7 @@ class RefedRegion:
         """
 class Travel:
     """
-    How a path is really travelled, per stretch between two stations.
+    How a path is really travelled, per section between two stations.
     """
     @property
     def duration_s(self) -> float:
@@ -6098,12 +6098,12 @@ class Travel:
     @property
     def highest_mm_per_s(self) -> numpy.ndarray:
         """
-        Largest travel within a window, over the window, (n,), mm/s: what was travelled in the present direction and in XY, as a way along the path.
+        Largest travel within a window, over the window, (n,), mm/s: what was travelled in the present direction and in XY, as travel along the path.
         """
     @property
     def time_s(self) -> numpy.ndarray:
         """
-        Time on each stretch, (n,), s.
+        Time on each section, (n,), s.
         """
 class ComparedKind:
     """
@@ -6258,7 +6258,7 @@ def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.A
         plain: One round of unfiltered least squares, which noise bends, instead of the iterated one.
     
     Returns:
-        The model whose phi settled, or the best of all rounds with converged False.
+        The model whose phi converged, or the best of all rounds with converged False.
     
     Raises:
         ArgumentError: No record, unequal lengths, a value that is not finite, a force that is zero throughout, a number
@@ -6273,9 +6273,9 @@ def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, nu
     """
 def busiest_per_s(durations_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], amounts: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, stretch_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Largest amount per second in any stretch of a duration; each block's amount is spread evenly over it.
+    Largest amount per second in any time window of a duration; each block's amount is spread evenly over it.
     
-    `durations_s`: of the blocks, s, (n,); `amounts`: what each of them needs, such as its characters, (n,); None: one of each; `stretch_s`: the stretch, s; all blocks together if they last less.
+    `durations_s`: of the blocks, s, (n,); `amounts`: what each of them needs, such as its characters, (n,); None: one of each; `stretch_s`: the window, s; all blocks together if they last less.
     """
 def compare_programs(original: ProgramText, emitted: ProgramText, reader: ReaderOptions, emission_lines: collections.abc.Sequence[str]) -> ProgramComparison:
     """
@@ -6773,7 +6773,7 @@ def plant_response(command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
     """
 def play_blocks(blocks: Path, path: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: PlaybackOptions) -> PlaybackFigures:
     """
-    Play blocks at their feed (a controller without look-ahead), measured against the programmed path.
+    Simulate blocks at their feed (a controller without look-ahead), measured against the programmed path.
     """
 def play_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.SupportsIndex, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
     """
@@ -6781,15 +6781,15 @@ def play_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.Suppor
     """
 def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions, programmed: Path = None) -> PlaybackFigures:
     """
-    Play a path under a speed profile (a controller with look-ahead) through filters and plant, measured against the programmed path (None: the path itself).
+    Simulate a path under a speed profile (a controller with look-ahead) through filters and plant, measured against the programmed path (None: the path itself).
     """
 def play_planned(path: Path, limits: MotionLimits, options: PlaybackOptions, programmed: Path) -> PlaybackFigures:
     """
-    play_path under the profile of plan_speed, which is not kept as a whole where it need not be.
+    simulate_path under the profile of plan_speed, which is not kept as a whole where it need not be.
     """
 def play_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: PlaybackOptions) -> PlaybackFigures:
     """
-    Play set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.
+    Simulate set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.
     """
 def poles_to_modes(poles: collections.abc.Sequence[complex | typing.SupportsComplex | typing.SupportsFloat | typing.SupportsIndex], period_s: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
@@ -6841,7 +6841,7 @@ def rapid_samples(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float
     """
 def rapid_time_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> float:
     """
-    Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: signed way of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.
+    Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: signed travel of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.
     """
 def read_parts(parts: list, options: ReaderOptions) -> ProgramText:
     """
@@ -6869,7 +6869,7 @@ def repeated_zv(mode: Mode, zeros: typing.SupportsInt | typing.SupportsIndex) ->
     """
 def schedule_feed(block_ends_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], kept_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], divisible: collections.abc.Sequence[bool], stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], least_length_mm: typing.SupportsFloat | typing.SupportsIndex = 0.6, most_change_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = ..., resolution_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> list[FeedStretch]:
     """
-    Feeds of a path in the shortest time that the stations allow: stretches not shorter than the least length, each at the lowest feed of its stations. Per block its end (n,), the feed that it keeps (0: it may change) and whether it may be divided; feeds (m,) hold up to their station. Raises ArgumentError on values that do not ascend or are not above 0.
+    Feeds of a path in the shortest time that the stations allow: sections not shorter than the least length, each at the lowest feed of its stations. Per block its end (n,), the feed that it keeps (0: it may change) and whether it may be divided; feeds (m,) hold up to their station. Raises ArgumentError on values that do not ascend or are not above 0.
     """
 def sensitivity_curve(shaper: Shaper, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, frequencies_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[float]:
     """
@@ -6980,7 +6980,7 @@ def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n
         stiffness_n_per_m: Stiffness, above 0.
         force_n: Force in N, shape (n,).
         period_s: Time between samples in s, above 0.
-        theta: Stretch of the step over which the acceleration is linear, at least 1; stable from 1.37 on.
+        theta: Section of the step over which the acceleration is linear, at least 1; stable from 1.37 on.
         displacement_m: At the first sample.
         velocity_m_per_s: At the first sample.
     
@@ -6994,7 +6994,7 @@ def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n
     """
 def with_feeds(path: Path, stretches: collections.abc.Sequence[FeedStretch]) -> Path:
     """
-    The path with other feeds: segments are divided where a stretch ends within one. Raises ArgumentError if the stretches do not cover it.
+    The path with other feeds: segments are divided where a section ends within one. Raises ArgumentError if the sections do not cover it.
     """
 def worst_residual(shaper: Shaper, mode: Mode, lowest_hz: typing.SupportsFloat | typing.SupportsIndex, highest_hz: typing.SupportsFloat | typing.SupportsIndex) -> WorstResidual:
     """
@@ -7021,7 +7021,7 @@ def write_blocks(blocks: FittedBlocks, start: typing.Annotated[collections.abc.S
     """
 def write_feeds(program: ProgramText, region: Region, stretches: collections.abc.Sequence[FeedStretch], options: FeedWriterOptions) -> RefedRegion:
     """
-    The region's lines with the feeds of stretches that cover its path; what else stands in them stays. Raises ArgumentError if they do not cover it, or end within a block that cannot be divided.
+    The region's lines with the feeds of sections that cover its path; what else stands in them stays. Raises ArgumentError if they do not cover it, or end within a block that cannot be divided.
     """
 def zv(mode: Mode | typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Shaper:
     """

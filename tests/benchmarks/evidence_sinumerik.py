@@ -16,15 +16,7 @@ from scipy.optimize import minimize_scalar
 import shapegcode as sg
 from shapegcode.identification.servo.models import delayed, rms
 
-SHIPPED = (
-    Path(__file__).resolve().parents[2]
-    / "python"
-    / "shapegcode"
-    / "data"
-    / "measured"
-    / "sinumerik"
-    / "capture.json.gz"
-)
+SHIPPED = Path(__file__).resolve().parents[2] / "python/shapegcode/data/measured/sinumerik/capture.json.gz"
 
 
 def own_dead_time(capture: sg.EdgeCapture, axis: int) -> tuple[float, float]:

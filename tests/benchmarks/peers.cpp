@@ -24,7 +24,7 @@
 namespace shapegcode::peers {
 namespace {
 
-constexpr std::size_t most_steps = 2'000'000;
+constexpr std::size_t max_steps = 2'000'000;
 
 std::int64_t now_ns() noexcept {
   timespec now{};
@@ -106,7 +106,7 @@ bool read_setting(const std::string& word, std::istream& in, Task& task) {
 
 // What the passes of a path took, the least of each step: what is slow in every pass is the code's own.
 struct StepTimes {
-  std::vector<std::int64_t> least_ns;
+  std::vector<std::int64_t> min_ns;
   double push_ns = std::numeric_limits<double>::infinity();  // per segment
 };
 
@@ -124,11 +124,11 @@ std::vector<double> run_once(const Task& task, StepTimes& times) {
     const std::int64_t begin = now_ns();
     const Activity activity = fed.control().step(out);
     const std::int64_t spent = now_ns() - begin;
-    if (i == times.least_ns.size()) times.least_ns.push_back(spent);
-    times.least_ns[i] = std::min(times.least_ns[i], spent);
+    if (i == times.min_ns.size()) times.min_ns.push_back(spent);
+    times.min_ns[i] = std::min(times.min_ns[i], spent);
     set_points.insert(set_points.end(), out.begin(), out.end());
     if (activity == Activity::idle && fed.all_pushed()) return set_points;
-    if (i == most_steps) {
+    if (i == max_steps) {
       const ControllerState state = fed.control().state();
       throw std::runtime_error("not at rest after " + std::to_string(i) + " steps: segment " +
                                std::to_string(state.line) + ", " + text_of(state.activity) + " at " +
@@ -146,9 +146,9 @@ int play(const Task& task, const char* file) {
   out.write(reinterpret_cast<const char*>(set_points.data()),
             static_cast<std::streamsize>(set_points.size() * sizeof(double)));
   if (!out) throw std::runtime_error(std::string(file) + " cannot be written");
-  const double sum = static_cast<double>(std::accumulate(times.least_ns.begin(), times.least_ns.end(), std::int64_t{}));
-  const std::size_t steps = times.least_ns.size();
-  const double longest = static_cast<double>(*std::max_element(times.least_ns.begin(), times.least_ns.end()));
+  const double sum = static_cast<double>(std::accumulate(times.min_ns.begin(), times.min_ns.end(), std::int64_t{}));
+  const std::size_t steps = times.min_ns.size();
+  const double longest = static_cast<double>(*std::max_element(times.min_ns.begin(), times.min_ns.end()));
   const double delay = FedController(task.settings, {}).control().delay_periods();
   std::printf("{\"steps\": %zu, \"step_us\": %.4f, \"longest_step_us\": %.4f, \"delay_periods\": %.17g", steps,
               1e-3 * sum / static_cast<double>(steps), 1e-3 * longest, delay);

@@ -18,7 +18,7 @@
 namespace shapegcode::peers {
 namespace {
 
-constexpr std::size_t most_steps = 10'000'000;
+constexpr std::size_t max_steps = 10'000'000;
 
 // Cutting moves between stops; rapids are no part of it.
 std::vector<std::vector<Segment>> cutting_paths(const char* file, double feed_mm_per_s) {
@@ -48,7 +48,7 @@ std::size_t moving_periods(const ControllerSettings& settings, const std::vector
   std::size_t moving = 0;
   double before = 0.0;
   for (std::size_t steps = 0;; ++steps) {
-    if (steps == most_steps) throw std::runtime_error("not at rest after " + std::to_string(steps) + " steps");
+    if (steps == max_steps) throw std::runtime_error("not at rest after " + std::to_string(steps) + " steps");
     const Activity activity = fed.step(out);
     const double distance = fed.control().state().distance_mm;
     if (distance != before) ++moving;

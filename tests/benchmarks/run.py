@@ -40,8 +40,8 @@ _STEP_NAMES = {
     "clock": "nothing (the clock read twice)",
     "interpolator_paper": "Interpolator, paper path",
     "interpolator_long": "Interpolator, G01 program",
-    "block_player_paper": "BlockPlayer, paper path",
-    "block_player_long": "BlockPlayer, G01 program",
+    "block_player_paper": "BlockInterpolator, paper path",
+    "block_player_long": "BlockInterpolator, G01 program",
     "fir_stream": "FirStream, 3 taps, 3 axes",
     "modal_plant": "ModalPlant, modes on X and Y",
 }

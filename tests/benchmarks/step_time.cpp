@@ -29,7 +29,7 @@ using namespace shapegcode;
 
 constexpr double period_s = 1e-3;
 constexpr std::size_t steps_wanted = 1'000'000;  // per case, over all passes at least; per pass at most
-constexpr std::size_t least_passes = 5;
+constexpr std::size_t min_passes = 5;
 
 std::int64_t now_ns() noexcept {
   timespec now{};
@@ -46,7 +46,7 @@ class Report {
   template <class MakeStep>
   void measure(const char* name, std::size_t steps, MakeStep&& make_step) {
     steps = std::min(steps, steps_wanted);
-    const std::size_t passes = std::max(least_passes, (steps_wanted + steps - 1) / steps);
+    const std::size_t passes = std::max(min_passes, (steps_wanted + steps - 1) / steps);
     constexpr auto none = std::numeric_limits<std::uint32_t>::max();
     std::vector<std::uint32_t> least(steps, none);
     std::vector<std::uint32_t> all;
@@ -118,9 +118,9 @@ void interpolator(Report& report, const char* name, const std::shared_ptr<const 
 void block_player(Report& report, const char* name, const Path& path) {
   std::size_t samples = 0;
   Vector3 position;
-  for (BlockPlayer player(path.segments(), period_s, BlockEnd::ceil); player.step(position);) ++samples;
+  for (BlockInterpolator player(path.segments(), period_s, BlockEnd::ceil); player.step(position);) ++samples;
   report.measure(name, samples, [&] {
-    return [player = BlockPlayer(path.segments(), period_s, BlockEnd::ceil)](std::size_t /*i*/) mutable {
+    return [player = BlockInterpolator(path.segments(), period_s, BlockEnd::ceil)](std::size_t /*i*/) mutable {
       Vector3 at;
       player.step(at);
       consume(at);

@@ -63,11 +63,11 @@ int main() {
   });
 
   for (const BlockEnd end : {BlockEnd::ceil, BlockEnd::carry}) {
-    BlockPlayer player(segments, 1e-3, end, 0.9);
-    expect_none(end == BlockEnd::ceil ? "BlockPlayer::step ceil" : "BlockPlayer::step carry", [&] {
+    BlockInterpolator interpolator(segments, 1e-3, end, 0.9);
+    expect_none(end == BlockEnd::ceil ? "BlockInterpolator::step ceil" : "BlockInterpolator::step carry", [&] {
       long steps = 0;
-      for (; player.step(position); ++steps) sink += position.sum();
-      player.step(position);
+      for (; interpolator.step(position); ++steps) sink += position.sum();
+      interpolator.step(position);
       return steps;
     });
   }
@@ -113,8 +113,8 @@ int main() {
 
   FanucModel controller;
   controller.rapid_bell_time_s = 0.03;
-  RapidPlayer rapid({0.0, 0.0, 0.0}, {300.0, -20.0, 5.0}, controller);
-  expect_none("RapidPlayer::step", [&] {
+  RapidInterpolator rapid({0.0, 0.0, 0.0}, {300.0, -20.0, 5.0}, controller);
+  expect_none("RapidInterpolator::step", [&] {
     long steps = 0;
     for (; rapid.step(position); ++steps) sink += position.sum();
     rapid.step(position);

@@ -51,7 +51,7 @@ inline Vector3 to_mm(const Position& p, double increment) {
 }
 
 /// A block as a controller sees it: from its words alone.
-struct Played {
+struct Simulated {
   Vector3 start, end;
   FittedKind kind;
   int normal = 2;
@@ -73,23 +73,23 @@ struct Played {
 };
 
 /// R > 0: the centre lies left of the chord for G03, right of it for G02; the sweep is below 180 degrees.
-inline Played as_played(const Position& from, const FittedBlock& block, double increment) {
-  Played played{to_mm(from, increment), to_mm(block.end, increment), block.kind, block.normal};
-  const Vector3 move = played.end - played.start;
-  played.length = move.norm();
-  if (block.kind == FittedKind::line) return played;
-  const int a = (played.normal + 1) % 3;
-  const int b = (played.normal + 2) % 3;
+inline Simulated as_simulated(const Position& from, const FittedBlock& block, double increment) {
+  Simulated simulated{to_mm(from, increment), to_mm(block.end, increment), block.kind, block.normal};
+  const Vector3 move = simulated.end - simulated.start;
+  simulated.length = move.norm();
+  if (block.kind == FittedKind::line) return simulated;
+  const int a = (simulated.normal + 1) % 3;
+  const int b = (simulated.normal + 2) % 3;
   const double chord = std::hypot(move[a], move[b]);
   const double sense = block.kind == FittedKind::counter_clockwise ? 1.0 : -1.0;
-  played.radius = static_cast<double>(block.radius) * increment;
-  const double height = std::sqrt(std::max(0.0, played.radius * played.radius - 0.25 * chord * chord));
-  played.centre = played.start;
-  played.centre[a] += 0.5 * move[a] - sense * height * move[b] / chord;
-  played.centre[b] += 0.5 * move[b] + sense * height * move[a] / chord;
-  played.sweep = sense * 2.0 * std::asin(0.5 * chord / played.radius);
-  played.length = std::hypot(played.radius * played.sweep, move[played.normal]);
-  return played;
+  simulated.radius = static_cast<double>(block.radius) * increment;
+  const double height = std::sqrt(std::max(0.0, simulated.radius * simulated.radius - 0.25 * chord * chord));
+  simulated.centre = simulated.start;
+  simulated.centre[a] += 0.5 * move[a] - sense * height * move[b] / chord;
+  simulated.centre[b] += 0.5 * move[b] + sense * height * move[a] / chord;
+  simulated.sweep = sense * 2.0 * std::asin(0.5 * chord / simulated.radius);
+  simulated.length = std::hypot(simulated.radius * simulated.sweep, move[simulated.normal]);
+  return simulated;
 }
 
 struct Findings {
@@ -133,9 +133,9 @@ inline Findings judge(const Command& command, const std::vector<FittedBlock>& bl
       const auto move = static_cast<double>(block.end[axis] - from[axis]);
       if (move * way < 0.0 || (move != 0.0 && std::abs(way) < 1e-9)) ++found.reversals;
     }
-    const Played played = as_played(from, block, options.increment_mm);
+    const Simulated simulated = as_simulated(from, block, options.increment_mm);
     const double speed = static_cast<double>(block.feed) * options.feed_unit_mm_per_s;
-    const double ticks = played.length / speed / options.interpolation_period_s;
+    const double ticks = simulated.length / speed / options.interpolation_period_s;
     const double wanted = static_cast<double>(block.periods) * ticks_per_period;
     if (std::ceil(ticks - 1e-6) != wanted) ++found.wrong_ticks;
     if (ticks > wanted + 1e-6) ++found.late;
@@ -147,14 +147,14 @@ inline Findings judge(const Command& command, const std::vector<FittedBlock>& bl
     const double slack = block.kind == FittedKind::line ? std::max(options.merge_tolerance_increments, 0.55) + 1e-3
                                                         : options.merge_tolerance_increments + 0.251;
     for (Eigen::Index k = first + 1; k < last && moving < last; ++k) {
-      const Vector3 p = played.at(static_cast<double>(k - first) / static_cast<double>(last - first));
+      const Vector3 p = simulated.at(static_cast<double>(k - first) / static_cast<double>(last - first));
       const Vector3 off = (p - command.grid.row(k).transpose()).cwiseAbs() / options.increment_mm;
       if (off.maxCoeff() > slack) ++found.out_of_tolerance;
       found.inside_error = std::max(found.inside_error, off.maxCoeff());
     }
     if (block.kind != FittedKind::line) {
       ++found.arcs;
-      if (!(std::abs(played.sweep) < pi / 2)) ++found.bad_sweep;
+      if (!(std::abs(simulated.sweep) < pi / 2)) ++found.bad_sweep;
     }
     found.periods += block.periods;
     from = block.end;

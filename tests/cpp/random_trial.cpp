@@ -96,7 +96,7 @@ class Ratios {
 
   std::size_t axes_;
   double period_s_;
-  std::array<std::array<double, 3>, most_controller_axes> limits_{};
+  std::array<std::array<double, 3>, max_controller_axes> limits_{};
   std::vector<Differences> watchers_;
 };
 
@@ -110,7 +110,7 @@ Trial trial_of(const ControllerSettings& settings, double fewest, double most, D
   trial.settings = settings;
   const auto count = static_cast<std::size_t>(draw.logarithmic(fewest, most));
   trial.segments = random_segments(draw.engine, count, draw.logarithmic(20.0, 400.0), draw.chance(0.6));
-  std::array<double, most_following_axes> at{};
+  std::array<double, max_following_axes> at{};
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t axis = 0; axis < trial.settings.following.size(); ++axis) {
       if (draw.chance(0.7)) at[axis] += draw.between(-20.0, 20.0);
@@ -159,17 +159,17 @@ Trial wide_trial(std::uint32_t seed) {
 }
 
 Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<void(const ControllerState&)>& see,
-                  std::size_t most_steps) {
+                  std::size_t max_steps) {
   Draw draw{std::mt19937(seed ^ 0x9e3779b9U)};
   MotionController control(trial.settings);
   const std::size_t n_following = trial.settings.following.size();
-  std::array<double, most_controller_axes> point{};
+  std::array<double, max_controller_axes> point{};
   const std::span<double> out(point.data(), axis_count + n_following);
   Ratios ratios(trial.settings);
   ratios.add(out);
   Outcome outcome;
   std::size_t pushed = 0;
-  while (outcome.steps < most_steps && !outcome.ended) {
+  while (outcome.steps < max_steps && !outcome.ended) {
     const bool alone = outcome.steps >= trial.does.leaves;
     while (pushed < trial.segments.size() && (alone || draw.chance(trial.does.push))) {
       if (control.push(trial.segments[pushed], std::span(trial.following_end[pushed].data(), n_following)) !=

@@ -36,7 +36,7 @@ struct Operator {
 struct Trial {
   ControllerSettings settings;
   std::vector<Segment> segments;
-  std::vector<std::array<double, most_following_axes>> following_end;
+  std::vector<std::array<double, max_following_axes>> following_end;
   Operator does;
 };
 
@@ -46,7 +46,7 @@ Trial random_trial(std::uint32_t seed);
 /// axes, 1 to 10 000 segments. The seeds of `random_trial` keep the trials that they stand for in its tests.
 Trial wide_trial(std::uint32_t seed);
 
-inline constexpr std::size_t most_steps_of_trial = 1'000'000;
+inline constexpr std::size_t max_steps_of_trial = 1'000'000;
 
 struct Outcome {
   std::array<double, 3>
@@ -60,7 +60,7 @@ struct Outcome {
 
 /// Runs the path of a seed; `see` gets the state after each step.
 Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<void(const ControllerState&)>& see = {},
-                  std::size_t most_steps = most_steps_of_trial);
+                  std::size_t max_steps = max_steps_of_trial);
 
 /// The settings in one line, for a message.
 std::string text_of(const ControllerSettings& settings);

@@ -24,15 +24,15 @@ TEST_CASE("arc frame: coordinates in the plane and back") {
   for (int normal = 0; normal < 3; ++normal) {
     const ArcFrame frame(normal);
     CHECK(frame.lift(frame.project(p), Vector3(p[normal], p[normal], p[normal])) == p);
-    CHECK(frame.way(centre, p) == frame.project(p - centre));
-    CHECK(frame.radius(p, centre) == doctest::Approx(frame.way(centre, p).norm()));
+    CHECK(frame.offset(centre, p) == frame.project(p - centre));
+    CHECK(frame.radius(p, centre) == doctest::Approx(frame.offset(centre, p).norm()));
     const double radius = frame.radius(p, centre);
     const double angle = frame.angle_rad(p, centre);
     CHECK((frame.at_angle(centre, radius, angle) - frame.project(p)).norm() < 1e-14);
     // Along the circle is across the way from the centre, outwards is along it.
     const Vector3 outwards = frame.direction(angle, 0.0, radius, 0.0);
     const Vector3 along = frame.direction(angle, radius, 0.0, 7.0);
-    CHECK((frame.project(outwards) - frame.way(centre, p)).norm() < 1e-14);
+    CHECK((frame.project(outwards) - frame.offset(centre, p)).norm() < 1e-14);
     CHECK(along.dot(outwards) == doctest::Approx(0.0));
     CHECK(along[normal] == 7.0);
     CHECK(outwards.cross(along)[normal] == doctest::Approx(radius * radius));

@@ -294,12 +294,12 @@ TEST_CASE("block fit: steady arcs in three planes and both senses are few blocks
           int wrong_sense = 0;
           Position from = rounded(command, 0, options.increment_mm);
           for (const FittedBlock& block : blocks) {
-            const Played played = as_played(from, block, options.increment_mm);
+            const Simulated simulated = as_simulated(from, block, options.increment_mm);
             const FittedKind expected = sense > 0.0 ? FittedKind::counter_clockwise : FittedKind::clockwise;
             if (block.kind != FittedKind::line && (block.kind != expected || int{block.normal} != normal))
               ++wrong_sense;
             for (int i = 0; i <= 20; ++i) {
-              Vector3 p = played.at(i / 20.0) - centre;
+              Vector3 p = simulated.at(i / 20.0) - centre;
               p[normal] = 0.0;
               off = std::max(off, std::abs(p.norm() - radius));
             }
@@ -340,7 +340,7 @@ TEST_CASE("block fit: an arc of changing speed and radius is followed too") {
   Position from = rounded(command, 0, options.increment_mm);
   for (const FittedBlock& block : blocks) {
     if (block.periods == 1) {
-      off = std::max(off, (as_played(from, block, 0.001).at(0.5) - at(block.first_period + 0.5)).norm());
+      off = std::max(off, (as_simulated(from, block, 0.001).at(0.5) - at(block.first_period + 0.5)).norm());
     }
     from = block.end;
   }
@@ -396,7 +396,7 @@ TEST_CASE("block fit: no piece sweeps more than asked for") {
         2);
     Position from = rounded(command, 0, 0.001);
     for (const FittedBlock& block : fit(command)) {
-      CHECK(std::abs(as_played(from, block, 0.001).sweep) <= FitOptions{}.max_sweep_rad);
+      CHECK(std::abs(as_simulated(from, block, 0.001).sweep) <= FitOptions{}.max_sweep_rad);
       from = block.end;
     }
   }

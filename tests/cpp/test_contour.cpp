@@ -490,7 +490,8 @@ TEST_CASE("contour: a path that runs over itself is followed on its own pass, ho
                                        {"helix of 1 um", circles(radius, 6, false, 0.001)},
                                        {"square three times", squares(radius, 3, false)},
                                        {"square and back", squares(radius, 1, true)}}) {
-        CAPTURE(std::string(name));
+        const std::string path_name(name);
+        CAPTURE(path_name);
         CAPTURE(feed);
         CAPTURE(radius);
         const Path followed(path);

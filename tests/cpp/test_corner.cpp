@@ -229,7 +229,8 @@ TEST_CASE("corners that cannot be made are refused with value and limit") {
   CHECK(refusal([](CornerCut& c) { c.turn_rad = pi; }) == "the corner turns by 180 degrees, must be 1 to 179");
   CHECK(refusal([](CornerCut& c) { c.before_mm = -1.0; }) == "a straight at the corner is -1 mm, must be at least 0");
   const CornerCut cut;
-  CHECK(message_of([&] { (void)corner_engagement(cut, 100.0); }).starts_with("place on the corner's path is 100 mm"));
+  CHECK(
+      message_of([&] { (void)corner_engagement(cut, 100.0); }).starts_with("position on the corner's path is 100 mm"));
   CHECK(message_of([&] { (void)corner_stock(cut, 0.0); }) ==
         "the stock reaches 0 mm beyond the walls, must be above 0");
   CHECK(message_of([&] { (void)corner_track(cut, 0.0, 0.1); }) == "axial depth is 0 mm, must be above 0");

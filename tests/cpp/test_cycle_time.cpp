@@ -116,9 +116,9 @@ TEST_CASE("cycle time: M codes, the spindle that starts and stops while the axes
   // place not known: .9. M05 .1, way of G28 .9, M09 .1: of the stop 3 - .1 - .9 - .1 are left before M30's .1.
   CHECK(time.parts.function_s == doctest::Approx(0.1 + 0.8 + (2.0 - 0.1 - 0.8 - 0.5) + 0.4 + 0.9 + 0.1 + 0.1 + 0.9 +
                                                  (3.0 - 0.1 - 0.1 - 0.9) + 0.1));
-  const InterpolatedTime played = interpolate_program(read, model);
-  CHECK(played.function_s == doctest::Approx(time.parts.function_s));
-  CHECK(played.tool_change_s == doctest::Approx(6.0));
+  const InterpolatedTime simulated = interpolate_program(read, model);
+  CHECK(simulated.function_s == doctest::Approx(time.parts.function_s));
+  CHECK(simulated.tool_change_s == doctest::Approx(6.0));
   // A cut right behind M03 waits for the whole start.
   const Program cut = program("G21 G90 G94 G0 X0. Y0. Z0.\nS12000 M3\nG1 X10. F600.");
   model.unknown_move_s.setZero();

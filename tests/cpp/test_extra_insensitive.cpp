@@ -53,7 +53,7 @@ TEST_CASE("extra-insensitive: the published closed forms without damping") {
 TEST_CASE("extra-insensitive: damped designs meet their definition") {
   for (const double zeta : {0.0, 0.005, 0.02, 0.05, 0.1, 0.15}) {
     for (const double v : {0.02, 0.05, 0.1}) {
-      for (int humps = 1; humps <= shapegcode::most_humps; ++humps) {
+      for (int humps = 1; humps <= shapegcode::max_humps; ++humps) {
         CAPTURE(zeta);
         CAPTURE(v);
         CAPTURE(humps);

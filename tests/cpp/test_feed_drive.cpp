@@ -155,7 +155,7 @@ TEST_CASE("feed drive: backlash is lost at a reversal of a semi-closed loop and 
     const double force_down = drive.spring_force_n();
     CHECK(force_up > 250.0);
     CHECK(force_down < -250.0);
-    // The motor stands at the set-point; between it and the table are the gap and the stretch that holds the friction.
+    // The motor stands at the set-point; between it and the table are the gap and the section that holds the friction.
     const double lost_mm = 0.010 + (force_up - force_down) / parameters.stiffness_n_per_m * 1e3;
     CHECK(down - up == doctest::Approx(feedback == PositionFeedback::motor ? lost_mm : 0.0).epsilon(1e-3).scale(0.01));
   }

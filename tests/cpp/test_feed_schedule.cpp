@@ -41,10 +41,10 @@ double lowest(const FeedStations& stations, double begin_mm, double end_mm) {
   return feed;
 }
 
-double time_min(const std::vector<FeedStretch>& stretches) {
+double time_min(const std::vector<FeedStretch>& sections) {
   double time = 0.0;
-  for (const FeedStretch& stretch : stretches) {
-    time += (stretch.end_mm - stretch.begin_mm) / stretch.feed_mm_per_min;
+  for (const FeedStretch& section : sections) {
+    time += (section.end_mm - section.begin_mm) / section.feed_mm_per_min;
   }
   return time;
 }
@@ -84,23 +84,23 @@ TEST_CASE("a feed schedule keeps every station, the least length and the borders
       stations.s_mm.push_back(s);
       stations.feed_mm_per_min.push_back(feed);
     }
-    const auto stretches = schedule_feed(blocks, stations, {0.6, infinity, 0.1});
+    const auto sections = schedule_feed(blocks, stations, {0.6, infinity, 0.1});
     double at = 0.0;
-    for (const FeedStretch& stretch : stretches) {
-      CHECK(stretch.begin_mm == at);
-      at = stretch.end_mm;
+    for (const FeedStretch& section : sections) {
+      CHECK(section.begin_mm == at);
+      at = section.end_mm;
       const auto inside = std::find_if(blocks.begin(), blocks.end(),
-                                       [&](const FeedBlock& block) { return block.end_mm > stretch.end_mm - 1e-9; });
+                                       [&](const FeedBlock& block) { return block.end_mm > section.end_mm - 1e-9; });
       REQUIRE(inside != blocks.end());
       const double begin = inside == blocks.begin() ? 0.0 : (inside - 1)->end_mm;
-      if (std::abs(inside->end_mm - stretch.end_mm) > 1e-9) {  // within a block: both pieces are long enough
+      if (std::abs(inside->end_mm - section.end_mm) > 1e-9) {  // within a block: both pieces are long enough
         CHECK(inside->divisible);
         CHECK(inside->kept_mm_per_min == 0.0);
-        CHECK(stretch.end_mm - begin >= 0.6 - 1e-9);
-        CHECK(inside->end_mm - stretch.end_mm >= 0.6 - 1e-9);
+        CHECK(section.end_mm - begin >= 0.6 - 1e-9);
+        CHECK(inside->end_mm - section.end_mm >= 0.6 - 1e-9);
       }
       if (inside->kept_mm_per_min == 0.0) {
-        CHECK(stretch.feed_mm_per_min <= lowest(stations, stretch.begin_mm, stretch.end_mm) + 1e-9);
+        CHECK(section.feed_mm_per_min <= lowest(stations, section.begin_mm, section.end_mm) + 1e-9);
       }
     }
     CHECK(at == doctest::Approx(length));
@@ -111,26 +111,26 @@ TEST_CASE("a feed schedule is as fast as the best of all ways to place the borde
   const std::vector<FeedBlock> blocks = {{6.0, 0.0, true}};
   const auto dip = [](double s) { return 300.0 - 220.0 * std::exp(-(s - 3.1) * (s - 3.1) / 0.8); };
   const FeedStations stations = even_stations(6.0, 0.15, +dip);
-  const auto stretches = schedule_feed(blocks, stations, {0.6, infinity, 1e-6});
+  const auto sections = schedule_feed(blocks, stations, {0.6, infinity, 1e-6});
   // The same places for borders: every 0.15 mm.
   const double best = best_time_by_trying(stations, 6.0, 0.15, 0.6);
-  CHECK(time_min(stretches) >= best - 1e-9);
-  // Each border costs at most a hundredth of the time of the shortest stretch.
-  CHECK(time_min(stretches) <= best + 10 * 0.01 * 0.6 / 80.0);
-  for (const FeedStretch& stretch : stretches) {
-    CHECK(stretch.end_mm - stretch.begin_mm >= 0.6 - 1e-9);
+  CHECK(time_min(sections) >= best - 1e-9);
+  // Each border costs at most a hundredth of the time of the shortest section.
+  CHECK(time_min(sections) <= best + 10 * 0.01 * 0.6 / 80.0);
+  for (const FeedStretch& section : sections) {
+    CHECK(section.end_mm - section.begin_mm >= 0.6 - 1e-9);
   }
 }
 
-TEST_CASE("a limited change of feed holds from stretch to stretch") {
+TEST_CASE("a limited change of feed holds from section to section") {
   const std::vector<FeedBlock> blocks = {{30.0, 0.0, true}, {34.0, 0.0, true}, {60.0, 0.0, true}};
   const auto step = [](double s) { return s > 30.0 && s < 34.0 ? 80.0 : 216.0; };
-  const auto stretches = schedule_feed(blocks, even_stations(60.0, 0.1, +step), {0.6, 20.0, 0.1});
-  for (std::size_t i = 1; i < stretches.size(); ++i) {
-    CHECK(std::abs(stretches[i].feed_mm_per_min - stretches[i - 1].feed_mm_per_min) <= 20.0 + 1e-9);
+  const auto sections = schedule_feed(blocks, even_stations(60.0, 0.1, +step), {0.6, 20.0, 0.1});
+  for (std::size_t i = 1; i < sections.size(); ++i) {
+    CHECK(std::abs(sections[i].feed_mm_per_min - sections[i - 1].feed_mm_per_min) <= 20.0 + 1e-9);
   }
-  CHECK(stretches.front().feed_mm_per_min == 216.0);
-  CHECK(stretches.front().end_mm > 20.0);  // the ramp is as short as it may be
+  CHECK(sections.front().feed_mm_per_min == 216.0);
+  CHECK(sections.front().end_mm > 20.0);  // the ramp is as short as it may be
 }
 
 TEST_CASE("feeds are low before a load and behind it as long as the travel lags") {
@@ -160,8 +160,8 @@ TEST_CASE("a feed that is low without need is not looked ahead on") {
 TEST_CASE("a path with other feeds has the same points") {
   const Path path({make_line({0, 0, 0}, {10, 0, 0}, 5.0, 3),
                    make_arc({10, 0, 0}, {14, 4, 0}, {10, 4, 0}, 1.5707963267948966, 2, 5.0, 4)});
-  const std::vector<FeedStretch> stretches = {{0.0, 4.0, 120.0}, {4.0, 12.0, 60.0}, {12.0, path.length_mm(), 90.0}};
-  const Path other = with_feeds(path, stretches);
+  const std::vector<FeedStretch> sections = {{0.0, 4.0, 120.0}, {4.0, 12.0, 60.0}, {12.0, path.length_mm(), 90.0}};
+  const Path other = with_feeds(path, sections);
   REQUIRE(other.size() == 4);
   CHECK(other.length_mm() == doctest::Approx(path.length_mm()).epsilon(1e-12));
   CHECK(other[0].feed_mm_per_s == 2.0);

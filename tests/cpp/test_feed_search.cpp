@@ -229,10 +229,10 @@ TEST_CASE("feed search: what is given out before it ends is the run that it ends
   CHECK(early.largest_deviation_mm() == patient.largest_deviation_mm());
   // And given out once more, whole.
   ShapedCommand again;
-  REQUIRE(early.begin_anew());
+  REQUIRE(early.restart());
   REQUIRE(early.next(again, all));
   CHECK(again.grid_mm == waited.grid_mm);
-  CHECK_FALSE(early.begin_anew());
+  CHECK_FALSE(early.restart());
 
   // One that it does not: withdrawn, then the run that the search finds.
   RegionShaper careful(path, grid_shaper(), {}, options_for(ContourTarget::command, 0.01));
@@ -242,7 +242,7 @@ TEST_CASE("feed search: what is given out before it ends is the run that it ends
   for (ShapedCommand piece; hasty.next(piece, 10);) {
   }
   CHECK(hasty.is_withdrawn());
-  REQUIRE(hasty.begin_anew());
+  REQUIRE(hasty.restart());
   CHECK_FALSE(hasty.is_withdrawn());
   REQUIRE(hasty.next(again, all));
   CHECK(again.grid_mm == waited.grid_mm);

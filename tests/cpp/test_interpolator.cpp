@@ -228,7 +228,7 @@ TEST_CASE("interpolator: a delay is rest at the start, also of part of a period"
 TEST_CASE("interpolator: into memory of the caller's, the same set-points") {
   const PathPointer path = line_and_arc();
   const ProfilePointer profile = std::make_shared<const SpeedProfile>(plan_speed(*path, shapegcode::MotionLimits{}));
-  Interpolator player(path, profile, 0.004);
+  Interpolator interpolator(path, profile, 0.004);
   Interpolator other(path, profile, 0.004);
-  shapegcode::tests::check_same_into_memory(player, other);
+  shapegcode::tests::check_same_into_memory(interpolator, other);
 }

@@ -265,8 +265,8 @@ TEST_CASE("look-ahead: a corner is passed at its limit, not below and not above"
 }
 
 TEST_CASE("look-ahead: the corner limit of the contour tolerance holds behind a filter of that spread") {
-  // Two equal taps 2*d apart have the mean deviation d and the variance d^2. Played through them, the corner is cut by
-  // no more than the tolerance, ramps on both sides included.
+  // Two equal taps 2*d apart have the mean deviation d and the variance d^2. Simulated through them, the corner is cut
+  // by no more than the tolerance, ramps on both sides included.
   constexpr double period = 1e-4;
   constexpr int d = 40;
   const MotionLimits limits = accelerating(1500.0);

@@ -79,7 +79,7 @@ TEST_CASE("minimal_shapers: the boxes of two modes find what the two-mode search
       Collection collection(system, region);
       const BoxCounts counts = BoxSearch(system, region, 1'000'000, collection).run();
       CHECK(counts.unresolved == 0);
-      CHECK(counts.settled >= duration * omega);
+      CHECK(counts.decided_up_to >= duration * omega);
       const std::vector<Shaper> listed = minimal_two_mode({1.0, damping}, {ratio, damping}, duration);
       const std::vector<Taps> taps = collection.taps();
       REQUIRE(taps.size() == listed.size());
@@ -144,7 +144,7 @@ TEST_CASE("minimal_shapers: starts and boxes find the same") {
   }
 }
 
-TEST_CASE("minimal_shapers: a search that runs out of boxes has settled the short shapers") {
+TEST_CASE("minimal_shapers: a search that runs out of boxes has decided the short shapers") {
   const std::array<Mode, 3> modes{Mode{20.0, 0.02}, Mode{71.0, 0.02}, Mode{160.0, 0.02}};
   MinimalOptions options;
   options.max_boxes = 20'000;

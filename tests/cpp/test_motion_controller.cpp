@@ -22,14 +22,14 @@ using namespace shapegcode::tests;
 namespace {
 
 constexpr double period_s = 0.001;
-constexpr double most_speed = 200.0;
+constexpr double max_speed = 200.0;
 constexpr double most_acceleration = 1000.0;
 constexpr double most_jerk = 50000.0;
 
 ControllerSettings limited() {
   ControllerSettings settings;
   settings.limits.law = AccelerationLaw::jerk_limited;
-  settings.limits.max_feed_mm_per_s.setConstant(most_speed);
+  settings.limits.max_feed_mm_per_s.setConstant(max_speed);
   settings.limits.max_acceleration_mm_per_s2.setConstant(most_acceleration);
   settings.limits.max_jerk_mm_per_s3.setConstant(most_jerk);
   return settings;
@@ -148,7 +148,7 @@ TEST_CASE("limits are kept at every set-point, whatever the operator does") {
       }
     }
     CHECK((point == segments.back().end_mm));
-    CHECK(differences.speed() <= 1.001 * most_speed);
+    CHECK(differences.speed() <= 1.001 * max_speed);
     CHECK(differences.acceleration() <= 1.001 * most_acceleration);
     CHECK(differences.jerk() <= 1.001 * most_jerk + 100.0);  // a coordinate of 100 mm is rounded to 1.4e-14
   }
@@ -288,7 +288,7 @@ TEST_CASE("limits hold for any later override, whatever the control begins with"
           activity = control.step(values_of(point));
           differences.add(values_of(point));
         }
-        CHECK(differences.speed() <= 1.001 * most_speed);
+        CHECK(differences.speed() <= 1.001 * max_speed);
         CHECK(differences.acceleration() <= 1.001 * most_acceleration);
         CHECK(differences.jerk() <= 1.001 * most_jerk);
       }

@@ -79,7 +79,8 @@ TEST_CASE("number scan: whole numbers and block skips") {
   CHECK(i == 5);
   for (const auto& [text, skip_switch, end] :
        {std::tuple{"/N1", 1, 1U}, {"/", 1, 1U}, {"/0", 1, 2U}, {"/9", 9, 2U}, {"/12", 1, 2U}}) {
-    CAPTURE(text);
+    const std::string written(text);
+    CAPTURE(written);
     i = 0;
     CHECK(scan_skip_switch(text, i) == skip_switch);
     CHECK(i == end);

@@ -7,7 +7,7 @@
 
 #include "random_blocks.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/play.hpp"
+#include "shapegcode/simulation.hpp"
 
 // The largest deviations at other overrides, beside a run, are those of runs in full.
 
@@ -17,11 +17,11 @@ using shapegcode::Fir;
 using shapegcode::make_line;
 using shapegcode::Mode;
 using shapegcode::Path;
-using shapegcode::play_blocks;
-using shapegcode::PlaybackFigures;
-using shapegcode::PlaybackOptions;
 using shapegcode::Segment;
 using shapegcode::Segments;
+using shapegcode::simulate_blocks;
+using shapegcode::SimulationFigures;
+using shapegcode::SimulationOptions;
 using shapegcode::Vector3;
 using shapegcode::tests::block_from;
 using shapegcode::tests::Random;
@@ -79,8 +79,8 @@ std::vector<Segment> random_blocks(Random& random, const std::vector<Segment>& p
   return blocks;
 }
 
-PlaybackOptions random_options(Random& random) {
-  PlaybackOptions options;
+SimulationOptions random_options(Random& random) {
+  SimulationOptions options;
   options.period_s = uniform(random, 0.0, 1.0) < 0.5 ? 0.001 : 0.002;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const double count = uniform(random, 0.0, 3.0);
@@ -104,21 +104,21 @@ TEST_CASE("largest deviations at other overrides are those of runs in full") {
   const std::vector<double> overrides{0.5, 0.63, 0.8, 0.9, 1.1, 1.2};
   for (int trial = 0; trial < 150; ++trial) {
     CAPTURE(trial);
-    PlaybackOptions options = random_options(random);
+    SimulationOptions options = random_options(random);
     const std::vector<Segment> segments = random_path(random, uniform(random, 5.0, 150.0));
     const Path path(segments);
     const std::vector<Segment> blocks = random_blocks(random, segments, options.period_s);
     for (const BlockEnd rule : {BlockEnd::ceil, BlockEnd::carry}) {
       options.other_overrides = overrides;
-      const PlaybackFigures beside = play_blocks(blocks, path, rule, 1.0, options);
+      const SimulationFigures beside = simulate_blocks(blocks, path, rule, 1.0, options);
       options.other_overrides.clear();
-      const PlaybackFigures alone = play_blocks(blocks, path, rule, 1.0, options);
+      const SimulationFigures alone = simulate_blocks(blocks, path, rule, 1.0, options);
       CHECK(beside.response.max_abs_mm == alone.response.max_abs_mm);
       CHECK(alone.other_overrides.empty());
       REQUIRE(beside.other_overrides.size() == overrides.size());
       for (std::size_t i = 0; i < overrides.size(); ++i) {
         CAPTURE(overrides[i]);
-        const PlaybackFigures full = play_blocks(blocks, path, rule, overrides[i], options);
+        const SimulationFigures full = simulate_blocks(blocks, path, rule, overrides[i], options);
         CHECK(beside.other_overrides[i].override_ratio == overrides[i]);
         check_alike(beside.other_overrides[i].command_mm, full.command.max_abs_mm);
         check_alike(beside.other_overrides[i].response_mm, full.response.max_abs_mm);
@@ -131,22 +131,22 @@ TEST_CASE("where the bounds do not hold other overrides are runs in full") {
   Random random(7);
   const std::vector<Segment> segments = random_path(random, 40.0);
   const Path path(segments);
-  PlaybackOptions options;
+  SimulationOptions options;
   options.modes[0] = {Mode{46.0, 0.02, 1.0}};
   const std::vector<Segment> blocks = random_blocks(random, segments, options.period_s);
   options.axis_filters = {Fir::moving_average(12)};
   options.other_overrides = {0.7};
-  const PlaybackFigures beside = play_blocks(blocks, path, BlockEnd::ceil, 1.0, options);
+  const SimulationFigures beside = simulate_blocks(blocks, path, BlockEnd::ceil, 1.0, options);
   options.other_overrides.clear();
-  const PlaybackFigures full = play_blocks(blocks, path, BlockEnd::ceil, 0.7, options);
+  const SimulationFigures full = simulate_blocks(blocks, path, BlockEnd::ceil, 0.7, options);
   REQUIRE(beside.other_overrides.size() == 1);
   CHECK(beside.other_overrides[0].command_mm == full.command.max_abs_mm);
   CHECK(beside.other_overrides[0].response_mm == full.response.max_abs_mm);
   CHECK(full.response.max_abs_mm > 0.0);
 
   options.other_overrides = {0.0};
-  CHECK_THROWS_AS(static_cast<void>(play_blocks(blocks, path, BlockEnd::ceil, 1.0, options)), Error);
+  CHECK_THROWS_AS(static_cast<void>(simulate_blocks(blocks, path, BlockEnd::ceil, 1.0, options)), Error);
   options.other_overrides = {0.7};
   options.last_seconds = 1.0;
-  CHECK_THROWS_AS(static_cast<void>(play_blocks(blocks, path, BlockEnd::ceil, 1.0, options)), Error);
+  CHECK_THROWS_AS(static_cast<void>(simulate_blocks(blocks, path, BlockEnd::ceil, 1.0, options)), Error);
 }

@@ -15,10 +15,10 @@ namespace {
 // what they miss.
 constexpr std::array<std::uint32_t, 1> left_to_the_planner{1247};
 
-void keeps_its_limits(std::uint32_t seed, const Trial& trial, std::size_t most_steps = most_steps_of_trial) {
+void keeps_its_limits(std::uint32_t seed, const Trial& trial, std::size_t max_steps = max_steps_of_trial) {
   CAPTURE(seed);
   CAPTURE(text_of(trial.settings));
-  const Outcome outcome = run_trial(trial, seed, {}, most_steps);
+  const Outcome outcome = run_trial(trial, seed, {}, max_steps);
   CHECK(outcome.worst[0] <= 1.001);
   CHECK(outcome.worst[1] <= 1.001);
   CHECK(outcome.worst[2] <= 1.001);

@@ -80,8 +80,8 @@ TEST_CASE(
     Vector3 travel(reach * (unit(generator) - 0.5), i % 4 == 0 ? 0.0 : reach * (unit(generator) - 0.5), 0.0);
     if (i % 7 == 0) travel.z() = -reach;
     CAPTURE(i);
-    RapidPlayer player({1.0, 2.0, 3.0}, Vector3(1.0, 2.0, 3.0) + travel, model);
-    CHECK(player.period_count() * model.period_s == doctest::Approx(rapid_time_s(travel, model)));
+    RapidInterpolator interpolator({1.0, 2.0, 3.0}, Vector3(1.0, 2.0, 3.0) + travel, model);
+    CHECK(interpolator.period_count() * model.period_s == doctest::Approx(rapid_time_s(travel, model)));
     if (i % 50 != 0 || model.rapid_path != RapidPath::linear || model.rapid_bell_time_s > 0.0) continue;
     MotionLimits limits;
     limits.law = AccelerationLaw::jerk_limited;
@@ -97,27 +97,27 @@ TEST_CASE("rapid: refuses what cannot be counted or given") {
   FanucModel model = paper_machine();
   model.rapid_rate_mm_per_s = Vector3::Constant(1e-9);
   CHECK_THROWS_AS((void)rapid_time_s({100.0, 0.0, 0.0}, model), Error);
-  CHECK_THROWS_AS(RapidPlayer(Vector3::Zero(), {100.0, 0.0, 0.0}, model), Error);
+  CHECK_THROWS_AS(RapidInterpolator(Vector3::Zero(), {100.0, 0.0, 0.0}, model), Error);
   model = paper_machine();
   model.rapid_time_constant_s.y() = -0.1;
-  CHECK_THROWS_AS(RapidPlayer(Vector3::Zero(), {100.0, 0.0, 0.0}, model), Error);
+  CHECK_THROWS_AS(RapidInterpolator(Vector3::Zero(), {100.0, 0.0, 0.0}, model), Error);
 }
 
 TEST_CASE("rapid: set-points end in the end, and go on giving it") {
   const FanucModel model = paper_machine();
-  RapidPlayer player({0.0, 0.0, 0.0}, {0.1, -3.0, 7.0}, model);
+  RapidInterpolator interpolator({0.0, 0.0, 0.0}, {0.1, -3.0, 7.0}, model);
   Vector3 position;
   int count = 0;
-  while (player.step(position)) ++count;
-  CHECK(count == player.period_count() + 1);
+  while (interpolator.step(position)) ++count;
+  CHECK(count == interpolator.period_count() + 1);
   CHECK(position == Vector3(0.1, -3.0, 7.0));
-  CHECK_FALSE(player.step(position));
+  CHECK_FALSE(interpolator.step(position));
   const Samples none = rapid_samples({4.0, 4.0, 4.0}, {4.0, 4.0, 4.0}, model);
   CHECK(none.positions_mm.rows() == 1);
 }
 
 TEST_CASE("rapid: into memory of the caller's, the same set-points") {
-  RapidPlayer player({0.0, 1.0, 2.0}, {10.0, -5.0, 2.0}, paper_machine());
-  RapidPlayer other = player;
-  shapegcode::tests::check_same_into_memory(player, other);
+  RapidInterpolator interpolator({0.0, 1.0, 2.0}, {10.0, -5.0, 2.0}, paper_machine());
+  RapidInterpolator other = interpolator;
+  shapegcode::tests::check_same_into_memory(interpolator, other);
 }

@@ -172,13 +172,13 @@ TEST_CASE("rounding: with few ends the choice before a rest is the best of all")
   }
 }
 
-TEST_CASE("rounding: long runs end far quieter, and state goes on over stretches") {
+TEST_CASE("rounding: long runs end far quieter, and state goes on over sections") {
   std::vector<double> ratios;
   for (unsigned seed = 1; seed <= 40; ++seed) {
     ModalRounder rounder(two_modes, 0.002, 2);
     const Problem problem = random_problem(300, seed, rounder);
     std::vector<std::int8_t> shift(300);
-    // In two stretches: the first ends on its nearest increment, as every stretch does.
+    // In two sections: the first ends on its nearest increment, as every section does.
     Problem split = problem;
     split.nodes[149].other = 0;
     const std::span<const RoundingNode> nodes(split.nodes);
@@ -265,8 +265,8 @@ FitOptions with_modes(double increment, double period_s = 0.005) {
   return options;
 }
 
-/// Amplitude of an axis' vibration behind the last block, in mm: blocks played tick by tick against the command, which
-/// is linear between its samples.
+/// Amplitude of an axis' vibration behind the last block, in mm: blocks simulated tick by tick against the command,
+/// which is linear between its samples.
 double left_by_blocks(const Command& command, const std::vector<FittedBlock>& blocks, const FitOptions& options,
                       Eigen::Index axis, const Mode& mode) {
   const int ticks = static_cast<int>(std::lround(options.block_period_s / options.interpolation_period_s));
@@ -281,10 +281,10 @@ double left_by_blocks(const Command& command, const std::vector<FittedBlock>& bl
     return command.grid(k, axis) + fraction * (command.grid(k + 1, axis) - command.grid(k, axis));
   };
   for (const FittedBlock& block : blocks) {
-    const Played played = as_played(from, block, options.increment_mm);
+    const Simulated simulated = as_simulated(from, block, options.increment_mm);
     const int steps = static_cast<int>(block.periods) * ticks;
     for (int i = 1; i <= steps; ++i) {
-      error.push_back(played.at(static_cast<double>(i) / steps)[axis] - exact(++tick));
+      error.push_back(simulated.at(static_cast<double>(i) / steps)[axis] - exact(++tick));
     }
     from = block.end;
   }
@@ -396,9 +396,9 @@ TEST_CASE("rounding: arcs keep their sense, follow the circle and leave less, wh
       double off = 0.0;
       Position from = rounded(command, 0, options.increment_mm);
       for (const FittedBlock& block : blocks) {
-        const Played played = as_played(from, block, options.increment_mm);
+        const Simulated simulated = as_simulated(from, block, options.increment_mm);
         for (int i = 0; i <= 10; ++i) {
-          Vector3 p = played.at(i / 10.0) - Vector3(1.2345, -0.5, 0.3333);
+          Vector3 p = simulated.at(i / 10.0) - Vector3(1.2345, -0.5, 0.3333);
           off = std::max(off, std::abs(std::hypot(p[0], p[1]) - radius));
         }
         from = block.end;

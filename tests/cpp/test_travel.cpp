@@ -1,4 +1,4 @@
-#include "shapegcode/play.hpp"
+#include "shapegcode/simulation.hpp"
 
 #include <doctest/doctest.h>
 

@@ -19,7 +19,7 @@ using namespace shapegcode;
 namespace {
 
 constexpr std::uint32_t sessions = 8;
-constexpr std::size_t most_steps = 1'000'000;
+constexpr std::size_t max_steps = 1'000'000;
 
 std::atomic<int> failures{0};
 
@@ -77,13 +77,13 @@ void session_of(std::uint32_t session) {
       last = state.steps;
     }
   });
-  std::array<double, most_controller_axes> point{};
+  std::array<double, max_controller_axes> point{};
   std::size_t steps = 0;
-  while (steps < most_steps && control.state().segments_done < segments.size()) {
+  while (steps < max_steps && control.state().segments_done < segments.size()) {
     control.step({point.data(), static_cast<std::size_t>(control.axes())});
     ++steps;
   }
-  check(steps < most_steps, "the path did not end", session);
+  check(steps < max_steps, "the path did not end", session);
   ended.store(true, std::memory_order_relaxed);
   pusher.join();
   reader.join();

@@ -27,7 +27,7 @@ from judge import (
 )
 from judge.player import BlockEnd
 from shapegcode import _core
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 
 PROGRAMS = samples.PROGRAMS
 SAMPLES = samples.SAMPLES

@@ -12,15 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-MEASURED = (
-    Path(__file__).resolve().parents[2]
-    / "python"
-    / "shapegcode"
-    / "data"
-    / "measured"
-    / "sinumerik"
-    / "capture.json.gz"
-)
+MEASURED = Path(__file__).resolve().parents[2] / "python/shapegcode/data/measured/sinumerik/capture.json.gz"
 """The real capture that comes with the package."""
 
 

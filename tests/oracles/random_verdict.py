@@ -23,7 +23,7 @@ from judge.dialect.moves import as_move
 from judge.draws import Draw
 from judge.in_order import Way, deviation_um, haste, missed_um, places
 from judge.player import BlockEnd
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 
 Vector = npt.NDArray[np.float64]
 RULES: tuple[BlockEnd, ...] = ("ceil", "carry")

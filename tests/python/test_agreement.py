@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import shapegcode as sg
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 
 PART = """%
 O1
@@ -223,5 +223,5 @@ def test_every_function_takes_the_path_of_a_file(emitted: Path, original: Path, 
 
 
 def test_emitted_programs_are_not_shaped_twice(emitted: Path, machine: sg.Machine) -> None:
-    with pytest.raises(sg.ProgramError, match="written by shapegcode already"):
+    with pytest.raises(sg.ProgramError, match="shaped by shapegcode already"):
         sg.convert(emitted, machine)

@@ -10,7 +10,7 @@ import pytest
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode._core import DesignError
-from shapegcode.machine.output import Shaping
+from shapegcode.machine.programs import Shaping
 from shapegcode.shaping import FAMILIES, choose_shaper
 from shapegcode.shaping.grid import choose_grid
 

@@ -87,6 +87,48 @@ def test_absolute_centres_are_hinted_at() -> None:
     assert caught.value.column > 1
 
 
+# ---- command lines -----------------------------------------------------------------------------------------
+
+REFUSED = [
+    ("check no.nc", "no.nc: no such file"),
+    ("check good.nc -m vx501", "no built-in machine"),
+    ("check good.nc --json good.nc", "would overwrite"),
+    ("check good.nc --program P1", "must be a program number"),
+    ("simulate good.nc --lines 90-99", "1-9"),
+    ("simulate good.nc --lines 3-10", "1-9"),
+    ("simulate good.nc --lines 1-2", "nothing happens"),
+    ("simulate good.nc --lines 9-3", "first to last"),
+    ("simulate good.nc --lines 0", "first to last"),
+    ("simulate good.nc --every 0", "1 or more"),
+    ("simulate good.nc --plant other", "--plant"),
+    ("simulate good.nc --csv a --npz a", "a would overwrite a"),
+    ("simulate good.nc --npz a --json a", "a would overwrite a"),
+    ("simulate good.nc --csv good.nc", "good.nc would overwrite good.nc"),
+    ("simulate good.nc --npz -", "standard output"),
+    ("simulate good.nc --csv - --json -", "standard output"),
+    ("simulate good.nc --csv nowhere/m.csv", "nowhere"),
+    ("simulate good.nc --npz nowhere/m.npz", "nowhere"),
+    ("convert good.nc -o out.nc --only 900-950", "has lines 1 to 9"),
+    ("convert good.nc -o out.nc --leave 1-2", "no cut that can be shaped there"),
+    ("convert good.nc -o out.nc --only 5-2", "first to last"),
+    ("convert good.nc -o out.nc --only x", "first to last"),
+    *(
+        (f"convert good.nc -o out.nc {option} {value}", "time")
+        for option in ("--max-time-increase", "--max-cut-time-increase")
+        for value in ("0", "-3", "nan")
+    ),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), REFUSED, ids=[words for words, _ in REFUSED])
+def test_what_a_command_cannot_do_is_refused_and_nothing_is_written(folder: Path, words: str, said: str) -> None:
+    machine = () if "-m" in words.split() else ("-m", "vx500")
+    done = run(folder, *words.split(), *machine)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert said in done.stderr.splitlines()[-1]
+    assert os.listdir(folder) == ["good.nc"]
+
+
 # ---- files -------------------------------------------------------------------------------------------------
 
 

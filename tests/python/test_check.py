@@ -424,21 +424,6 @@ def test_table_of_many_alike_is_short(folder: Path, capsys: pytest.CaptureFixtur
     assert "1995 more of look_ahead_breaker" in out
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["no.nc", "-m", "vx500"], "no.nc: no such file"),
-        (["good.nc", "-m", "vx501"], "no built-in machine"),
-        (["good.nc", "-m", "vx500", "--json", "good.nc"], "would overwrite"),
-        (["good.nc", "-m", "vx500", "--program", "P1"], "must be a program number"),
-    ],
-)
-def test_bad_input(folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str) -> None:
-    code, _, err = run(capsys, *words)
-    assert code == 2
-    assert said in err
-
-
 def test_shaped_blocks_ask_for_the_rate_of_their_busiest_stretch(tmp_path: Path) -> None:
     (tmp_path / "part.nc").write_text(HEAD + "G1X40.F4000.\nY40.\nX0\nY0\nG0Z5.\n" + END)
     vx500 = machine()

@@ -166,9 +166,9 @@ def test_outliers_are_found_and_left_out() -> None:
 @pytest.mark.parametrize(
     ("depths", "feeds", "edge", "said"),
     [
-        (np.full(12, 0.8), (216.0,), False, "the exponents cannot be told: the mean chip is 6.22 to 6.22 um"),
+        (np.full(12, 0.8), (216.0,), False, "the exponents cannot be determined: the mean chip is 6.22 to 6.22 um"),
         (np.linspace(0.4, 2.8, 3), (216.0,), False, "3 mean forces are too few for 4 coefficients"),
-        (np.linspace(0.4, 2.8, 20), (216.0,), True, "edge forces cannot be told from the exponents"),
+        (np.linspace(0.4, 2.8, 20), (216.0,), True, "edge forces cannot be distinguished from the exponents"),
     ],
 )
 def test_what_the_forces_do_not_tell_is_refused(depths: Array, feeds: tuple[float, ...], edge: bool, said: str) -> None:

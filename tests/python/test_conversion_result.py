@@ -11,8 +11,8 @@ import pytest
 
 import shapegcode as sg
 from acceptance import machine_with
-from shapegcode.conversion.rests import RestsOn
-from shapegcode.conversion.tables import BeforeAfter, rests_table
+from shapegcode.conversion.sensitivity import Sensitivity
+from shapegcode.conversion.tables import BeforeAfter, sensitivity_table
 from shapegcode.results.json import schema
 from shapegcode.results.result import Pair, Xyz
 from shapegcode.verdict.cases import case_table
@@ -160,12 +160,12 @@ def test_an_option_is_checked_as_a_key_of_the_machine_file(options: dict[str, An
 
 
 def test_what_a_verdict_rests_on_fits_80_columns_without_a_broken_word() -> None:
-    longest = RestsOn(
+    longest = Sensitivity(
         "controller.interpolation_period_s", "0.001 s", "inherited", "longer, case underrun 20 ms",
         "contour error of the response", 12.3, 279.8, 20.0,
     )  # fmt: skip
     law = replace(longest, key="controller.motion", value="after_interpolation", origin="assumed")
-    lines = str(rests_table([longest, law], 6)).splitlines()
+    lines = str(sensitivity_table([longest, law], 6)).splitlines()
     assert max(map(len, lines)) <= 80 and len(lines) <= 10
     words = {word for line in lines for word in line.split()}
     assert {longest.key, "inherited", "after_interpolation", "contour", "279.8", "20.0", "limit", "underrun"} <= words

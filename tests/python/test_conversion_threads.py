@@ -14,10 +14,10 @@ import pytest
 import shapegcode as sg
 from shapegcode import _core
 from shapegcode.conversion import convert as module, write
+from shapegcode.conversion.whole_text import Prefetch
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.program import stamp
 from shapegcode.results.json import plain
-from shapegcode.verdict.ahead import Ahead
 
 
 def pockets(count: int) -> str:
@@ -104,7 +104,7 @@ def test_the_first_refusal_in_the_text_is_the_one_that_is_told() -> None:
     for threads in (1, 2, 5):
         told: list[float] = []
         with ThreadPoolExecutor(threads) as pool:
-            ahead = Ahead(pool, {n: task(n) for n in range(9)}, dict.fromkeys(range(9), 2.0), told.append)
+            ahead = Prefetch(pool, {n: task(n) for n in range(9)}, dict.fromkeys(range(9), 2.0), told.append)
             assert [ahead.result(number) for number in range(3)] == [0, 1, 2]
             with pytest.raises(ValueError, match="3"):
                 ahead.result(3)

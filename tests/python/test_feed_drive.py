@@ -235,3 +235,26 @@ def test_friction_model_asks_for_its_figures() -> None:
     with pytest.raises(MachineError, match=r"stiffness_n_per_um = -1\.0: must be greater than 0 \(unit: N/µm\)"):
         machine_with({"axes.z.drive.stiffness_n_per_um": -1.0})
     assert machine_with({"axes.x.drive.friction_model": "viscous", "axes.x.drive.friction_static_n": None})
+
+
+def test_a_loop_that_grows_by_itself_is_refused() -> None:
+    """Against the poles of the equations of motion, written out: motor and table, position and speed, and integral."""
+    slow = {f"axes.{axis}.drive.velocity_bandwidth_hz": 5.0 for axis in "xyz"}
+    machine, gain = machine_with(slow), 100.0
+    p = drive_parameters(machine)[0]
+    m, t, k, c = p.motor_mass_kg, p.table_mass_kg, p.stiffness_n_per_m, p.damping_n_s_per_m
+    speed_gain, integral_s = p.velocity_gain_n_s_per_m, p.velocity_integral_time_s
+    motor, table = p.motor_friction.viscous_n_s_per_m, p.table_friction.viscous_n_s_per_m
+    poles = np.linalg.eigvals(
+        [
+            [0.0, 1.0, 0.0, 0.0, 0.0],
+            [-(speed_gain * gain + k) / m, -(speed_gain + motor + c) / m, k / m, c / m, speed_gain / integral_s / m],
+            [0.0, 0.0, 0.0, 1.0, 0.0],
+            [k / t, c / t, -k / t, -(c + table) / t, 0.0],
+            [-gain, -1.0, 0.0, 0.0, 0.0],
+        ]
+    )
+    worst = poles[np.argmax(poles.real)]
+    found = f"grows by a factor e in {1.0 / worst.real:.3g} s at {abs(worst.imag) / (2.0 * math.pi):.4g} Hz"
+    with pytest.raises(MachineError, match=f"axes.x.drive: the loop is unstable: it {found}"):
+        drive_parameters(machine.with_values({f"controller.position_gain_per_s.{axis}": gain for axis in "xyz"}))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
@@ -70,6 +71,22 @@ def test_traces_are_those_of_the_regions_in_a_row(pocket: FeedSchedule) -> None:
     assert (traces.limit["peak_resultant_n"] == 100.0).all()
     assert np.isinf(traces.limit["mean_power_w"]).all()
     assert traces.load.original.peak_resultant_n.max() > 100.0 >= traces.load.emitted.peak_resultant_n.max()
+
+
+def test_limits_of_the_spindle_are_drawn_as_they_are_kept(pocket: FeedSchedule) -> None:
+    """The tool file limits the resultant alone; torque and power are the machine's."""
+    limits = {"feed_control.spindle_torque_nm": 0.4, "feed_control.spindle_power_w": 150.0}
+    machine = Machine.load("vx500").with_values(limits)
+    schedule = schedule_feed(
+        FEED / "POCKET.NC", machine, Tool.load(FEED / "pocket_tool.toml"),
+        Stock.load(FEED / "pocket_stock.toml"), resolution_mm=0.16,
+    )  # fmt: skip
+    assert schedule.traces is not None
+    assert schedule.peak.mean_power_w.emitted <= 150.0 < schedule.peak.mean_power_w.original
+    assert (schedule.traces.limit["mean_power_w"] == 150.0).all()
+    assert (schedule.traces.limit["peak_torque_nm"] == 0.4).all()
+    texts = {text.get_text() for text in plot_feed_along_path(schedule).figure.findobj(Text)}
+    assert {"limit 150 W", "limit 0.4 N m", "limit 100 N"} <= texts
 
 
 def test_walls_are_those_of_the_core(pocket: FeedSchedule) -> None:

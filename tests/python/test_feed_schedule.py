@@ -219,7 +219,7 @@ def test_the_command_writes_program_report_and_table(
     words = {float(word) for word in re.findall(r"F([0-9.]+)", out.read_text())}
     assert result["feed_mm_per_min"]["min"] == min(words)
     shown = capsys.readouterr().out
-    assert "resultant, peak" in shown
+    assert "peak resultant" in shown
     assert "what holds the feed" in shown
     assert interpret(out.read_text()).cuts
     assert (

@@ -39,7 +39,7 @@ FOLDERS = [
     "milling",
     "command",
     "write",
-    "play",
+    "simulate",
     "c",
 ]
 NOT_FROM = {
@@ -53,10 +53,11 @@ HEADER_FOLDERS = {
     "fanuc_model.hpp": "motion",
     "minimal_shapers.hpp": "shaper",
     "mode.hpp": "base",
-    "play_stream.hpp": "play",
     "samples.hpp": "base",
     "shapegcode.h": "c",
-    "timing.hpp": "play",
+    "simulation.hpp": "simulate",
+    "simulation_stream.hpp": "simulate",
+    "timing.hpp": "simulate",
 }
 # They are for users and include what lies below; nobody in the library includes them.
 UMBRELLAS = {"shapegcode.hpp", "prototype.hpp"}

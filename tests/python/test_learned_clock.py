@@ -1,4 +1,4 @@
-"""Clocks learned from logs, held against simulated controls whose facts are known."""
+"""Cycle-time models calibrated with logs, held against simulated controls whose facts are known."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def test_the_kind_of_look_ahead_is_chosen_by_runs_left_out(tmp_path: Path) -> No
 def test_unknown_kinds_and_nothing_to_fit_are_refused(tmp_path: Path) -> None:
     file = shop(tmp_path, dataclasses.replace(HiddenControl()), [], [1])
     machine = sg.Machine.load("vx500")
-    with pytest.raises(sg.ArgumentError, match="nothing to learn from"):
+    with pytest.raises(sg.ArgumentError, match="nothing to calibrate with"):
         sg.learn_clock(file, machine, families=ONE)
     with pytest.raises(sg.ArgumentError, match="must be one of speed difference"):
         sg.learn_clock(file, machine, families=["trapezium"])

@@ -478,7 +478,8 @@ def test_init_writes_a_file_that_loads_and_never_overwrites(
     assert main(["machine", "init"]) == 2
     assert "--force" in capsys.readouterr().err
     assert (tmp_path / "machine.toml").read_text() == "mine"
-    assert main(["machine", "init", "--force"]) == 0
+    assert main(["machine", "init", "--force", "-q"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 1
     assert list(tmp_path.iterdir()) == [tmp_path / "machine.toml"]
 
 

@@ -15,15 +15,9 @@ import pypdf
 import pytest
 from selenium.webdriver import Keys
 
-from browser import ROOT, SEEN, Browser, chromium, grave
+from browser import ROOT, SEEN, Browser, grave
 from command import run
 from small_page import COMMENT, NAME, convert, marked, write_small
-
-
-@pytest.fixture(scope="module")
-def chrome() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

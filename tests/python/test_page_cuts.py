@@ -14,7 +14,7 @@ import pypdf
 import pytest
 from selenium.webdriver import Keys
 
-from browser import Browser, chromium, grave
+from browser import Browser, grave
 from shapegcode.results.outcome import Pair
 from shapegcode.results.page.html import save
 from shapegcode.results.page.model import CutPicker, CutRow, CutTotals, Light, Page, Section
@@ -59,12 +59,6 @@ def write(place: Path, rows: Sequence[CutRow], name: str, light: Light = "calm")
     page = Page("Cuts", light, "no benefit: run the original", "nothing gains enough", (section,), {"name": "cuts"})
     save(page, place / name)
     return place / name
-
-
-@pytest.fixture(scope="module")
-def chrome() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,19 +10,13 @@ import pytest
 from selenium.webdriver import ActionChains, Keys
 
 import shapegcode as sg
-from browser import SEEN, Browser, chromium
+from browser import SEEN, Browser
 from shapegcode import _core
 from shapegcode.model.scene import scene_of
 from shapegcode.model.stream import stream
 from shapegcode.program import Program
 from shapegcode.program.compensation import paired_regions
 from small_page import DOWN, LINES, NAME, UP, marked, write_small
-
-
-@pytest.fixture(scope="module")
-def chrome() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

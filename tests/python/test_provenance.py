@@ -16,10 +16,11 @@ import shapegcode as sg
 from acceptance import Judged, convert, machine_with
 from judge import Mode, contour_error_um, play, residual_um, response, starts
 from shapegcode.cli import main
-from shapegcode.conversion.rests import _Region
+from shapegcode.conversion.sensitivity import _Region
 from shapegcode.identification.result import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_modes
-from shapegcode.settings.remarks import origin_of, remarks_of, with_remarks
+from shapegcode.settings.edit import with_remarks
+from shapegcode.settings.remarks import origin_of, remarks_of
 from shapegcode.shaping.grid import choose_grid
 
 DUMP = b"""%
@@ -520,14 +521,14 @@ def test_an_axis_that_moves_elsewhere_is_named_too() -> None:
 def test_what_it_rests_on_costs_no_more_than_the_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     """Motion simulated with its contour for unmeasured values: no more than twice the program, or a minute."""
     simulated: list[float] = []
-    whole = _Region.play
+    whole = _Region.simulate
 
     def counted(region: _Region, trial: Any, *, contour: bool) -> Any:
         figures = whole(region, trial, contour=contour)
         simulated.append(figures.time_s if contour else 0.0)
         return figures
 
-    monkeypatch.setattr(_Region, "play", counted)
+    monkeypatch.setattr(_Region, "simulate", counted)
     text = PART.replace("F6000", "F60")  # some two minutes in one region
     machine = machine_with({}).with_remarks({value.key: "assumed" for value in machine_with({}).values()})
     conversion = convert(text, machine, shape_all=True).conversion

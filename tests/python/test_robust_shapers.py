@@ -21,10 +21,10 @@ from shapegcode.shaping import (
     design,
     least_worst,
     minimax_robust,
+    proven_worst,
     robust_candidate,
     shortest_non_negative,
 )
-from shapegcode.shaping.cutting_planes import proven_worst
 from shapegcode.shaping.grid_designs import lower_hull
 
 FloatArray = NDArray[np.float64]

@@ -21,7 +21,7 @@ from prompt_toolkit.output import DummyOutput
 
 import shapegcode as sg
 from command import run
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.settings.describe import toml_schema
 from shapegcode.setup.ask import ask_all
@@ -66,6 +66,13 @@ def test_answers_become_a_short_file_that_says_why(tmp_path: Path) -> None:
     jsonschema.validate(report, schema(sg.MachineSetup))
     assert report["open"][0]["key"] == "axes.y.modes"
     assert "axes.x.modes.1.damping_ratio" in report["answered"]
+
+
+def test_a_name_is_an_answer(tmp_path: Path) -> None:
+    """Of a machine of which only the name is said, one value is answered."""
+    said = answered(tmp_path, 'name = "A"\n')
+    assert json.loads((tmp_path / "r.json").read_text())["answered"] == ["name"]
+    assert "1 value answered" in said.splitlines()[0]
 
 
 def test_the_short_file_converts_like_the_full_one(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,11 @@ def punch(folder: Path, text: str = PUNCH) -> Path:
     return folder / "all.nc"
 
 
+def every(folder: Path, command: str, *words: str) -> subprocess.CompletedProcess[str]:
+    """A command over all programs of the file."""
+    return run(folder, command, "all.nc", "-m", "vx500", "--program", "all", *words)
+
+
 def test_addresses_pick_one_program_and_no_other(tmp_path: Path) -> None:
     path, machine = punch(tmp_path), sg.Machine.load("vx500")
     assert [place.address for place in programs_of(PUNCH.encode())] == [*DONE[:2], "O0003", *DONE[2:]]
@@ -71,7 +77,7 @@ def test_two_programs_without_any_difference_in_name_have_places(tmp_path: Path)
 )
 def test_every_program_has_its_table_and_its_place_in_the_json(words: list[str], tmp_path: Path) -> None:
     punch(tmp_path)
-    told = run(tmp_path, words[0], "all.nc", "-m", "vx500", "--program", "all", "--json", "r.json", *words[1:])
+    told = every(tmp_path, words[0], "--json", "r.json", *words[1:])
     reports = json.loads((tmp_path / "r.json").read_text())
     assert [report["program_address"] for report in reports] == DONE
     lines = told.stdout.splitlines()
@@ -90,14 +96,14 @@ def test_every_program_has_its_table_and_its_place_in_the_json(words: list[str],
 
 def test_time_of_all_is_the_time_of_each(tmp_path: Path) -> None:
     path, machine = punch(tmp_path), sg.Machine.load("vx500")
-    run(tmp_path, "time", "all.nc", "-m", "vx500", "--program", "all", "--json", "r.json", "--csv", "blocks.csv")
+    every(tmp_path, "time", "--json", "r.json", "--csv", "blocks.csv")
     for report in json.loads((tmp_path / "r.json").read_text()):
         read = sg.Program.read(path, machine, program_number=report["program_address"])
         assert report["cycle_time_s"] == pytest.approx(sg.cycle_time(read, machine).cycle_time_s)
     assert sorted(each.name for each in tmp_path.glob("blocks*")) == [
         "blocks-O0002.csv", "blocks-ONE-O0001.csv", "blocks-PART-7.csv", "blocks-TWO-O0001.csv",
     ]  # fmt: skip
-    refused = run(tmp_path, "time", "all.nc", "-m", "vx500", "--program", "all", "--csv", "-")
+    refused = every(tmp_path, "time", "--csv", "-")
     assert refused.returncode == 2 and "a file of its own" in refused.stderr
 
 
@@ -105,20 +111,7 @@ def test_time_of_all_is_the_time_of_each(tmp_path: Path) -> None:
 def test_convert_writes_one_file_with_every_program_in_its_place(end: str, tmp_path: Path) -> None:
     original = PUNCH.replace("\n", end)
     punch(tmp_path, original)
-    told = run(
-        tmp_path,
-        "convert",
-        "all.nc",
-        "-m",
-        "vx500",
-        "--program",
-        "all",
-        "--shape-all",
-        "-o",
-        "out.nc",
-        "--json",
-        "r.json",
-    )
+    told = every(tmp_path, "convert", "--shape-all", "-o", "out.nc", "--json", "r.json")
     assert told.returncode == 0, told.stderr
     emitted = (tmp_path / "out.nc").read_bytes()
     reports = json.loads((tmp_path / "r.json").read_text())
@@ -142,27 +135,14 @@ def test_convert_writes_one_file_with_every_program_in_its_place(end: str, tmp_p
 def test_expand_leaves_what_needs_nothing_to_the_letter(tmp_path: Path) -> None:
     plain = "%\n" + program("O0001", 30) + program("O0002", 60) + "%\n"
     punch(tmp_path, plain)
-    assert run(tmp_path, "expand", "all.nc", "-m", "vx500", "--program", "all", "-o", "out.nc").returncode == 0
+    assert every(tmp_path, "expand", "-o", "out.nc").returncode == 0
     assert (tmp_path / "out.nc").read_bytes() == plain.encode()
 
 
 def test_a_program_that_cannot_be_read_does_not_stop_the_others(tmp_path: Path) -> None:
     bad = f"O0005\n{HEAD}G02 X10. I3. F500\nM30\n"
     punch(tmp_path, "%\n" + program("O0001", 30) + bad + program("O0002", 60) + "%\n")
-    told = run(
-        tmp_path,
-        "convert",
-        "all.nc",
-        "-m",
-        "vx500",
-        "--program",
-        "all",
-        "--shape-all",
-        "-o",
-        "out.nc",
-        "--json",
-        "r.json",
-    )
+    told = every(tmp_path, "convert", "--shape-all", "-o", "out.nc", "--json", "r.json")
     assert told.returncode == 2
     assert "not done: all.nc:12:" in told.stdout and "off its radius" in told.stdout
     reports = json.loads((tmp_path / "r.json").read_text())
@@ -173,8 +153,8 @@ def test_a_program_that_cannot_be_read_does_not_stop_the_others(tmp_path: Path) 
 def test_one_program_out_of_tolerance_sends_the_file_beside_the_one_asked_for(tmp_path: Path) -> None:
     slanting = (program("O0001", 30) + program("O0002", 60)).replace("Y40.", "X33.3Y41.7")
     punch(tmp_path, "%\n" + slanting + "%\n")
-    told = run(
-        tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--shape-all", "-o", "out.nc",
+    told = every(
+        tmp_path, "convert", "--shape-all", "-o", "out.nc",
         "--contour", "command", "--contour-tolerance", "0.4um", "--max-time-increase", "1e5",
         "--max-cut-time-increase", "1e5",
     )  # fmt: skip
@@ -188,7 +168,7 @@ def test_one_program_out_of_tolerance_sends_the_file_beside_the_one_asked_for(tm
 
 def test_each_emitted_program_is_held_against_its_own_header(tmp_path: Path) -> None:
     punch(tmp_path)
-    done = run(tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--shape-all", "-o", "out.nc")
+    done = every(tmp_path, "convert", "--shape-all", "-o", "out.nc")
     assert done.returncode == 0, done.stderr
 
     def codes() -> dict[str, set[str]]:
@@ -254,7 +234,7 @@ def test_programs_whose_calls_were_kept_stand_behind_the_one_that_was_asked_for(
     found = json.loads((tmp_path / "c.json").read_text())
     assert checked.returncode == 0 and "edited" not in found["counts_by_code"]
     # All of them: the two are done there, and stand as they were.
-    run(tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--shape-all", "-o", "whole.nc")
+    every(tmp_path, "convert", "--shape-all", "-o", "whole.nc")
     whole = (tmp_path / "whole.nc").read_bytes()
     assert [place.address for place in programs_of(whole)] == ["O0001", "O0002", "O0003", "O0004"]
     assert whole.endswith(f"{probe}{second}%\n".encode())

@@ -28,20 +28,10 @@ from shapegcode.shaping import (
     recommend,
 )
 from shapegcode.shaping.grid import choose_grid
+from shaper_residual import left_of
 
 FEW = ("zv", "mzv", "polynomial", "non-negative", "robust")  # quick ones
 PAPER = [ModeBand(Mode(46.0, 0.02), 0.05), ModeBand(Mode(131.0, 0.02))]
-
-
-def residual(times_s: list[float], amplitudes: list[float], frequency_hz: float, zeta: float) -> float:
-    """The residual ratio V, written out."""
-    omega, end = 2.0 * math.pi * frequency_hz, times_s[-1]
-    damped = omega * math.sqrt(1.0 - zeta**2)
-    total = sum(
-        a * complex(math.cos(damped * t), math.sin(damped * t)) * math.exp(zeta * omega * (t - end))
-        for t, a in zip(times_s, amplitudes, strict=True)
-    )
-    return abs(total)
 
 
 def made(duration: float, worst: float, negative: bool = False, period_s: float | None = None) -> Design:
@@ -191,9 +181,10 @@ def test_every_design_keeps_the_limits_and_says_its_own_figures() -> None:
             np.dot(np.square(times_s), amplitudes) - mean**2, rel=1e-8, abs=1e-15
         )
         assert row["negative"] == (min(amplitudes) < 0.0)
-        nominal = max(residual(times_s, amplitudes, 46.0, 0.02), residual(times_s, amplitudes, 131.0, 0.02))
+        shaper = Shaper(times_s, amplitudes)
+        nominal = max(left_of(shaper, Mode(46.0, 0.02)), left_of(shaper, Mode(131.0, 0.02)))
         assert row["residual"] == pytest.approx(nominal, rel=1e-8, abs=1e-12)
-        swept = [residual(times_s, amplitudes, f, 0.02) for f in np.linspace(46.0 * 0.95, 46.0 * 1.05, 41)]
+        swept = [left_of(shaper, Mode(f, 0.02)) for f in np.linspace(46.0 * 0.95, 46.0 * 1.05, 41)]
         assert row["worst_residual"] == pytest.approx(max(*swept, nominal), rel=2e-3, abs=1e-9)
     refused = [row for row in report["refused"] if row["family"] == "polynomial"]
     assert [row["period_s"] for row in refused] == [0.001]
@@ -235,12 +226,13 @@ def test_own_taps_are_compared() -> None:
     result = choose_shaper(
         ["46:0.02±5%", "131:0.02"], periods_s=[None, 0.002, 0.004], families=["zv"], taps="0:.5,10ms:.5"
     )
+    options = DesignOptions(taps=Shaper([0.0, 0.01], [0.5, 0.5]))
+    assert options.taps is not None
     rows = [each for each in result.designs if each.family == "taps"]
     assert [each.period_s for each in rows] == [None, 0.002]
-    swept = [residual([0.0, 0.01], [0.5, 0.5], f, 0.02) for f in (46.0 * 0.95, 46.0, 46.0 * 1.05, 131.0)]
+    swept = [left_of(options.taps, Mode(f, 0.02)) for f in (46.0 * 0.95, 46.0, 46.0 * 1.05, 131.0)]
     assert rows[0].worst_residual == pytest.approx(max(swept), rel=1e-3)
     assert "10 ms is not on the 4 ms grid" in next(each.reason for each in result.refused if each.family == "taps")
-    options = DesignOptions(taps=Shaper([0.0, 0.01], [0.5, 0.5]))
     assert {each.family for each in choose(PAPER, [0.002], options, families=["zv"]).designs} == {"zv", "taps"}
 
 

@@ -455,35 +455,6 @@ def test_memory_does_not_grow_with_the_length(folder: Path) -> None:
 # ---- bad input ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--lines", "90-99"], "1-17"),
-        (["--lines", "3-18"], "1-17"),
-        (["--lines", "1-2"], "nothing happens"),
-        (["--csv", "a", "--npz", "a"], "a would overwrite a"),
-        (["--npz", "a", "--json", "a"], "a would overwrite a"),
-        (["--csv", "part.nc"], "part.nc would overwrite part.nc"),
-        (["--npz", "-"], "standard output"),
-        (["--csv", "-", "--json", "-"], "standard output"),
-        (["--csv", "nowhere/m.csv"], "nowhere"),
-        (["--npz", "nowhere/m.npz"], "nowhere"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_what_cannot_be_is_refused(
-    folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
-) -> None:
-    message = refused(capsys, *words)
-    assert message.startswith("shapegcode: ")
-    assert said in message
-
-
-@pytest.mark.parametrize("words", [["--lines", "9-3"], ["--lines", "0"], ["--every", "0"], ["--plant", "other"]])
-def test_arguments_that_mean_nothing_are_refused(folder: Path, words: list[str]) -> None:
-    assert main(["simulate", "part.nc", "-m", "vx500", *words]) == 2
-
-
 def test_api_refuses_before_anything_is_played() -> None:
     machine = sg.Machine.load("vx500")
     program = sg.Program.from_text(WHOLE, machine)

@@ -6,6 +6,7 @@ The shape of an allowance is held against plane geometry: distances from walls a
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from importlib import resources
 from itertools import pairwise
@@ -47,11 +48,11 @@ def corner(straight: float = 30.0) -> _core.Path:
     )
 
 
-def rectangle(width: float, depth: float) -> list[_core.Segment]:
-    """Path round a rectangle about the origin, counter-clockwise from the middle of its lower side."""
+def rectangle(width: float, depth: float, z: float = Z) -> list[_core.Segment]:
+    """Path round a rectangle about the origin, counter-clockwise from the middle of its lower side; depth < 0: cw."""
     x, y = width / 2, depth / 2
     corners = [(0, -y), (x, -y), (x, y), (-x, y), (-x, -y), (0, -y)]
-    return [line(a, b) for a, b in pairwise(corners)]
+    return [line(a, b, z) for a, b in pairwise(corners)]
 
 
 def allowance(text: str = "", **values: object) -> Stock:
@@ -73,12 +74,6 @@ def within_reach(shape: shapely.Polygon, core: shapely.Polygon, reach: float) ->
 def complaint(text: str) -> str:
     with pytest.raises(StockError) as caught:
         Stock.from_toml(text, "s.toml")
-    return str(caught.value)
-
-
-def unsuited(stock: Stock, path: _core.Path, radius: float = RADIUS) -> str:
-    with pytest.raises(StockError) as caught:
-        stock_polygons(stock, [path], radius)
     return str(caught.value)
 
 
@@ -203,14 +198,6 @@ def test_a_straight_wall_is_a_plain_layer_that_goes_on_beyond_its_ends() -> None
     assert inside.bounds == pytest.approx((-8, -4 - 6.8, 58, -3.2), abs=NEAR_MM)
 
 
-def test_the_wall_may_be_on_the_left() -> None:
-    path = _core.Path([line((0, 0), (50, 0))])
-    right = area(stock_polygons(allowance(), [path], RADIUS))
-    left = area(stock_polygons(allowance(wall='"left"'), [path], RADIUS))
-    mirrored = shapely.transform(right, lambda points: points * [1, -1])
-    assert left.symmetric_difference(mirrored).area < NEAR_MM2
-
-
 def test_a_pocket() -> None:
     """Path 40 x 20 with a tool of 8: a pocket 48 x 28; with corners of 4, where roughing left 8."""
     (piece,) = stock_polygons(allowance(wall='"right"'), [_core.Path(rectangle(40, 20))], RADIUS)
@@ -225,36 +212,6 @@ def test_a_boss() -> None:
     (piece,) = stock_polygons(allowance(wall='"left"', width_mm=30), [_core.Path(rectangle(40, 20))], RADIUS)
     assert len(piece.rings) == 1
     within_reach(shapely.Polygon(piece.rings[0]), shapely.box(-16, -6, 16, 6), 0.8)
-
-
-def test_a_pocket_ran_clockwise_has_its_wall_on_the_left() -> None:
-    corners = [(0, -10), (-20, -10), (-20, 10), (20, 10), (20, -10), (0, -10)]
-    path = _core.Path([line(a, b) for a, b in pairwise(corners)])
-    clockwise = area(stock_polygons(allowance(wall='"left"'), [path], RADIUS))
-    counter = area(stock_polygons(allowance(), [_core.Path(rectangle(40, 20))], RADIUS))
-    assert clockwise.symmetric_difference(counter).area < NEAR_MM2
-
-
-def test_what_leads_to_a_closed_contour_is_no_wall() -> None:
-    plain = area(stock_polygons(allowance(), [_core.Path(rectangle(40, 20))], RADIUS))
-    led = [
-        line((-3, -7), (-3, -7.0001)),
-        line((-3, -7.0001), (0, -10)),
-        *rectangle(40, 20),
-        line((0, -10), (3, -7)),
-    ]
-    assert area(stock_polygons(allowance(), [_core.Path(led)], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
-
-
-def test_a_contour_may_run_on_over_its_beginning() -> None:
-    plain = area(stock_polygons(allowance(), [_core.Path(rectangle(40, 20))], RADIUS))
-    overlapping = [*rectangle(40, 20), line((0, -10), (2, -10)), line((2, -10), (2, -8))]
-    lead_in = line((0, -8), (0, -10))
-    # Once with a point where the contour began, once straight through it.
-    through = [lead_in, *rectangle(40, 20)[:-1], line((-20, -10), (2, -10)), line((2, -10), (2, -8))]
-    for segments in ([lead_in, *overlapping], through):
-        result = area(stock_polygons(allowance(), [_core.Path(segments)], RADIUS))
-        assert result.symmetric_difference(plain).area < NEAR_MM2
 
 
 def test_a_wall_of_thousands_of_short_moves_is_one_piece() -> None:
@@ -272,41 +229,53 @@ def test_a_wall_of_thousands_of_short_moves_is_one_piece() -> None:
     assert distances == pytest.approx(RADIUS - 0.5, abs=NEAR_MM)
 
 
-def test_several_levels_of_one_contour_are_one_wall() -> None:
-    once = rectangle(40, 20)
-    plain = area(stock_polygons(allowance(), [_core.Path(once)], RADIUS))
-    down = _core.Segment.line([0, -10, Z], [0, -10, 2 * Z], 10.0)
-    twice = [*once, down]
-    corners = [(0, -10), (20, -10), (20, 10), (-20, 10), (-20, -10), (0, -10)]
-    twice += [line(a, b, 2 * Z) for a, b in pairwise(corners)]
-    assert area(stock_polygons(allowance(), [_core.Path(twice)], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
-    assert area(stock_polygons(allowance(), [_core.Path(once)] * 2, RADIUS)).symmetric_difference(plain).area < NEAR_MM2
+ROUND = _core.Path(rectangle(40, 20))
+BEHIND = [line((0, -10), (2, -10)), line((2, -10), (2, -8))]  # over the beginning of the contour, and away
+LEAD_IN = line((0, -8), (0, -10))
+DOWN = _core.Segment.line([0, -10, Z], [0, -10, 2 * Z], 10.0)
+ABOVE = _core.Path([line((-60, 5), (60, 5), 1.0)])
+LED_CORNER = _core.Path(
+    [
+        arc((-35, 5), (-30, 0), (-30, 5), 90),
+        line((-30, 0), (0, 0)),
+        arc((0, 0), (4, 4), (0, 4), 90),
+        line((4, 4), (4, 34)),
+        line((4, 34), (-3, 40)),
+    ]
+)
 
 
-def test_moves_above_the_stock_do_not_count() -> None:
-    above = _core.Path([line((-60, 5), (60, 5), 1.0)])
-    plain = area(stock_polygons(allowance(), [corner()], RADIUS))
-    assert area(stock_polygons(allowance(), [above, corner()], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
-    assert unsuited(allowance(), above) == (
-        "s.toml:5: allowance.z_mm = [-15.0, 0.0]: no cutting move of the program goes below the top"
+@pytest.mark.parametrize(
+    ("keys", "paths", "same"),
+    [
+        ({"wall": '"left"'}, [_core.Path(rectangle(40, -20))], [ROUND]),
+        ({}, [_core.Path([line((-3, -7), (-3, -7.0001)), line((-3, -7.0001), (0, -10)), *rectangle(40, 20),
+                          line((0, -10), (3, -7))])], [ROUND]),
+        # Once with a point where the contour began, once straight through it.
+        ({}, [_core.Path([LEAD_IN, *rectangle(40, 20), *BEHIND])], [ROUND]),
+        ({}, [_core.Path([LEAD_IN, *rectangle(40, 20)[:-1], line((-20, -10), (2, -10)), BEHIND[1]])], [ROUND]),
+        ({}, [_core.Path([*rectangle(40, 20), DOWN, *rectangle(40, 20, 2 * Z)])], [ROUND]),
+        ({}, [ROUND, ROUND], [ROUND]),
+        ({}, [ABOVE, corner()], [corner()]),
+        ({"lead_in_mm": 5 * math.pi / 2, "lead_out_mm": math.hypot(7, 6)}, [LED_CORNER], [corner()]),
+    ],
+    ids=["clockwise, wall on the left", "lead-in and lead-out of a closed contour", "runs over its beginning",
+         "straight through its beginning", "two levels", "twice", "moves above the stock", "open with leads"],
+)  # fmt: skip
+def test_the_same_wall(keys: dict[str, object], paths: list[_core.Path], same: list[_core.Path]) -> None:
+    found, plain = (
+        area(stock_polygons(allowance(**keys), paths, RADIUS)),
+        area(stock_polygons(allowance(), same, RADIUS)),
     )
+    assert found.symmetric_difference(plain).area < NEAR_MM2
 
 
-def test_lead_in_and_lead_out_of_an_open_wall_are_left_out() -> None:
-    plain = area(stock_polygons(allowance(), [corner()], RADIUS))
-    length = 5 * math.pi / 2
-    led = _core.Path(
-        [
-            arc((-35, 5), (-30, 0), (-30, 5), 90),
-            line((-30, 0), (0, 0)),
-            arc((0, 0), (4, 4), (0, 4), 90),
-            line((4, 4), (4, 34)),
-            line((4, 34), (-3, 40)),
-        ]
-    )
-    stock = allowance(lead_in_mm=length, lead_out_mm=math.hypot(7, 6))
-    assert area(stock_polygons(stock, [led], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
-    assert "no wall is left" in unsuited(allowance(lead_in_mm=60, lead_out_mm=60), led)
+def test_the_wall_may_be_on_the_left() -> None:
+    path = _core.Path([line((0, 0), (50, 0))])
+    right = area(stock_polygons(allowance(), [path], RADIUS))
+    left = area(stock_polygons(allowance(wall='"left"'), [path], RADIUS))
+    mirrored = shapely.transform(right, lambda points: points * [1, -1])
+    assert left.symmetric_difference(mirrored).area < NEAR_MM2
 
 
 def test_a_thin_wall_between_two_pockets_is_no_stock_inside_either() -> None:
@@ -321,35 +290,27 @@ def test_a_thin_wall_between_two_pockets_is_no_stock_inside_either() -> None:
 # --- What does not fit ------------------------------------------------------------------------------------------------
 
 
-def test_a_tool_bigger_than_the_corner() -> None:
-    assert unsuited(allowance(corner_radius_mm=3), corner()) == (
-        "s.toml:3: allowance.corner_radius_mm = 3.0: tool bigger than the corner: "
-        "must not be below the tool's radius, 4 mm"
-    )
+LOOP = [line((50, 0), (52, 0)), line((52, 0), (52, 2)), line((52, 2), (50, 2)), line((50, 2), (50, 0))]
+CROSSING = [line((0, 0), (20, 0)), line((20, 0), (20, 10)), line((20, 10), (10, 10)), line((10, 10), (10, -15))]
 
 
-def test_a_roughing_tool_bigger_than_the_pocket() -> None:
-    message = unsuited(allowance(corner_radius_mm=14), _core.Path(rectangle(40, 20)))
-    assert "roughing tool bigger than the pocket" in message
-    assert "needs 29.6 mm, the pocket is 28 mm wide" in message
-
-
-def test_a_contour_with_nothing_inside() -> None:
-    assert "leaves nothing inside the closed contour" in unsuited(allowance(wall='"left"'), _core.Path(rectangle(8, 8)))
-
-
-def test_a_small_loop_on_a_long_wall_is_not_taken_for_the_wall() -> None:
-    loop = [line((50, 0), (52, 0)), line((52, 0), (52, 2)), line((52, 2), (50, 2)), line((50, 2), (50, 0))]
-    path = _core.Path([line((0, 0), (50, 0)), *loop, line((50, 0), (50, -40))])
-    message = unsuited(allowance(), path)
-    assert "only 8 of 98 mm of a run of cutting moves close upon themselves" in message
-
-
-def test_a_path_that_crosses_itself_is_refused() -> None:
-    loop = _core.Path(
-        [line((0, 0), (20, 0)), line((20, 0), (20, 10)), line((20, 10), (10, 10)), line((10, 10), (10, -15))]
-    )
-    assert "describe the stock as [polygon]" in unsuited(allowance(wall='"left"'), loop)
+@pytest.mark.parametrize(
+    ("keys", "path", "expected"),
+    [
+        ({"corner_radius_mm": 3}, corner(), "s.toml:3: allowance.corner_radius_mm = 3.0: tool bigger than the corner: "
+         "must not be below the tool's radius, 4 mm"),
+        ({"corner_radius_mm": 14}, ROUND, "needs 29.6 mm, the pocket is 28 mm wide"),
+        ({"wall": '"left"'}, _core.Path(rectangle(8, 8)), "leaves nothing inside the closed contour"),
+        ({}, _core.Path([line((0, 0), (50, 0)), *LOOP, line((50, 0), (50, -40))]),
+         "only 8 of 98 mm of a run of cutting moves close upon themselves"),
+        ({"wall": '"left"'}, _core.Path(CROSSING), "describe the stock as [polygon]"),
+        ({}, ABOVE, "s.toml:5: allowance.z_mm = [-15.0, 0.0]: no cutting move of the program goes below the top"),
+        ({"lead_in_mm": 60, "lead_out_mm": 60}, LED_CORNER, "no wall is left"),
+    ],
+)  # fmt: skip
+def test_a_stock_that_does_not_suit_the_program(keys: dict[str, object], path: _core.Path, expected: str) -> None:
+    with pytest.raises(StockError, match=re.escape(expected)):
+        stock_polygons(allowance(**keys), [path], RADIUS)
 
 
 @pytest.mark.parametrize(

@@ -149,7 +149,7 @@ BACK = "G00 Z5.\nM30"
         ("S2000 M03", "T1 M06\nS2000 M03\nT2", "uses the tools T1, T2: must use one"),
         ("X70. F500.", "G18 G03 X-4. Z1. I3. K3. F500.", "rough.nc:6: an arc that is not in the XY plane (G17)"),
         (BACK, f"G55\nG00 X0 Y0\nG01 Z-6. F100.\nX50.\n{BACK}", "cuts in the work coordinates G54, G55: must cut in"),
-        ("G54 G00 X-10. Y20. Z5.", "G91 G01 X1. F500.", "the place of these moves is not known"),
+        ("G54 G00 X-10. Y20. Z5.", "G91 G01 X1. F500.", "the position of these moves is not known"),
     ],
     ids=["tools", "plane", "coordinates", "place"],
 )

@@ -24,13 +24,13 @@ from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from shapegcode.cli.machine import file_schema
 from shapegcode.demos.path import path_program
 from shapegcode.errors import ArgumentError, MachineError
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.studies import replay as replays
-from shapegcode.studies.replay import DrawsJob, play_all
+from shapegcode.studies.replay import SamplesJob, simulate_all
 from shapegcode.studies.study import decides, interval_of
 from shapegcode.studies.study_file import StudyFileError
-from shapegcode.studies.varied import drawn, varied_values
+from shapegcode.studies.varied import sampled_columns, varied_values
 
 ROOT = Path(__file__).resolve().parents[2]
 X_HZ, Y_HZ = "axes.x.modes.1.frequency_hz", "axes.y.modes.1.frequency_hz"
@@ -115,7 +115,7 @@ def test_distributions_have_the_quantiles_of_scipy() -> None:
 @pytest.mark.parametrize("sampling", ["sobol", "lhs"])
 def test_draws_fill_the_cube_as_the_sequences_do(sampling: str) -> None:
     varied = varied_values(VX500, {X_HZ: sg.uniform(40, 50), Y_HZ: sg.uniform(120, 140)})
-    columns = drawn(varied, 256, sampling, 3, indices=False)
+    columns = sampled_columns(varied, 256, sampling, 3, indices=False)
     points = np.column_stack([(np.array(columns[0], float) - 40) / 10, (np.array(columns[1], float) - 120) / 20])
     random = np.random.default_rng(0).random((256, 2))
     assert qmc.discrepancy(points) < 0.5 * qmc.discrepancy(random)
@@ -125,19 +125,19 @@ def test_draws_fill_the_cube_as_the_sequences_do(sampling: str) -> None:
 
 def test_a_grid_has_every_combination_once() -> None:
     varied = varied_values(VX500, {X_HZ: sg.uniform(40, 50), "controller.block_end": ["ceil", "carry"]})
-    columns = drawn(varied, 11, "grid", 0, indices=False)
+    columns = sampled_columns(varied, 11, "grid", 0, indices=False)
     rows = list(zip(*columns, strict=True))
     assert rows == [(hz, rule) for hz in (41.0, 43.0, 45.0, 47.0, 49.0) for rule in ("ceil", "carry")]
     with pytest.raises(ArgumentError, match="n = 1: the lists alone have 2 combinations"):
-        drawn(varied, 1, "grid", 0, indices=False)
+        sampled_columns(varied, 1, "grid", 0, indices=False)
 
 
 def test_sobol_indices_of_a_sum_are_its_shares_of_the_variance() -> None:
     keys = {X_HZ: sg.uniform(40, 50), Y_HZ: sg.uniform(120, 140), X_DAMPING: sg.uniform(0.01, 0.02)}
     varied = varied_values(VX500, keys)
-    columns = drawn(varied, 10_000, "sobol", 0, indices=True)
+    columns = sampled_columns(varied, 10_000, "sobol", 0, indices=True)
     x, y = np.array(columns[0], float) - 40.0, np.array(columns[1], float) - 120.0
-    found = decides(varied, columns, {"share_of_limit": 3.0 * x + y / 2.0}, indices=True, seed=0)
+    found = decides(varied, columns, 3.0 * x + y / 2.0, indices=True, seed=0)
     # Variances 9 · 100 / 12 and 100 / 12.
     assert [each.key for each in found] == [X_HZ, Y_HZ, X_DAMPING]
     assert [each.first for each in found] == pytest.approx([0.9, 0.1, 0.0], abs=0.02)
@@ -429,7 +429,7 @@ def test_a_choice_that_nothing_bears_is_code_1_and_draws_none(tmp_path: Path) ->
         ('"zvd"]', '"zvd"]\nmost = 3', "choose.most"),
         ('["zv", "zvd"]', '["soft"]', 'shaping.family = "soft": must be "auto"'),
         ("shaping.family", "shaping.famly", "did you mean family?"),
-        ("shaping.family", "axes.x.modes.1.frequency_hz", "a value is either drawn or chosen"),
+        ("shaping.family", "axes.x.modes.1.frequency_hz", "either sampled or chosen"),
         ("n = 40", "most = 0", "STUDY.toml:3: most = 0: must be 1 or more"),
         ("n = 40", "n = 400000", "n = 400000: must be at most 250000"),
         ("sd = 2.0", "sd = 2.0, known = true", "it belongs into choose"),
@@ -487,9 +487,9 @@ def test_a_text_that_travels_as_bytes_is_played_to_the_bit() -> None:
     machine = VX500.with_values("axes.x.modes.1.frequency_over", over)
     replay = replays.Replay.of(path_program(200, machine), machine)
     rows = tuple({Y_HZ: 120.0 + draw} for draw in range(70))
-    job = DrawsJob("vx500", rows, tuple(range(70)), ("residual_um", "contour_um", "time_s"), times=True)
+    job = SamplesJob("vx500", rows, tuple(range(70)), ("residual_um", "contour_um", "time_s"), times=True)
     with ThreadPoolExecutor(2) as pool:
-        assert play_all(replay, job, pool) == play_all(replay, job, None)
+        assert simulate_all(replay, job, pool) == simulate_all(replay, job, None)
 
 
 @pytest.mark.slow

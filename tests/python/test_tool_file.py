@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from importlib import resources
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from tool_files_page import STEEL_TOOL
 
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool, materials
-from shapegcode.errors import FileError, ToolError
+from shapegcode.errors import ToolError
 from shapegcode.settings.load import line_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -256,29 +255,6 @@ def test_every_entry_says_where_it_comes_from() -> None:
         assert entry.description
 
 
-def test_every_entry_makes_coefficients_that_the_core_takes() -> None:
-    for name in materials():
-        tool = Tool.from_toml(TOOL.replace("al6061-t6-carbide-6", name))
-        values = tool.coefficients()
-        assert values.specific_n_per_mm2 == materials()[name].specific_n_per_mm2
-
-
-# --- Documentation ----------------------------------------------------------------------------------------------------
-
-
-def test_every_key_of_a_tool_file_is_in_the_documentation() -> None:
-    text = (ROOT / "docs" / "reference" / "tool_files.md").read_text(encoding="utf-8")
-    for name, field in Tool.model_fields.items():
-        assert f"### `[{name}]`" in text
-        for key in field.annotation.model_fields:  # type: ignore[union-attr]
-            assert f"| `{key}` |" in text
-
-
 def test_examples_load() -> None:
-    assert tomllib.loads(STEEL_TOOL)
     assert Tool.from_toml(STEEL_TOOL).tool.number == 3
     assert paper_tool().cutting.library_entry() == materials()["al6061-t6-carbide-6"]
-
-
-def test_tool_errors_belong_to_the_family_that_the_command_line_prints() -> None:
-    assert issubclass(ToolError, FileError)

@@ -251,7 +251,7 @@ def _as_nobody(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_every_pool_is_as_large_as_the_processors_that_may_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    from shapegcode.verdict.ahead import cores
+    from shapegcode.program.computer import cores
 
     monkeypatch.delenv("SHAPEGCODE_THREADS", raising=False)
     before = os.sched_getaffinity(0)
@@ -264,7 +264,7 @@ def test_every_pool_is_as_large_as_the_processors_that_may_be_used(monkeypatch: 
     assert cores() == 3
     package = Path(sg.__file__).parent
     users = [file for file in package.rglob("*.py") if "cpu_count" in file.read_text(encoding="utf-8")]
-    assert users == [package / "verdict/ahead.py"]
+    assert users == [package / "program/computer.py"]
 
 
 def test_every_module_loads_where_there_is_no_posix(tmp_path: Path) -> None:

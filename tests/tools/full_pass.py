@@ -3,12 +3,14 @@
 `write` puts a hash of each group of files that the long checks guard into tests/full_pass.txt, which is committed: a
 folder of cpp/, or all of another place. `changed` prints what must run again (core, python) because a file of it is
 new, gone or another one; nothing: all of it passed as it is. `files` prints the sources and headers of the core's
-folders that changed, for clang-tidy, which reads a folder as one. A change of the core counts for the Python tests too.
+folders that changed or include a header of one that did, for clang-tidy, which reads a folder as one and finds in the
+others what it found before. A change of the core counts for the Python tests too.
 """
 
 from __future__ import annotations
 
 import hashlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -75,6 +77,26 @@ def mark_of(names: list[str]) -> str:
     return hashlib.sha256("".join(lines).encode()).hexdigest()[:16]
 
 
+def core_folders(groups: dict[str, list[str]], changed: set[str]) -> list[str]:
+    """Folders of the core to be checked again: those that changed and, through any number of headers, their users."""
+    folders = sorted(group for group in groups if group.startswith(("cpp/src", "cpp/include")))
+    if ".clang-tidy" in changed:
+        return folders
+    included = {name: included_files(name) for folder in folders for name in groups[folder]}
+    found = {name for folder in changed.intersection(folders) for name in groups[folder]}
+    while more := {name for name, headers in included.items() if headers & found} - found:
+        found |= more
+    return sorted({group_of(name) for name in found})
+
+
+def included_files(name: str) -> set[str]:
+    """What a file includes of the project's own: of the two include folders or from beside it."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    starts = ("cpp/include", "cpp/src", str(Path(name).parent))
+    headers = re.findall(r'^#include "(.+)"', text, re.MULTILINE)
+    return {f"{start}/{header}" for header in headers for start in starts if (ROOT / start / header).is_file()}
+
+
 def main() -> None:
     """See the module's docstring."""
     command = sys.argv[1]
@@ -87,7 +109,7 @@ def main() -> None:
     then = {group: mark for mark, group in (line.split(" ", 1) for line in lines)}
     changed = {group for group in now.keys() | then.keys() if now.get(group) != then.get(group)}
     if command == "files":
-        folders = (group for group in sorted(changed & now.keys()) if group.startswith(("cpp/src", "cpp/include")))
+        folders = core_folders(groups, changed)
         print(*(name for group in folders for name in groups[group] if name.endswith((".cpp", ".hpp"))), sep="\n")
         return
     if any(group.startswith(CORE) for group in changed):

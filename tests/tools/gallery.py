@@ -59,14 +59,14 @@ ENTRIES = (
         "Before and after", "convert path.nc -m vx500 -o shaped.nc",
         {
             "path": "How far, and to which side, does the table leave the path? Drawn larger, as the title says.",
-            "vibration": "How much does each axis swing about its command, and what is left after the stop (dashed)?",
+            "vibration": "How much does each axis vibrate about its command, and what is left after the stop (dashed)?",
             "feed": "How fast does the command go, along the path and per axis?",
             "tolerance": "What does a tighter contour cost in time, and where is the knee?",
         }, "convert",
     ),
     Entry(
-        "A long program, at its worst place", "convert moulds.nc -m vx500 -o quiet.nc",
-        {"path": "Three seconds around the place where the original is worst; right: where that is."}, "long",
+        "A long program, where it is worst", "convert moulds.nc -m vx500 -o quiet.nc",
+        {"path": "Three seconds around the position where the original is worst; right: where that is."}, "long",
     ),
     Entry(
         "The motion of each axis", "simulate path.nc -m vx500 --plant feed-drive --lines 8-10",
@@ -87,10 +87,10 @@ ENTRIES = (
         "Shapers side by side", "shaper --mode 46:0.02±5% --mode 131:0.02",
         {
             "shaper-pareto": "What does less vibration cost? Each mark is a design; filled: nothing is better in both.",
-            "shaper-sensitivity": "What is left if the machine's frequency is another one than the file says?",
-            "shaper-impulses": "The taps: how each shaper splits a change of speed.",
+            "shaper-sensitivity": "What is left if the machine's frequency is not the one in the file?",
+            "shaper-impulses": "The impulses: how each shaper splits a change of speed.",
             "shaper-steps": "What becomes of a step, and how the modes follow.",
-            "shaper-branches": "How long the shortest shapers of two modes are if the faster mode is another one.",
+            "shaper-branches": "How long the shortest shapers of two modes are if the faster mode differs.",
         }, "shaper",
     ),
     Entry(
@@ -114,7 +114,7 @@ ENTRIES = (
         "Feeds by force", "feed pocket.nc -m vx500 --tool tool.toml --stock block.toml -o fast.nc",
         {
             "feed-path": "Where is the force large? Red: above the limit.",
-            "feed-along-path": "What the tool meets, how fast it goes, what it bears.",
+            "feed-along-path": "What the tool meets, how fast it goes, the load on the tool.",
             "feed-surface": "How far the wall is off. Red: left standing; blue: cut too far.",
         }, "feed",
     ),
@@ -135,22 +135,22 @@ ENTRIES = (
         {"testcut-interval": "Force over time for each interval, and with the lag that fits best."}, "interval",
     ),
     Entry(
-        "Machines that are drawn", "study STUDY.toml",
+        "Sampled machines", "study STUDY.toml",
         {
-            "study-tornado": "Which value decides whether the part is good?",
-            "study-bands": "What is left over the value that decides, and within which band.",
+            "study-tornado": "Which parameter decides whether the part is good?",
+            "study-bands": "Residual over the parameter that decides, and within which band.",
         }, "studies",
     ),
     Entry(
-        "Settings that most machines bear", "optimize STUDY.toml",
-        {"optimum-choices": "Which choices are the fastest, and on how many machines is each good?"}, "optimum",
+        "Settings that keep the tolerance on most machines", "optimize STUDY.toml",
+        {"optimum-choices": "Which choices are the fastest, and how often is each within tolerance?"}, "optimum",
     ),
     Entry(
-        "Position loops from a log", "characterize --servo capture.json.gz -m vx500",
+        "Position loops identified from a log", "characterize --servo capture.json.gz -m vx500",
         {"servo": "The control's own deviation, and what our model leaves of it where it was not fitted."}, "servo",
     ),
     Entry(
-        "A machine learned from its logs",
+        "A cycle-time model calibrated from run logs",
         "characterize --runs RUNS.toml -m vx500",
         {"clock": "Predicted over measured time of each run: whole, by tool, by kind of motion."},
         "clock",
@@ -158,9 +158,9 @@ ENTRIES = (
 )  # fmt: skip
 KEPT = (
     ("Two machining centres predicted", "python tests/benchmarks/evidence_nist.py --plots plots", "evidence-nist.png",
-     "Predicted over measured time of runs that were left out; some 100 s of CPU, so drawn once."),
-    ("The fewer runs, the less is known", "python tests/benchmarks/evidence_nist.py --curve --plots plots",
-     "evidence-nist-runs.png", "Error by the number of runs learned from; ten minutes."),
+     "Predicted over measured time of runs that were left out; some 100 s of CPU, so it is kept."),
+    ("Error by the number of runs in the calibration", "python tests/benchmarks/evidence_nist.py --curve --plots plots",
+     "evidence-nist-runs.png", "Ten minutes of CPU."),
 )  # fmt: skip
 
 
@@ -170,10 +170,10 @@ def page() -> str:
     parts[0] += " `result.plot(NAME)`\ninto axes of your own. These were drawn when this page was built.\n"
     for entry in ENTRIES:
         parts.append(f"## {entry.title}\n\n    shapegcode {entry.command} --plots plots\n")
-        for name, said in entry.shown.items():
-            parts.append(f"`{name}`: {said}\n\n![{said}]({entry.folder}/{name}.png)\n")
-    for title, command, name, said in KEPT:
-        parts.append(f"## {title}\n\n    {command}\n\n{said}\n\n![{title}](../images/{name})\n")
+        for name, caption in entry.shown.items():
+            parts.append(f"`{name}`: {caption}\n\n![{caption}]({entry.folder}/{name}.png)\n")
+    for title, command, name, caption in KEPT:
+        parts.append(f"## {title}\n\n    {command}\n\n{caption}\n\n![{title}](../images/{name})\n")
     return "\n".join(parts)
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from importlib import resources
 
+from machine_page import key_tables
+
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool, materials
-from shapegcode.settings.describe import key_tables
 from shapegcode.settings.keys import toml
 
 STEEL_TOOL = """\

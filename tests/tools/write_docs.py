@@ -8,10 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import write_schemas
+from machine_page import machine_documentation
 from tool_files_page import file_documentation
 
 import shapegcode as sg
-from shapegcode.machine import key_documentation
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs"
 
@@ -93,7 +93,7 @@ def schema_documentation(*, linked: bool = False) -> str:
 
 
 PAGES: dict[str, Callable[[], str]] = {
-    "reference/machine.md": key_documentation,
+    "reference/machine.md": machine_documentation,
     "reference/tool_files.md": file_documentation,
     "reference/api.md": api_documentation,
     "reference/schemas.md": schema_documentation,

@@ -46,7 +46,7 @@ class ContourSolver {
   /// Error(argument) on an empty or not finite kernel or another smoothness.
   ContourSolver(std::vector<double> kernel, double smoothness);
 
-  /// Delay of the kernel's last tap: samples by which a correction acts beyond its own place.
+  /// Delay of the kernel's last tap: samples by which a correction acts beyond its own sample.
   [[nodiscard]] std::size_t reach() const noexcept { return kernel_.size() - 1; }
   [[nodiscard]] const std::vector<double>& kernel() const noexcept { return kernel_; }
 
@@ -68,7 +68,7 @@ class ContourSolver {
   /// Rows of the factor, band_+1 values each: l(i, i-band_) ... l(i, i-1), 1/l(i, i).
   std::vector<double> factor_;
   std::size_t factor_rows_ = 0;
-  bool settled_ = false;  // the last row stands for all that follow
+  bool is_settled_ = false;  // the last row stands for all that follow
   std::vector<double> work_;
   std::vector<double> own_factor_;  // with stiffness
 };
@@ -145,7 +145,7 @@ class RegionShaper {
   [[nodiscard]] bool is_withdrawn() const noexcept;
   /// Gives the region out from its begin again, with the feed that the search then finds; false, and nothing done, if
   /// no part was given out early.
-  bool begin_anew();
+  bool restart();
   /// Largest deviation in mm of what the target says shall follow the path, as far as the runs given out tell.
   [[nodiscard]] double largest_deviation_mm() const noexcept;
   /// Whether any run given out is slower than without a tolerance; without a target always.

@@ -29,8 +29,8 @@
 
 namespace shapegcode {
 
-inline constexpr std::size_t most_following_axes = 6;
-inline constexpr std::size_t most_controller_axes = axis_count + most_following_axes;
+inline constexpr std::size_t max_following_axes = 6;
+inline constexpr std::size_t max_controller_axes = axis_count + max_following_axes;
 
 /// Limits of an axis that follows the path, in its own unit (mm or degrees) and seconds.
 struct FollowingLimits {
@@ -54,7 +54,7 @@ struct ControllerSettings {
   /// What smoothing and shaper may cut off corners and arcs; none: as much as the limits let them.
   double contour_tolerance_mm = MotionLimits::none;
   /// Length of each of two moving averages over every axis, which spread what a corner or the begin of an arc asks for
-  /// at once. 0 = none: then such a place is passed at a crawl where acceleration or jerk are limited.
+  /// at once. 0 = none: then such a corner is passed at a crawl where acceleration or jerk are limited.
   double smoothing_time_s = 0.01;
   /// One that follows an axis is read in front of the smoothing. Its changes take up to a quarter of acceleration and
   /// jerk, and limit the feed where that would not be enough.
@@ -95,9 +95,9 @@ enum class Activity : std::uint8_t {
 /// A snapshot for a user interface.
 struct ControllerState {
   Activity activity = Activity::idle;
-  std::array<double, most_controller_axes> set_point{};  ///< last one given; mm, or the unit of a following axis
-  double speed_mm_per_s = 0.0;                           ///< along the path, before smoothing and shaper
-  double distance_mm = 0.0;                              ///< since the last rest
+  std::array<double, max_controller_axes> set_point{};  ///< last one given; mm, or the unit of a following axis
+  double speed_mm_per_s = 0.0;                          ///< along the path, before smoothing and shaper
+  double distance_mm = 0.0;                             ///< since the last rest
   double feed_override = 1.0;
   std::uint32_t line = 0;           ///< of the segment that is being run
   std::uint64_t segments_done = 0;  ///< run to their ends
@@ -123,8 +123,8 @@ class MotionController {
   MotionController& operator=(const MotionController&) = delete;
 
   /// The next segment, from the planning thread: never blocks, does not allocate. `following_end`: where the following
-  /// axes are at its end; they follow in proportion to the way. A segment of no length in X, Y and Z is one of the
-  /// following axes alone if they move: its length is then the largest of their ways, its feed that axis'.
+  /// axes are at its end; they follow in proportion to the path length. A segment of no length in X, Y and Z is one of
+  /// the following axes alone if they move: its length is then the largest of their ways, its feed that axis'.
   PushResult push(const Segment& segment, std::span<const double> following_end = {}) noexcept;
 
   /// The next set-point into `out` (axes() values), from the real-time thread: no allocation, no lock, no exception;

@@ -34,13 +34,13 @@ enum class BlockEnd : std::uint8_t {
 /// A controller without look-ahead: every block runs at its feed for its whole length, the next one follows at once.
 /// The acceleration filter comes after it (a moving average: block overlap). Real-time form: the work of a step grows
 /// with the logarithm of the number of blocks that end within a period.
-class BlockPlayer {
+class BlockInterpolator {
  public:
   /// `override_ratio` scales every feed. Throws Error(argument) on period or ratio <= 0, or a segment without feed.
-  BlockPlayer(Segments blocks, double period_s, BlockEnd block_end, double override_ratio = 1.0);
+  BlockInterpolator(Segments blocks, double period_s, BlockEnd block_end, double override_ratio = 1.0);
 
   /// Stop for so long behind a block, as where the block buffer runs empty: the set-points stay at its end, then the
-  /// next block follows. One pause per player, a later call takes the place of an earlier one. Under `ceil` whole
+  /// next block follows. One pause per interpolator, a later call replaces an earlier one. Under `ceil` whole
   /// periods, rounded up. Throws Error(argument) on a time that is negative or not finite, or a block that is
   /// over already or does not exist.
   void pause_after(std::size_t block, double seconds);
@@ -51,7 +51,7 @@ class BlockPlayer {
     if (!(elapsed_s < on_line_until_s_)) return step_on(position);
     elapsed_s_ = elapsed_s;
     const double along_mm = speed_mm_per_s_ * elapsed_s;
-    position = along_mm >= open_.length_mm ? open_.end_mm : open_.start_mm + along_mm / open_.length_mm * way_mm_;
+    position = along_mm >= open_.length_mm ? open_.end_mm : open_.start_mm + along_mm / open_.length_mm * travel_mm_;
     return true;
   }
   /// Passes over the set-points that follow on the same block before `until_mm` from its start: their number, and the
@@ -84,13 +84,13 @@ class BlockPlayer {
   bool leap(double slack) noexcept;
 
   Segments blocks_;
-  Segment open_;  // of the blocks, the one under way
+  Segment open_;  // of the blocks, the current one
   double period_s_;
   double ratio_;
   BlockEnd block_end_;
   std::size_t block_ = 0;
   // A line on which a set-point lies is passed without a look at the block's kind.
-  Vector3 way_mm_ = Vector3::Zero();
+  Vector3 travel_mm_ = Vector3::Zero();
   double speed_mm_per_s_ = 0.0;
   double on_line_until_s_ = 0.0;
   double elapsed_s_ = 0.0;   // since the open block began
@@ -105,8 +105,8 @@ class BlockPlayer {
 };
 
 /// Sum of block durations in s.
-[[nodiscard]] double play_duration_s(const Segments& blocks, double period_s, BlockEnd block_end,
-                                     double override_ratio = 1.0);
+[[nodiscard]] double blocks_duration_s(const Segments& blocks, double period_s, BlockEnd block_end,
+                                       double override_ratio = 1.0);
 
 /// Where the controller accelerates a cutting move.
 enum class MotionKind : std::uint8_t {
@@ -120,7 +120,7 @@ enum class FilterShape : std::uint8_t {
   exponential,  ///< geometric weights of the time constant
 };
 
-/// Way of a rapid (1401#1).
+/// Path of a rapid (1401#1).
 enum class RapidPath : std::uint8_t {
   linear,      ///< straight: the axis that needs longest sets the tangential rate
   non_linear,  ///< every axis at its own rate
@@ -132,7 +132,7 @@ enum class InPosition : std::uint8_t {
   servo_lag,  ///< until the position error of a first-order servo loop is within the width (1825, 1826)
 };
 
-/// Which cuts of a program are played as shaped blocks.
+/// Which cuts of a program run as shaped blocks.
 enum class ShapedRegions : std::uint8_t {
   marked,  ///< regions that the program says it of
   all,     ///< every cut
@@ -187,7 +187,7 @@ struct FanucModel {
   std::map<int, double> m_code_s;     ///< M codes with a time of their own
   std::vector<SpindleTime> spindle_start_s;  ///< from rest, by speed; it passes while the axes move; empty: none
   std::vector<SpindleTime> spindle_stop_s;   ///< likewise to rest
-  Vector3 unknown_move_s = Vector3::Zero();  ///< of a rapid of whose way the program does not tell start or end
+  Vector3 unknown_move_s = Vector3::Zero();  ///< of a rapid whose start or end the program does not give
 };
 
 /// The same controller while shaped blocks run: block by block at their feed, without look-ahead.
@@ -212,14 +212,14 @@ void check(const FanucModel& model);
 [[nodiscard]] double block_overlap_time_s(std::span<const double> lengths_mm, std::span<const double> feeds_mm_per_s,
                                           const FanucModel& model);
 
-/// Shape of one rapid in whole interpolation periods, per axis: the way is run off evenly in `travel` periods and
-/// smoothed by a moving average over `ramp` and one over `bell` periods, so it takes the sum of the three. A short
-/// rapid has travel = ramp.
+/// Shape of one rapid in whole interpolation periods, per axis: the distance is run at a constant rate in `travel`
+/// periods and smoothed by a moving average over `ramp` and one over `bell` periods, so it takes the sum of the three.
+/// A short rapid has travel = ramp.
 struct RapidShape {
   std::array<int, axis_count> travel = {};
   std::array<int, axis_count> ramp = {};
   int bell = 0;
-  double even_s = 0.0;         ///< what the way would take at its rate all along; non-linear: of the slowest axis
+  double even_s = 0.0;         ///< what the distance would take at that rate all along; non-linear: of the slowest axis
   double rate_mm_per_s = 0.0;  ///< reached; linear: tangential; non-linear: of the axis that takes longest
 };
 
@@ -241,10 +241,10 @@ struct RapidShape {
                                         const FanucModel& model);
 
 /// Set-points of a rapid, one per period, the start first. Its periods are found by trial, not by the closed form.
-class RapidPlayer {
+class RapidInterpolator {
  public:
   /// Throws Error(argument) on a model that `check` refuses.
-  RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model);
+  RapidInterpolator(const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model);
   /// Next set-point, X, Y and Z; false once the end was given.
   bool step(std::span<double> out) noexcept { return step_into(out, *this); }
   bool step(Vector3& position) noexcept;

@@ -90,7 +90,7 @@ class FirStream {
 /// A set of filters on one grid between which the input moves. Each increment of the input is replaced by the whole
 /// impulse train of the filter that is valid where the increment begins (scatter form). A train once begun is always
 /// completed: every increment keeps the zeros of its own filter, however often the filters change. Taking the output
-/// from another filter at a switch (gather form) would cut the trains that are under way.
+/// from another filter at a switch (gather form) would cut the trains that have begun.
 ///
 /// A *place* says which filter: place k is filter k of the set, place k + w (0 < w < 1) gives the share 1 - w of the
 /// increment to filter k and w to filter k + 1. A zero that both filters have stays; of zeros at different frequencies
@@ -138,7 +138,7 @@ class VaryingFirStream {
   [[nodiscard]] const VaryingFir& fir() const noexcept { return fir_; }
 
  private:
-  /// What of an axis' way is still to come, with the rounding that its sum lost.
+  /// What of an axis' travel is still to come, with the rounding that its sum lost.
   struct Lag {
     double sum = 0.0;
     double error = 0.0;

@@ -38,12 +38,12 @@ struct MinimalOptions {
 /// The minimal shapers of some modes, and what is known about there being others.
 struct MinimalShapers {
   std::vector<Shaper> shapers;    ///< ascending in duration, then in the times
-  bool complete = false;          ///< every box was settled: there is no other up to the largest duration
+  bool complete = false;          ///< every box was decided: there is no other up to the largest duration
   double complete_up_to_s = 0.0;  ///< the same up to this duration; 0: nothing is proven
   double max_duration_s = 0.0;    ///< the region: largest duration
   double max_abs_sum = 0.0;       ///< the region: largest sum |A_k|
   std::int64_t boxes = 0;         ///< boxes looked at
-  std::int64_t unresolved = 0;    ///< boxes too small to halve on that could not be settled (solutions not isolated)
+  std::int64_t unresolved = 0;    ///< boxes too small to halve on that could not be decided (solutions not isolated)
   int starts = 0;                 ///< Newton starts
   int converged = 0;              ///< how many of them reached a shaper in the region
   int found_once = 0;             ///< shapers that one start alone reached; found_once/converged estimates the share

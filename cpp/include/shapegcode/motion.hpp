@@ -63,7 +63,7 @@ struct FilterTolerance {
   double mean_deviation_s = 0.0;  ///< its mean absolute deviation from the mean delay
 };
 
-/// One stretch of constant tangential acceleration.
+/// One section of constant tangential acceleration.
 struct SpeedPhase {
   double start_s = 0.0;  ///< time at which it begins
   double duration_s = 0.0;
@@ -119,8 +119,8 @@ struct SpeedCaps {
 /// or a segment without feed, or caps that are not one per segment. `filter`: what follows, and its tolerance.
 ///
 /// Forward and backward passes over the segments' boundary speeds (the planner of grbl and of LinuxCNC, in v^2); then,
-/// under the constant-time law, ramps are stretched to the time constant where a neighbouring steady stretch leaves
-/// room. A jerk time smooths distance over time by a moving average of that length; the slow stretches around corners
+/// under the constant-time law, ramps are stretched to the time constant where a neighbouring steady section leaves
+/// room. A jerk time smooths distance over time by a moving average of that length; the slow sections around corners
 /// are lengthened by half of it on both sides, so that smoothing does not raise the speed at the corner.
 ///
 /// Behind a jerk time the acceleration of an axis may exceed its limit where segments of different direction meet at

@@ -92,8 +92,8 @@ struct ReaderOptions {
   char offset_memory = 'C';                                             ///< A, B or C: see SystemVariables
   std::map<int, double> retained_variables;                             ///< #500 ... #999
   CodeBindings bindings;
-  std::int64_t program = -1;        ///< O number to play of a file that holds several; -1: the first
-  std::int64_t program_index = -1;  ///< the same by its place among `list_programs`, whatever its name; -1: by number
+  std::int64_t program = -1;        ///< O number of the program to use, of a file that holds several; -1: the first
+  std::int64_t program_index = -1;  ///< the same by its index in `list_programs`, whatever its name; -1: by number
   std::function<std::optional<SourceText>(std::int64_t)> load_program;  ///< programs that the file does not hold
   std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not looked into
   int subprogram_nesting = 10;
@@ -109,7 +109,7 @@ struct ReaderOptions {
   std::vector<std::uint32_t> probe_lines;
 };
 
-/// Something to tell the user about one place of the text.
+/// Something to tell the user about one line of the text.
 struct Finding {
   std::uint32_t line = 0;
   std::string message;
@@ -153,20 +153,20 @@ struct Region {
   std::uint32_t blocks = 0;        ///< source blocks with a cutting move
 };
 
-/// A move or a wait outside of the regions, for the clock only.
+/// A move or a wait outside of the regions, for the cycle time only.
 struct OtherMove {
   Segment segment;       ///< axes of unknown position stay where they are
   double dwell_s = 0.0;  ///< a wait instead of a move when > 0
 };
 
-/// M, S and T words of one block: what the clock may charge for, and which tool is in use.
+/// M, S and T words of one block: what may take cycle time, and which tool is in use.
 struct MachineFunction {
   std::array<int, 6> m_codes = {};
   int m_count = 0;
   std::int64_t tool = -1;             ///< T, -1 if the block has none
   double spindle_rev_per_min = -1.0;  ///< S, -1 if the block has none
-  /// Axes that the block moves in rapid on a way of which start or end is not known (behind M06, G28, G30, G53).
-  std::array<bool, axis_count> unknown_way = {false, false, false};
+  /// Axes that the block moves in rapid from or to a position that is not known (behind M06, G28, G30, G53).
+  std::array<bool, axis_count> unknown_move = {false, false, false};
 };
 
 /// Where a rapid ends, or a cutting move whose path is not known.

@@ -30,7 +30,7 @@
 
 namespace shapegcode {
 
-/// A path from rest to rest as a control plays it: look-ahead over the whole of it at the start, then one set-point per
+/// A path from rest to rest as a control runs it: look-ahead over the whole of it at the start, then one set-point per
 /// period, through a shaper whose zeros lie on the modes exactly. `step` is real-time safe: no allocation, no
 /// exception, no lock, bounded work.
 class ShapedMotion {

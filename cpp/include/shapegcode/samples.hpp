@@ -7,7 +7,7 @@
 
 namespace shapegcode {
 
-/// Number of linear axes that the core plays: X, Y, Z.
+/// Number of linear axes of the core: X, Y, Z.
 inline constexpr int axis_count = 3;
 
 using Vector3 = Eigen::Vector3d;
@@ -18,11 +18,11 @@ using Vector3 = Eigen::Vector3d;
   return {position.data(), axis_count};
 }
 
-/// `step` of a player of positions into memory of the caller's: X, Y and Z.
-template <class Player>
-bool step_into(std::span<double> out, Player& player) noexcept {
+/// `step` of an interpolator into memory of the caller's: X, Y and Z.
+template <class PositionSource>
+bool step_into(std::span<double> out, PositionSource& source) noexcept {
   Vector3 position = Vector3::Zero();
-  const bool moving = player.step(position);
+  const bool moving = source.step(position);
   std::copy_n(position.data(), axis_count, out.begin());
   return moving;
 }

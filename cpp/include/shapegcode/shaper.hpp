@@ -81,11 +81,11 @@ inline constexpr double grid_largest_residual = 1e-10;
 [[nodiscard]] Shaper zv_on_grid(const Mode& mode, double period_s);
 
 /// Most zeros that `repeated_zv` places at a mode.
-inline constexpr int most_repeated_zeros = 20;
+inline constexpr int max_repeated_zeros = 20;
 
 /// The ZV shaper in series with itself: `zeros` zeros at the mode, so that V and its first `zeros`-1 derivatives with
 /// respect to the frequency vanish there; 1 is ZV, 2 ZVD, 3 ZVDD. `zeros`+1 non-negative taps, half a damped period
-/// apart. Throws Error(argument) as `pole` does, or if `zeros` is not from 1 to `most_repeated_zeros`. Source: Singer
+/// apart. Throws Error(argument) as `pole` does, or if `zeros` is not from 1 to `max_repeated_zeros`. Source: Singer
 /// and Seering 1990.
 [[nodiscard]] Shaper repeated_zv(const Mode& mode, int zeros);
 
@@ -115,7 +115,7 @@ inline constexpr int most_repeated_zeros = 20;
 [[nodiscard]] Shaper convolved_zv(std::span<const Mode> modes);
 
 /// Most humps of `extra_insensitive`.
-inline constexpr int most_humps = 3;
+inline constexpr int max_humps = 3;
 
 /// An extra-insensitive shaper and where its residual vanishes and peaks. The frequencies are natural frequencies of
 /// modes with the damping ratio of the design.
@@ -126,7 +126,7 @@ struct ExtraInsensitive {
 };
 
 /// Extra-insensitive shaper of one mode: non-negative taps, `humps`+2 of them, whose residual between its outermost
-/// zeros rises to exactly `vibration_limit` (above 0, below 1) at each of `humps` (1 to `most_humps`) maxima. With an
+/// zeros rises to exactly `vibration_limit` (above 0, below 1) at each of `humps` (1 to `max_humps`) maxima. With an
 /// odd number of humps the middle one lies at the mode, with two the middle zero does.
 ///
 /// Without damping it is the Dolph-Chebyshev window over half periods, in closed form; with damping the conditions

@@ -38,11 +38,12 @@ struct FitOptions {
   /// ends, half an increment, is all that counts.
   double merge_tolerance_increments = 0.5;
   /// Longest block. 1: all blocks last the same time, so that whatever a control adds to each of them at another feed
-  /// override is the same for all, and stretches the motion evenly.
+  /// override is the same for all, and sections the motion evenly.
   std::uint32_t most_periods = std::numeric_limits<std::uint32_t>::max();
-  /// Way per interpolation period up to which blocks may be longer than that: what a control adds there is no more.
+  /// Distance per interpolation period up to which blocks may be longer than that: what a control adds there is no
+  /// more.
   double equal_above_increments = 1.0;
-  /// Likewise blocks so far from both ends of a steady stretch: what they excite dies away before it. 0: none.
+  /// Likewise blocks so far from both ends of a steady section: what they excite dies away before it. 0: none.
   std::uint32_t equal_periods = 0;
   double arc_min_chord_mm = 0.02;  ///< shorter pieces are lines
   /// What the last block must be, so that the modal motion code behind it is the original's: a control refuses G02 or
@@ -58,7 +59,7 @@ struct FitOptions {
   std::uint32_t lent_periods = 0;  ///< time that the blocks before did not last (see fit_blocks)
 };
 
-/// Places of a shaped command, as ascending period indices.
+/// Positions within a shaped command, as ascending period indices.
 struct FitBorders {
   std::span<const std::uint32_t> breaks = {};  ///< a block must end there (program marks)
   std::span<const std::uint32_t> rests = {};   ///< the command is at rest there, besides its end
@@ -79,7 +80,7 @@ struct FitBorders {
                                                   std::span<const std::int8_t> arc_normal, const FitBorders& borders,
                                                   const FitOptions& options, std::uint32_t* left_periods = nullptr);
 
-/// What stood at a place of the original: written before the block that begins there.
+/// What stood at a position of the original: written before the block that begins there.
 struct BlockMark {
   std::uint32_t period = 0;    ///< block period at which it stood
   std::int32_t n_number = -1;  ///< -1: none
@@ -109,9 +110,9 @@ struct WrittenBlocks {
                                          std::array<std::int64_t, axis_count> start, std::span<const BlockMark> marks,
                                          const WriterOptions& options);
 
-/// Largest amount per second in any stretch of a duration; each block's amount is spread evenly over it. `amounts`: of
-/// each block, such as its characters; empty: one of each. Durations >= 0; all blocks together are the stretch if they
-/// last less. 0 where nothing lasts.
+/// Largest amount per second in any time window of a duration; each block's amount is spread evenly over it. `amounts`:
+/// of each block, such as its characters; empty: one of each. Durations >= 0; all blocks together are the window if
+/// they last less. 0 where nothing lasts.
 [[nodiscard]] double busiest_per_s(std::span<const double> durations_s, std::span<const double> amounts,
                                    double stretch_s) noexcept;
 
@@ -142,12 +143,12 @@ struct RefedRegion {
 [[nodiscard]] std::vector<bool> divisible_segments(const Program& program, const Region& region,
                                                    const FeedWriterOptions& options);
 
-/// The region's lines with the feeds of `stretches`; comments, numbers, spaces and everything else stay as they are.
+/// The region's lines with the feeds of `sections`; comments, numbers, spaces and everything else stay as they are.
 /// F stands where the feed changes and where it stood; where asked for, a last line with F alone gives the modal feed
-/// back that the original leaves behind. Where a stretch ends within a divisible block, the block is divided: the first
+/// back that the original leaves behind. Where a section ends within a divisible block, the block is divided: the first
 /// part keeps the words of the original, ends lie on the least increment (so they are off the path by half of it at
-/// most). Throws Error(argument) if the stretches do not cover the path.
+/// most). Throws Error(argument) if the sections do not cover the path.
 [[nodiscard]] RefedRegion write_feeds(const Program& program, const Region& region,
-                                      std::span<const FeedStretch> stretches, const FeedWriterOptions& options);
+                                      std::span<const FeedStretch> sections, const FeedWriterOptions& options);
 
 }  // namespace shapegcode

@@ -28,9 +28,9 @@ void require_period(double period_s, std::string_view name = "interpolation peri
 /// possible": what is not checked before it becomes a whole number may become any.
 [[nodiscard]] std::int64_t require_count(double count, double most, std::string_view what, std::string_view things);
 
-/// Set-points of one run that can be numbered and, in principle, played.
-inline constexpr double most_set_points = 4e9;
+/// Set-points of one run that can be numbered and, in principle, computed.
+inline constexpr double max_set_points = 4e9;
 /// Samples over which a filter may reach.
-inline constexpr double most_filter_samples = 1e7;
+inline constexpr double max_filter_samples = 1e7;
 
 }  // namespace shapegcode

@@ -32,13 +32,13 @@ struct shapegcode_controller {
   explicit shapegcode_controller(const shapegcode::ControllerSettings& settings) : control(settings) {}
 
   MotionController control;
-  std::array<double, shapegcode::most_controller_axes> end{};
+  std::array<double, shapegcode::max_controller_axes> end{};
 };
 
 namespace {
 
 // By how much a sweep may miss the end of its arc.
-constexpr double most_sweep_error_mm = 0.01;
+constexpr double max_sweep_error_mm = 0.01;
 // What the first version of the struct holds.
 constexpr std::size_t first_state_size = offsetof(shapegcode_state, line) + sizeof(std::uint32_t);
 
@@ -135,7 +135,7 @@ shapegcode_status arc_of(const Vector3& start, const Vector3& end, const shapegc
   segment = shapegcode::make_arc(start, end, centre, arc.sweep_rad, arc.normal, feed_mm_per_s, line);
   const double missing_rad = shapegcode::missing_sweep_rad(segment);
   const double sweep_rad = arc.sweep_rad + missing_rad;
-  if (std::abs(missing_rad) * segment.end_radius_mm > most_sweep_error_mm || sweep_rad * arc.sweep_rad <= 0.0) {
+  if (std::abs(missing_rad) * segment.end_radius_mm > max_sweep_error_mm || sweep_rad * arc.sweep_rad <= 0.0) {
     return SHAPEGCODE_NO_ARC;
   }
   segment = shapegcode::make_arc(start, end, centre, sweep_rad, arc.normal, feed_mm_per_s, line);

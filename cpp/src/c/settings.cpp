@@ -16,8 +16,8 @@
 namespace shapegcode::c {
 namespace {
 
-static_assert(SHAPEGCODE_MOST_AXES == most_controller_axes);
-static_assert(SHAPEGCODE_MOST_FOLLOWING_AXES == most_following_axes);
+static_assert(SHAPEGCODE_MOST_AXES == max_controller_axes);
+static_assert(SHAPEGCODE_MOST_FOLLOWING_AXES == max_following_axes);
 
 // What the first version of the struct holds.
 constexpr std::size_t first_settings_size = offsetof(shapegcode_settings, queue) + sizeof(std::size_t);
@@ -98,8 +98,8 @@ Fir fir_of(const shapegcode_shaper& shaper) {
 ControllerShaper shaper_of(const shapegcode_settings& from) {
   if (from.shaper_count == 0) return ControllerSettings{}.shaper;
   if (from.shapers == nullptr) detail::refuse("shapers is NULL and shaper_count is {}", from.shaper_count);
-  if (from.shaper_count > most_controller_axes) {
-    detail::refuse("shaper_count is {}, at most {} are possible", from.shaper_count, most_controller_axes);
+  if (from.shaper_count > max_controller_axes) {
+    detail::refuse("shaper_count is {}, at most {} are possible", from.shaper_count, max_controller_axes);
   }
   std::vector<Fir> each;
   for (const shapegcode_shaper& shaper : std::span(from.shapers, from.shaper_count)) each.push_back(fir_of(shaper));
@@ -117,8 +117,8 @@ ControllerSettings settings_of(const shapegcode_settings& given) {
   ControllerSettings settings;
   settings.period_s = from.period_s;
   settings.limits = limits_of(from.limits);
-  if (from.following_count > most_following_axes) {
-    detail::refuse("following_count is {}, at most {} are possible", from.following_count, most_following_axes);
+  if (from.following_count > max_following_axes) {
+    detail::refuse("following_count is {}, at most {} are possible", from.following_count, max_following_axes);
   }
   for (const shapegcode_following_limits& axis : std::span(from.following, from.following_count)) {
     settings.following.push_back({axis.max_feed, axis.max_acceleration, axis.max_jerk});

@@ -15,7 +15,7 @@ namespace shapegcode {
 namespace {
 
 // Relative change of a factor's row below which it stands for all that follow.
-constexpr double settled_change = 1e-13;
+constexpr double settling_change = 1e-13;
 constexpr std::array<double, 3> second_difference{1.0, -2.0, 1.0};
 
 // l(i, i-j) of a row of `band`+1 values.
@@ -92,17 +92,18 @@ ContourSolver::ContourSolver(std::vector<double> kernel, double smoothness)
 
 void ContourSolver::extend_factor(std::size_t rows) {
   const std::size_t width = band_ + 1;
-  while (!settled_ && factor_rows_ < rows) {
+  while (!is_settled_ && factor_rows_ < rows) {
     factor_.resize((factor_rows_ + 1) * width);
     double* row = factor_.data() + factor_rows_ * width;
     std::reverse_copy(column_.begin(), column_.end(), row);
     factor_row(row, band_, factor_rows_);
     if (factor_rows_ > band_) {
+      const double* before = row - width;
       double change = 0.0;
       for (std::size_t j = 0; j < width; ++j) {
-        change = std::max(change, std::abs(row[j] - row[j - width]));
+        change = std::max(change, std::abs(row[j] - before[j]));
       }
-      settled_ = change <= settled_change * row[band_];
+      is_settled_ = change <= settling_change * row[band_];
     }
     ++factor_rows_;
   }

@@ -23,11 +23,11 @@ constexpr double creep_share = 0.02;
 // Curves and lines are never slowed below this share of their speed: what then still deviates is not the feed's doing.
 constexpr double slowest_share = 0.05;
 // A longer run is shaped once more when it is given out: so much memory (100 MB) is not spent on it.
-constexpr std::size_t most_rows_kept = std::size_t{1} << 22U;
+constexpr std::size_t max_rows_kept = std::size_t{1} << 22U;
 constexpr float none = std::numeric_limits<float>::infinity();
 
-// Speed at which the next round may pass a place that was passed at `speed` with `deviation`. Deviation grows with the
-// square of the speed on curves, and at least with the speed at corners.
+// Speed at which the next round may pass a position that was passed at `speed` with `deviation`. Deviation grows with
+// the square of the speed on curves, and at least with the speed at corners.
 double next_speed(double speed, double deviation, double tolerance, bool curve) noexcept {
   const double share = aim * tolerance / std::max(deviation, 1e-3 * tolerance);
   return speed * (curve ? std::sqrt(share) : share);
@@ -42,7 +42,7 @@ FeedSearch::FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& lim
       filter_(filter),
       steps_per_half_(steps_per_half),
       tolerance_(tolerance_mm),
-      least_feed_(least_feed_mm_per_s),
+      min_feed_(least_feed_mm_per_s),
       caps_{std::vector<float>(path_->size(), none), std::vector<float>(path_->size(), none)} {}
 
 void FeedSearch::begin_round() {
@@ -65,7 +65,7 @@ bool FeedSearch::next(Vector3& position) {
 PlannedRun FeedSearch::measured() {
   if (!shaper_) begin_round();
   const std::size_t rows = 2 * static_cast<std::size_t>(shaper_->periods()) + 1;
-  const bool keeps = keeps_rows_ && row_ == 0 && rows <= most_rows_kept;
+  const bool keeps = keeps_rows_ && row_ == 0 && rows <= max_rows_kept;
   Vector3 position;
   while (row_ < rows) {
     const std::size_t row = row_;
@@ -167,7 +167,7 @@ bool FeedSearch::adjust(bool raise) {
 }
 
 double FeedSearch::slowest(double speed) const noexcept {
-  return std::min(speed, std::max(least_feed_, slowest_share * speed));
+  return std::min(speed, std::max(min_feed_, slowest_share * speed));
 }
 
 // Where neither arcs nor corners are to blame it is a ramp on a line across the axes, which bends the response of

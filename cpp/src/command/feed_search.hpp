@@ -75,11 +75,11 @@ class FeedSearch {
   const RunFilter& filter_;
   std::size_t steps_per_half_;
   double tolerance_;
-  double least_feed_;
+  double min_feed_;
   SpeedCaps caps_;
   RunDeviation deviation_;
   std::vector<std::size_t> stops_;
-  PlannedRun plan_;  // of the round under way, with its shaper
+  PlannedRun plan_;  // of the current round, with its shaper
   std::unique_ptr<RunShaper> shaper_;
   std::size_t row_ = 0;  // rows of it that were measured
   bool keeps_rows_ = true;

@@ -17,7 +17,7 @@ inline constexpr double corner_change = 0.0872;
 class Corners {
  public:
   explicit Corners(const Path& path);
-  /// Whether there is a corner on the way from one segment to a later one.
+  /// Whether there is a corner between one segment and a later one.
   [[nodiscard]] bool passed(std::size_t before, std::size_t after) const noexcept;
 
  private:

@@ -107,7 +107,7 @@ void RunCorrector::correct(std::size_t begin, std::size_t end, std::size_t accep
   }
 }
 
-// Windows are short against the way between two shapers that are followed: the nearest one serves.
+// Windows are short against the distance between two shapers that are followed: the nearest one serves.
 ContourSolver& RunCorrector::solver(std::size_t begin, std::size_t end, std::size_t axis) {
   return solvers_[static_cast<std::size_t>(std::lround(rows_.place(begin + (end - begin) / 2)))][axis];
 }

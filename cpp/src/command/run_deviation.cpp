@@ -65,7 +65,7 @@ void DeviationMeter::measure(std::size_t row) {
   const Vector3& left_here = left(row);
   const Vector3& tangent = rows_.tangent(row);
   double size = (left_here - tangent.dot(left_here) * tangent).norm();
-  // At a corner the way by which the corner itself is missed counts.
+  // At a corner the distance by which the corner itself is missed counts.
   const auto at = static_cast<std::ptrdiff_t>(row);
   const std::uint32_t behind = rows_.segment(at - static_cast<std::ptrdiff_t>(around));
   const std::uint32_t before = rows_.segment(at - static_cast<std::ptrdiff_t>(around) - 1);

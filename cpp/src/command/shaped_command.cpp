@@ -49,7 +49,7 @@ void put(const std::vector<Vector3>& grid, const std::vector<Vector3>& middle, c
   }
 }
 
-// A planned run given out row by row: as it was kept when it was planned, or shaped anew, or while it is measured.
+// A planned run given out row by row: as it was kept when it was planned, or shaped again, or while it is measured.
 class ShapedRun {
  public:
   // The first round of a search, which stays the caller's.
@@ -110,7 +110,7 @@ struct RegionShaper::State {
   [[nodiscard]] std::unique_ptr<FeedSearch> search_of(const std::shared_ptr<const Path>& part) const;
   [[nodiscard]] PlannedRun plan_run();
   [[nodiscard]] PlannedTolerance plan_only(SpeedCaps& caps);
-  void begin_anew();
+  void restart();
   void note_marks(const PlannedRun& run);
   [[nodiscard]] double share() const noexcept;
 
@@ -266,7 +266,7 @@ PlannedTolerance RegionShaper::State::plan_only(SpeedCaps& caps) {
   return planned;
 }
 
-void RegionShaper::State::begin_anew() {
+void RegionShaper::State::restart() {
   run_.reset();
   ranges_ = {{0, path_->size()}};
   early_ = withdrawn_ = is_slowed_ = false;
@@ -372,9 +372,9 @@ void RegionShaper::begin_early() noexcept {
 
 bool RegionShaper::is_withdrawn() const noexcept { return state_->withdrawn_; }
 
-bool RegionShaper::begin_anew() {
+bool RegionShaper::restart() {
   if (!state_->early_) return false;
-  state_->begin_anew();
+  state_->restart();
   return true;
 }
 

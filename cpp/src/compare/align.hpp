@@ -12,7 +12,7 @@ namespace shapegcode::detail {
 using Matches = std::vector<std::pair<std::size_t, std::size_t>>;
 
 /// The greedy algorithm of Myers (An O(ND) difference algorithm, 1986) between [0, n) and [0, m), `equal(a, b)` asked
-/// of entries. Behind every `most_edits` edits what reaches furthest is taken for good, so that lists with little in
+/// of entries. Behind every `max_edits` edits what reaches furthest is taken for good, so that lists with little in
 /// common cost time and memory in proportion to their length.
 template <typename Equal>
 class Alignment {
@@ -28,7 +28,7 @@ class Alignment {
   }
 
  private:
-  static constexpr std::int64_t most_edits = 512;
+  static constexpr std::int64_t max_edits = 512;
   static constexpr std::int64_t none = -1;
   using Reach = std::vector<std::int64_t>;  // by diagonal a - b from -d - 2 to d + 2: how far along the first list
 
@@ -61,7 +61,7 @@ class Alignment {
       }
       reached.push_back(std::move(now));
       const std::int64_t x = reached.back()[static_cast<std::size_t>(best + d + 2)];
-      if ((x == n && x - best == m) || d == most_edits) {
+      if ((x == n && x - best == m) || d == max_edits) {
         take(reached, best, x);
         return;
       }

@@ -25,7 +25,7 @@ constexpr double likely_length = 0.1;   // corners that are cut shorten a path
 constexpr double likely_length_mm = 1.0;
 constexpr std::size_t looked_ahead = 64;  // for a partner among what is left
 constexpr std::size_t worth_a_thread = 10'000;
-constexpr std::size_t most_pairs = 4'000'000;  // looked at for what stands elsewhere
+constexpr std::size_t max_pairs = 4'000'000;  // looked at for what stands elsewhere
 
 std::size_t of_kind(ComparedKind kind) noexcept { return static_cast<std::size_t>(kind); }
 
@@ -57,8 +57,8 @@ class Comparer {
     const bool inch = events_[0].units == 20 || events_[1].units == 20;
     const bool other_units = events_[0].units != events_[1].units;
     // An axis that a block does not name stays where a cut has left it: rounded.
-    same_position_mm_ = 0.6 * least_increment(options.reader, 21) +
-                        (inch ? 0.5 * mm_per_inch * least_increment(options.reader, 20) : 0.0) +
+    same_position_mm_ = 0.6 * min_increment(options.reader, 21) +
+                        (inch ? 0.5 * mm_per_inch * min_increment(options.reader, 20) : 0.0) +
                         (other_units ? 1e-3 : 0.0);
   }
 
@@ -106,7 +106,7 @@ class Comparer {
     if (a.kind == ComparedKind::cuts) {
       return (a.cut == no_cut) == (b.cut == no_cut) && (a.cut == no_cut || likely_same(cut(0, a), cut(1, b)));
     }
-    // An axis that neither names stays where something before has left it, and that is told there.
+    // An axis that neither names stays where something before has left it, and that is reported there.
     const int named = a.named | b.named;
     const bool shaped = a.cut != no_cut || b.cut != no_cut;
     if (!shaped && (a.known & named) != (b.known & named)) {
@@ -137,7 +137,7 @@ class Comparer {
         if (partners_[side][i] == nobody && wanted(all(side)[i])) left[side].push_back(i);
       }
     }
-    if (left[0].size() * left[1].size() > most_pairs) {
+    if (left[0].size() * left[1].size() > max_pairs) {
       return;
     }
     for (const std::size_t a : left[0]) {
@@ -311,14 +311,14 @@ class Comparer {
     const std::pair<CutModes, CutModes> pair(ours.modes, theirs.modes);
     if (ours.modes == theirs.modes) {
       unchanged(ComparedKind::modal);
-    } else if (pair != told_modes_) {
+    } else if (pair != reported_modes_) {
       const auto text = [](const CutModes& modes) {
         return fmt::format("G{} G{} G{} G{} G{}", modes.plane, modes.distance, modes.feed_mode, modes.exact_stop,
                            modes.cycle_return);
       };
       add(ComparedKind::modal, from, to, text(ours.modes), text(theirs.modes));
     }
-    told_modes_ = pair;
+    reported_modes_ = pair;
     ++result_.counts[of_kind(ComparedKind::modal)].original;
     ++result_.counts[of_kind(ComparedKind::modal)].emitted;
   }
@@ -369,7 +369,7 @@ class Comparer {
   std::array<Events, 2> events_;
   std::array<std::vector<std::size_t>, 2> partners_;  // of each event, in the other program
   std::vector<std::size_t> elsewhere_;                // of the first program, ascending
-  std::pair<CutModes, CutModes> told_modes_;
+  std::pair<CutModes, CutModes> reported_modes_;
   double same_position_mm_ = 0.0;
   ProgramComparison result_;
 };

@@ -69,9 +69,9 @@ class CutCollector {
  public:
   CutCollector(const Program& program, Events& events) : moves_(program), events_(events) {}
 
-  /// The moves of a line: of the open cut, or of a new one with these modes, whose event `begun()` gives.
-  template <typename Begun>
-  void add(std::uint32_t line, const CutModes& modes, const Begun& begun) {
+  /// The moves of a line: of the open cut, or of a new one with these modes, whose event `make_event()` gives.
+  template <typename MakeEvent>
+  void add(std::uint32_t line, const CutModes& modes, const MakeEvent& make_event) {
     while (moves_.next(line)) {
       const Segment move = moves_.move();
       if (open_ && (move.start_mm - events_.cuts.back().end_mm).norm() > joined_mm) {
@@ -79,7 +79,7 @@ class CutCollector {
       }
       if (!open_) {
         opened_ = events_.all.size();
-        events_.all.push_back(begun());
+        events_.all.push_back(make_event());
         events_.all.back().cut = events_.cuts.size();
         events_.cuts.emplace_back();
         events_.cuts.back().modes = modes;

@@ -12,7 +12,7 @@ constexpr double same_position_mm = 1e-9;
 constexpr double looked_at_mm = 0.2;
 constexpr double looked_at_rad = 0.035;
 constexpr double same_feed = 1e-6;
-constexpr double same_stretch_mm = 0.05;  // shaping and rounding move the place of a change of feed
+constexpr double same_section_mm = 0.05;  // shaping and rounding move the position of a change of feed
 
 // The moves of a cut one after another.
 class Moves {
@@ -46,8 +46,8 @@ bool same_move(const Segment& one, const Segment& other) {
           std::abs(one.start_radius_mm - other.start_radius_mm) <= same_position_mm);
 }
 
-bool same_stretch(double one_mm, double other_mm) {
-  return std::abs(one_mm - other_mm) <= same_stretch_mm + 1e-3 * one_mm;
+bool same_section(double one_mm, double other_mm) {
+  return std::abs(one_mm - other_mm) <= same_section_mm + 1e-3 * one_mm;
 }
 
 Path whole_path(const Cut& cut) {
@@ -59,23 +59,23 @@ Path whole_path(const Cut& cut) {
   return builder.path();
 }
 
-// A stretch of one feed.
-struct Stretch {
+// A section of one feed.
+struct Section {
   double feed_mm_per_s = 0.0;
   double length_mm = 0.0;
   std::uint32_t line = 0;
 };
 
-class Stretches {
+class Sections {
  public:
-  explicit Stretches(const Cut& cut) : moves_(cut) { more_ = moves_.next(move_); }
-  bool next(Stretch& stretch) {
+  explicit Sections(const Cut& cut) : moves_(cut) { more_ = moves_.next(move_); }
+  bool next(Section& section) {
     if (!more_) {
       return false;
     }
-    stretch = {move_.feed_mm_per_s, 0.0, move_.line};
-    while (more_ && std::abs(move_.feed_mm_per_s - stretch.feed_mm_per_s) <= same_feed * stretch.feed_mm_per_s) {
-      stretch.length_mm += move_.length_mm;
+    section = {move_.feed_mm_per_s, 0.0, move_.line};
+    while (more_ && std::abs(move_.feed_mm_per_s - section.feed_mm_per_s) <= same_feed * section.feed_mm_per_s) {
+      section.length_mm += move_.length_mm;
       more_ = moves_.next(move_);
     }
     return true;
@@ -142,20 +142,20 @@ PathDistance path_distance(const Cut& moving, const Cut& still) {
 }
 
 std::optional<FeedDifference> feed_difference(const Cut& original, const Cut& emitted) {
-  Stretches ours(original);
-  Stretches theirs(emitted);
-  // Of a path that is another one the stretches are too: that is a difference of the paths.
-  const bool same_length = same_stretch(original.length_mm, emitted.length_mm);
+  Sections ours(original);
+  Sections theirs(emitted);
+  // Of a path that is another one the sections are too: that is a difference of the paths.
+  const bool same_length = same_section(original.length_mm, emitted.length_mm);
   for (;;) {
-    Stretch a;
-    Stretch b;
+    Section a;
+    Section b;
     const bool has_a = ours.next(a);
     const bool has_b = theirs.next(b);
     if (!has_a && !has_b) {
       return std::nullopt;
     }
     const bool same = has_a && has_b && std::abs(a.feed_mm_per_s - b.feed_mm_per_s) <= same_feed * a.feed_mm_per_s &&
-                      (!same_length || same_stretch(a.length_mm, b.length_mm));
+                      (!same_length || same_section(a.length_mm, b.length_mm));
     if (!same) {
       return FeedDifference{a.line, b.line, a.feed_mm_per_s, b.feed_mm_per_s};
     }

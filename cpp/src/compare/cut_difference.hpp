@@ -22,7 +22,7 @@ struct PathDistance {
 /// it is near another part of the path only, that far from the start where it should be, the part that is meant counts.
 [[nodiscard]] PathDistance path_distance(const Cut& moving, const Cut& still);
 
-/// The first stretch whose programmed feed differs, as moves of either cut.
+/// The first section whose programmed feed differs, as moves of either cut.
 struct FeedDifference {
   std::uint32_t original_line = 0;
   std::uint32_t emitted_line = 0;

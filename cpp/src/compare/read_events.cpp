@@ -374,7 +374,7 @@ class EventReader {
       if (words().has(letters[i])) {
         const Word& word = words()[letters[i]];
         const bool counts = !word.has_point && !options_.reader.calculator_decimal_point;
-        event.position_mm[i] = word.value * unit_mm(units_) * (counts ? least_increment(options_.reader, units_) : 1.0);
+        event.position_mm[i] = word.value * unit_mm(units_) * (counts ? min_increment(options_.reader, units_) : 1.0);
         event.known = event.named = static_cast<std::uint8_t>(event.known | (1U << i));
       }
     }
@@ -454,9 +454,9 @@ class EventReader {
       return;
     }
     cuts_.add(line_, entry_, [this] {
-      Event begun = event(in_rapid_ ? ComparedKind::rapids : ComparedKind::cuts, in_rapid_ ? "G00" : "");
-      begun.known = in_rapid_ ? 7 : 0;
-      return begun;
+      Event opened = event(in_rapid_ ? ComparedKind::rapids : ComparedKind::cuts, in_rapid_ ? "G00" : "");
+      opened.known = in_rapid_ ? 7 : 0;
+      return opened;
     });
     if (in_rapid_ && cuts_.is_open()) {
       const Vector3& end = events_.cuts.back().end_mm;

@@ -20,7 +20,7 @@ ChangeCost cost_of_change(std::span<const Fir> chains, std::span<const double> p
   const double reach_mm = fastest_mm_per_s * static_cast<double>(longest) * period_s;
   ChangeCost cost;
   for (std::size_t first = 0; first + 1 < chains.size(); ++first) {
-    // The filters of all places that the axis can pass while one increment is under way, if it starts behind the first.
+    // The filters of all positions that the axis can pass during one increment, if it starts behind the first.
     std::size_t last = first + 1;
     while (last + 1 < chains.size() && position_mm[last] < position_mm[first + 1] + reach_mm) ++last;
     ChangeCost here{0.0, 0.0, 0.0};
@@ -31,10 +31,10 @@ ChangeCost cost_of_change(std::span<const Fir> chains, std::span<const double> p
       for (std::size_t k = first; k <= last; ++k) {
         tap = std::max(tap, std::abs(tap_of(chains[k], delay)));
         if (k == last) break;
-        const double way_mm = position_mm[k + 1] - position_mm[k];
-        const double now = (tap_of(chains[k + 1], delay) - tap_of(chains[k], delay)) / way_mm;
+        const double travel_mm = position_mm[k + 1] - position_mm[k];
+        const double now = (tap_of(chains[k + 1], delay) - tap_of(chains[k], delay)) / travel_mm;
         const double before =
-            delay > 0 ? (tap_of(chains[k + 1], delay - 1) - tap_of(chains[k], delay - 1)) / way_mm : 0.0;
+            delay > 0 ? (tap_of(chains[k + 1], delay - 1) - tap_of(chains[k], delay - 1)) / travel_mm : 0.0;
         slope = std::max(slope, std::abs(now));
         step = std::max(step, std::abs(now - before));
       }

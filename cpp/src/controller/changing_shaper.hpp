@@ -8,8 +8,8 @@
 
 namespace shapegcode {
 
-/// An increment keeps the filter of the place where it begins. So an axis of speed v has, behind filters h(x) that
-/// change along the way x, besides the response to its own acceleration one to v dx/dt with the taps dh/dx: at most
+/// An increment keeps the filter of the position where it begins. So an axis of speed v has, behind filters h(x) that
+/// change along the path x, besides the response to its own acceleration one to v dx/dt with the taps dh/dx: at most
 /// `acceleration_per_mm` v dx/dt, and of jerk `jerk_per_mm_s` v dx/dt and `acceleration_per_mm` dx/dt times the
 /// acceleration before the filters.
 struct ChangeCost {

@@ -84,8 +84,8 @@ void Intake::look_at(QueuedSegment& entry) const noexcept {
   }
   entry.fastest = std::min(fastest_speed(segment, limits_, tolerance_), entry.hard_limit);
   entry.corner = MotionLimits::none;
-  for (const bool eased : {false, true}) {
-    entry.line_acceleration[eased ? 1 : 0] = acceleration_along(entry, 0.0, limits_, eased);
+  for (const bool reduced : {false, true}) {
+    entry.line_acceleration[reduced ? 1 : 0] = acceleration_along(entry, 0.0, limits_, reduced);
   }
   entry.jump = Zone{};
   entry.passed = 0.0;  // from rest

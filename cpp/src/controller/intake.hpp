@@ -35,7 +35,7 @@ class Intake {
   double steepest_;
   double jump_time_s_;
   Segment last_segment_;
-  std::array<double, most_following_axes> last_following_{}, last_rate_{};
+  std::array<double, max_following_axes> last_following_{}, last_rate_{};
   double last_fastest_ = MotionLimits::none;
   double last_passed_ = 0.0;
   bool has_last_ = false;

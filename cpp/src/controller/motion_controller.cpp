@@ -65,7 +65,7 @@ class MotionController::Implementation {
         profile_(ring_, limits_, settings.window, settings.period_s),
         smoothing_(Fir::moving_average(jerk_periods_), 1) {
     override_.store(settings.limits.feed_override, std::memory_order_relaxed);
-    restart(std::array<double, most_controller_axes>{});
+    restart(std::array<double, max_controller_axes>{});
   }
 
   PushResult push(const Segment& segment, std::span<const double> following_end) noexcept {
@@ -87,14 +87,14 @@ class MotionController::Implementation {
     const bool rested = profile_.at_rest();
     const double distance = profile_.distance();
     profile_.advance(settled);
-    const bool anew = profile_.began_anew();
-    if (anew) {
+    const bool restarted = profile_.has_restarted();
+    if (restarted) {
       const double nothing = 0.0;
       smoothing_.reset({&nothing, 1});
       cursor_ = profile_.running();
     }
-    // The last of a way may be gone within one period.
-    if (!rested || anew || profile_.distance() != distance) rest_periods_ = 0;
+    // The last of a path may be gone within one period.
+    if (!rested || restarted || profile_.distance() != distance) rest_periods_ = 0;
     rest_periods_ = profile_.at_rest() ? std::min(rest_periods_ + 1, settling_periods()) : 0;
     stand_at(smoothed_distance());
     filters_.step({position_.data(), axes()});
@@ -107,7 +107,7 @@ class MotionController::Implementation {
   }
 
   void feed_override(double ratio) noexcept {
-    if (!std::isnan(ratio)) override_.store(std::clamp(ratio, 0.0, most_override), std::memory_order_relaxed);
+    if (!std::isnan(ratio)) override_.store(std::clamp(ratio, 0.0, max_override), std::memory_order_relaxed);
   }
   void hold(bool held) noexcept { hold_.store(held, std::memory_order_relaxed); }
   void abort() noexcept { abort_.store(true, std::memory_order_relaxed); }
@@ -162,10 +162,10 @@ class MotionController::Implementation {
       return;
     }
     const QueuedSegment& entry = ring_[cursor_];
-    const double way = distance - entry.distance;
-    const Vector3 point = point_at(entry.segment, way);
+    const double along = distance - entry.distance;
+    const Vector3 point = point_at(entry.segment, along);
     for (int i = 0; i < axis_count; ++i) position_[static_cast<std::size_t>(i)] = point[i];
-    const double within = std::clamp(way, 0.0, entry.segment.length_mm);
+    const double within = std::clamp(along, 0.0, entry.segment.length_mm);
     for (std::size_t i = 0; i < n_following_; ++i) {
       position_[axis_count + i] = entry.following_start[i] + entry.following_rate[i] * within;
     }
@@ -225,7 +225,7 @@ class MotionController::Implementation {
   bool has_cursor_ = false;
   bool ran_out_ = true;
   int rest_periods_ = 0;
-  std::array<double, most_controller_axes> position_{}, rest_{};
+  std::array<double, max_controller_axes> position_{}, rest_{};
   ControllerState state_;
   SharedState shared_;
 };

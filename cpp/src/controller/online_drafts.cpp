@@ -19,10 +19,10 @@ void OnlineProfile::look_ahead(std::uint64_t pushed) noexcept {
   if (off_ && asked_ == plan_.ratio()) turn_off(false);
   // A motion begins when there is nothing more to be seen, at the override that was asked for: but once only, as a dial
   // may never rest.
-  waiting_ = plan_.has_more(pushed, machine()) || plan_.absorbs() || (plan_.plans_anew() && !replanned_);
+  waiting_ = plan_.has_more(pushed, machine()) || plan_.absorbs() || (plan_.replans() && !replanned_);
 }
 
-// Whether a draft comes too late for the speed of a corner, or for the slow stretch around it that the jerk time wants:
+// Whether a draft comes too late for the speed of a corner, or for the slow section around it that the jerk time wants:
 // the machine stops before it, as it was about to.
 bool OnlineProfile::refuses() const noexcept {
   const std::uint64_t first = plan_.first_new();
@@ -34,7 +34,7 @@ bool OnlineProfile::refuses() const noexcept {
   return (fitted && plan_.jerk_s() > 0.0) || !slows_down_before(first);
 }
 
-// Whether the slow stretch before a corner of the new segments, which the jerk time wants, has begun already, and the
+// Whether the slow section before a corner of the new segments, which the jerk time wants, has begun already, and the
 // machine was faster there.
 bool OnlineProfile::comes_too_late() const noexcept {
   const double highest = recent_.highest();
@@ -66,9 +66,9 @@ bool OnlineProfile::slows_down_before(std::uint64_t index) const noexcept {
   for (std::uint64_t i = running_; i < end && left > 0.0 && squared > corner * corner; ++i) {
     const SegmentPlan& plan = plan_.segment(i, plan_.draft());
     for (std::size_t k = 0; k < plan.piece_count && squared > corner * corner; ++k) {
-      const double way = std::min(left, std::max(0.0, plan.pieces[k].length - skipped));
-      squared -= 2.0 * plan_.acceleration_of((*ring_)[i], std::sqrt(squared), plan.eased[k]) * way;
-      left -= way;
+      const double part = std::min(left, std::max(0.0, plan.pieces[k].length - skipped));
+      squared -= 2.0 * plan_.acceleration_of((*ring_)[i], std::sqrt(squared), plan.reduced[k]) * part;
+      left -= part;
       skipped = std::max(0.0, skipped - plan.pieces[k].length);
     }
   }
@@ -77,13 +77,13 @@ bool OnlineProfile::slows_down_before(std::uint64_t index) const noexcept {
 
 void OnlineProfile::take_over() noexcept {
   const std::uint64_t next = running_ + 1;
-  const bool anew = !plan_.absorbs();
+  const bool replanned = !plan_.absorbs();
   if (state_ == State::running) {
-    changed_ = changed_ || anew || next == absorbed() || plan_.first_changed() <= running_ ||
+    changed_ = changed_ || replanned || next == absorbed() || plan_.first_changed() <= running_ ||
                plan_.start(next, plan_.draft()) != plan_.start(next, plan_.version());
   }
   plan_.take_over();
-  if (!anew) return;
+  if (!replanned) return;
   replanned_ = true;
   if (off_ && asked_ > 0.0) turn_off(false);
 }

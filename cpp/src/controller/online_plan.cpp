@@ -7,14 +7,14 @@
 
 namespace shapegcode {
 
-double acceleration_along(const QueuedSegment& entry, double speed, const MotionLimits& limits, bool eased) noexcept {
-  return std::min(eased ? eased_share * entry.following_acceleration : entry.following_acceleration,
-                  segment_acceleration(entry.segment, speed, limits, eased));
+double acceleration_along(const QueuedSegment& entry, double speed, const MotionLimits& limits, bool reduced) noexcept {
+  return std::min(reduced ? reduced_share * entry.following_acceleration : entry.following_acceleration,
+                  segment_acceleration(entry.segment, speed, limits, reduced));
 }
 
-double OnlinePlan::acceleration_of(const QueuedSegment& entry, double speed, bool eased) const noexcept {
-  if (entry.segment.kind != SegmentKind::arc) return entry.line_acceleration[eased ? 1 : 0];
-  return acceleration_along(entry, speed, limits_, eased);
+double OnlinePlan::acceleration_of(const QueuedSegment& entry, double speed, bool reduced) const noexcept {
+  if (entry.segment.kind != SegmentKind::arc) return entry.line_acceleration[reduced ? 1 : 0];
+  return acceleration_along(entry, speed, limits_, reduced);
 }
 
 double OnlinePlan::limit_of(const QueuedSegment& entry) const noexcept {
@@ -30,13 +30,13 @@ ZoneSet OnlinePlan::zones_between(std::uint64_t from, std::uint64_t into) const 
 }
 
 void OnlinePlan::split(const QueuedSegment& entry, SegmentPlan& plan) const noexcept {
-  std::array<Stretch, most_pieces> stretches;
+  std::array<Section, max_pieces> sections;
   const std::size_t count =
-      split_segment(plan.at_start, plan.at_end, entry.segment.length_mm, limit_of(entry), entry.beside_turn, stretches);
+      split_segment(plan.at_start, plan.at_end, entry.segment.length_mm, limit_of(entry), entry.beside_turn, sections);
   for (std::size_t k = 0; k < count; ++k) {
-    const auto& [length, limit, eased] = stretches[k];
-    plan.pieces[k] = {length, limit, acceleration_of(entry, limit, eased), 0.0};
-    plan.eased[k] = eased;
+    const auto& [length, limit, reduced] = sections[k];
+    plan.pieces[k] = {length, limit, acceleration_of(entry, limit, reduced), 0.0};
+    plan.reduced[k] = reduced;
   }
   plan.piece_count = static_cast<std::uint8_t>(count);
 }

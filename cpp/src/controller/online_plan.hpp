@@ -15,8 +15,8 @@ namespace shapegcode {
 struct SegmentPlan {
   ZoneSet at_start{}, at_end{};
   std::uint8_t piece_count = 0;
-  std::array<bool, most_pieces> eased{};
-  std::array<Piece, most_pieces> pieces{};  ///< their start_speed: of the forward pass
+  std::array<bool, max_pieces> reduced{};
+  std::array<Piece, max_pieces> pieces{};  ///< their start_speed: of the forward pass
 };
 
 /// A value in force and its draft, told apart by the version since which each holds.
@@ -86,8 +86,8 @@ class OnlinePlan {
     return absorbed_ < pushed && absorbed_ - machine.running < window_;
   }
   [[nodiscard]] bool absorbs() const noexcept { return pass_ != Pass::none && !anew_; }
-  [[nodiscard]] bool plans_anew() const noexcept { return anew_ || wished_ != ratio_; }
-  /// New segments of the draft, and the first segment that it runs in another way than before.
+  [[nodiscard]] bool replans() const noexcept { return anew_ || wished_ != ratio_; }
+  /// New segments of the draft, and the first segment that it runs otherwise than before.
   [[nodiscard]] std::uint64_t first_new() const noexcept { return first_; }
   [[nodiscard]] std::uint64_t newest() const noexcept { return newest_; }
   [[nodiscard]] std::uint64_t first_changed() const noexcept { return changed_; }
@@ -103,7 +103,7 @@ class OnlinePlan {
   [[nodiscard]] double start(std::uint64_t index, std::uint64_t version) const noexcept {
     return entries_[index & mask_].start.at(version);
   }
-  [[nodiscard]] double acceleration_of(const QueuedSegment& entry, double speed, bool eased) const noexcept;
+  [[nodiscard]] double acceleration_of(const QueuedSegment& entry, double speed, bool reduced) const noexcept;
 
  private:
   // What a draft goes through; each visits one segment after the other.
@@ -122,7 +122,7 @@ class OnlinePlan {
 
   bool next_draft(std::uint64_t pushed) noexcept;
   void absorb(std::uint64_t first, std::uint64_t count) noexcept;
-  void plan_anew() noexcept;
+  void replan() noexcept;
   void go_through(Pass pass) noexcept;
   void visit() noexcept;
   void visit_zones() noexcept;
@@ -140,7 +140,7 @@ class OnlinePlan {
   std::uint64_t window_;  // an eighth more than was asked for: what a draft is being made of is not yet in sight
   std::uint64_t mask_;
   std::vector<Entry> entries_;
-  static constexpr std::uint64_t least_batch = 8;  // as many new segments a draft takes in, if so many are there
+  static constexpr std::uint64_t min_batch = 8;  // as many new segments a draft takes in, if so many are there
 
   std::uint64_t absorbed_ = 0;
   std::uint64_t version_ = 1;

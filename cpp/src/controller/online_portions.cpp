@@ -41,11 +41,11 @@ bool OnlinePlan::next_draft(std::uint64_t pushed) noexcept {
   if (seen == 0) ratio_ = wished_;
   if (wished_ != ratio_ && (!more || seen > seen_)) {
     seen_ = seen;
-    plan_anew();
+    replan();
     return true;
   }
   // The more is in sight, the more braking may change at once: then many segments share that work.
-  const std::uint64_t most = std::max<std::uint64_t>(least_batch, seen / 4);
+  const std::uint64_t most = std::max<std::uint64_t>(min_batch, seen / 4);
   if (more) absorb(absorbed_, std::min({most, pushed - absorbed_, window_ - seen}));
   return more;
 }
@@ -60,7 +60,7 @@ void OnlinePlan::absorb(std::uint64_t first, std::uint64_t count) noexcept {
   go_through(Pass::zones);
 }
 
-void OnlinePlan::plan_anew() noexcept {
+void OnlinePlan::replan() noexcept {
   anew_ = true;
   draft_ratio_ = wished_;
   first_ = machine_.running;

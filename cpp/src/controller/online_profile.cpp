@@ -10,7 +10,7 @@
 namespace shapegcode {
 namespace {
 
-constexpr double longest_time_s = 32768.0;  // after which times are counted anew
+constexpr double longest_time_s = 32768.0;  // after which times are counted again from zero
 
 }  // namespace
 
@@ -23,10 +23,10 @@ void OnlineProfile::restart(std::uint64_t next) noexcept {
   recent_.reset();
 }
 
-bool OnlineProfile::began_anew() noexcept {
-  const bool anew = began_anew_;
-  began_anew_ = false;
-  return anew;
+bool OnlineProfile::has_restarted() noexcept {
+  const bool restarted = has_restarted_;
+  has_restarted_ = false;
+  return restarted;
 }
 
 // What of the running segment lies beyond `offset`: with the speeds of the forward pass as the plan has them, or as
@@ -43,7 +43,7 @@ OnlineProfile::Remaining OnlineProfile::remaining_beyond(double offset, bool as_
       piece = entry.pieces[k];
       if (begin < offset) piece.length = std::max(end - offset, 0.0);
       if (!as_planned) piece.start_speed = MotionLimits::none;
-      remaining.eased[remaining.count++] = entry.eased[k];
+      remaining.reduced[remaining.count++] = entry.reduced[k];
     }
     begin = end;
   }
@@ -76,7 +76,7 @@ bool OnlineProfile::may_run(double distance, double speed) noexcept {
 }
 
 // The phases to come begin at the last set-point's distance and speed.
-void OnlineProfile::generate_anew() noexcept {
+void OnlineProfile::regenerate() noexcept {
   changed_ = false;
   const double time_s = static_cast<double>(tick_ - 2) * period_s_;  // of the last set-point
   phase_ = {time_s, 0.0, distance_, speed_now_, 0.0};
@@ -93,12 +93,12 @@ void OnlineProfile::generate_anew() noexcept {
 // The ramp down within a piece, as steep as its present speed lets it be.
 bool OnlineProfile::next_ramps_down(std::size_t piece) noexcept {
   const double length = remaining_.pieces[piece].length;
-  const double acceleration = plan_.acceleration_of((*ring_)[running_], speed_, remaining_.eased[piece]);
-  const double way = speed_ * speed_ / (2.0 * acceleration);
-  const double end = way < length ? 0.0 : std::sqrt(std::max(0.0, speed_ * speed_ - 2.0 * acceleration * length));
+  const double acceleration = plan_.acceleration_of((*ring_)[running_], speed_, remaining_.reduced[piece]);
+  const double braking = speed_ * speed_ / (2.0 * acceleration);
+  const double end = braking < length ? 0.0 : std::sqrt(std::max(0.0, speed_ * speed_ - 2.0 * acceleration * length));
   ramp_ = 0;
   ramp_count_ = 1;
-  ramps_[0] = {speed_, end, std::min(way, length)};
+  ramps_[0] = {speed_, end, std::min(braking, length)};
   speed_ = end;
   return true;
 }
@@ -140,10 +140,10 @@ bool OnlineProfile::next_phase() noexcept {
   return true;
 }
 
-// A motion begins with segment running_, where distances are counted anew.
+// A motion begins with segment running_, where distances are counted again from zero.
 void OnlineProfile::begin() noexcept {
   tick_ = 1;
-  began_anew_ = true;
+  has_restarted_ = true;
   replanned_ = false;
   distance_ = 0.0;
   recent_.reset();
@@ -176,12 +176,12 @@ void OnlineProfile::come_to_rest() noexcept {
 void OnlineProfile::advance(bool settled) noexcept {
   ++tick_;
   recent_.add(speed_now_);
-  // Not before the set-points have come to rest: they are still on their way to the corner.
+  // Not before the set-points have come to rest: they are still before the corner.
   const bool waits = !settled || waiting_ || stop_ || off_;
   if (state_ == State::rest && running_ < absorbed() && !waits) begin();
   if ((state_ == State::running && (changed_ || (slow_down_ && may_run(distance_, speed_now_)))) ||
       (state_ == State::stopped && !stop_ && !off_)) {
-    generate_anew();
+    regenerate();
   }
   if (state_ != State::running) {
     changed_ = false;

@@ -45,7 +45,7 @@ class OnlineProfile {
   void restart(std::uint64_t next) noexcept;
   /// Looks at the segments before `pushed`, which are in the ring, and at the override: a portion of that work.
   void look_ahead(std::uint64_t pushed) noexcept;
-  /// One period on. `settled`: what follows the profile is at rest as well, so that a motion may begin anew.
+  /// One period on. `settled`: what follows the profile is at rest as well, so that a motion may restart.
   void advance(bool settled) noexcept;
 
   /// Ratio of the programmed feeds: 0 stops as `stop` does, another one holds as soon as the path is planned with it.
@@ -66,8 +66,8 @@ class OnlineProfile {
   [[nodiscard]] bool ran_out() const noexcept { return !within_segment() && !waiting_ && running_ == absorbed(); }
   /// What the last look_ahead did, see OnlinePlan::portion.
   [[nodiscard]] int looked() const noexcept { return plan_.done(); }
-  /// True once after a motion began with its distances counted anew: whoever smooths them begins anew too.
-  [[nodiscard]] bool began_anew() noexcept;
+  /// True once after a motion began with its distances counted again from zero: whoever smooths them restarts too.
+  [[nodiscard]] bool has_restarted() noexcept;
 
  private:
   enum class State : std::uint8_t {
@@ -78,8 +78,8 @@ class OnlineProfile {
 
   // Pieces of the segment that is being run; their start_speed: of both passes.
   struct Remaining {
-    std::array<Piece, most_pieces> pieces{};
-    std::array<bool, most_pieces> eased{};
+    std::array<Piece, max_pieces> pieces{};
+    std::array<bool, max_pieces> reduced{};
     std::size_t count = 0;
   };
 
@@ -88,7 +88,7 @@ class OnlineProfile {
   [[nodiscard]] double start_after(const Remaining& remaining, std::size_t piece, std::uint64_t version) const noexcept;
   void begin() noexcept;
   void enter(std::uint64_t index) noexcept;
-  void generate_anew() noexcept;
+  void regenerate() noexcept;
   bool next_phase() noexcept;
   bool next_ramps() noexcept;
   bool next_ramps_down(std::size_t piece) noexcept;
@@ -116,7 +116,7 @@ class OnlineProfile {
   bool slow_down_ = false;  // faster than the path now allows
   bool waiting_ = false;
   bool replanned_ = false;  // since the last motion
-  bool began_anew_ = false;
+  bool has_restarted_ = false;
   bool changed_ = false;  // the phases to come are not those of the plan
 
   std::int64_t tick_ = 0;
@@ -127,7 +127,7 @@ class OnlineProfile {
   bool has_phase_ = false;
   double length_ = 0.0;  // of all ramps so far
   double speed_ = 0.0;   // at their end
-  std::array<Ramp, most_phases> ramps_{};
+  std::array<Ramp, max_phases> ramps_{};
   std::size_t ramp_ = 0;
   std::size_t ramp_count_ = 0;
   Remaining remaining_;

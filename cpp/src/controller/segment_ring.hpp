@@ -16,7 +16,7 @@ struct QueuedSegment {
   Segment segment;
   double feed = 0.0;                                   ///< programmed, with the ratio of arcs
   double hard_limit = 0.0;                             ///< speed whatever the override
-  double following_acceleration = MotionLimits::none;  ///< of the way
+  double following_acceleration = MotionLimits::none;  ///< along the path
   double corner = MotionLimits::none;                  ///< speed at which it is entered
   Zone jump;                                           ///< what jumps there, as far as it counts
   Zone open_end;                                       ///< the same of whatever may follow
@@ -29,13 +29,13 @@ struct QueuedSegment {
   double distance = 0.0;  ///< of its start, since the motion began
   ZoneSet behind{};       ///< at its start, of slow corners and segments before it, whatever the override
   // Of the planning thread again; last, as nothing but a set-point asks for them.
-  std::array<double, most_following_axes> following_start{}, following_end{};
-  std::array<double, most_following_axes> following_rate{};  ///< per mm of the way
+  std::array<double, max_following_axes> following_start{}, following_end{};
+  std::array<double, max_following_axes> following_rate{};  ///< per mm of path
 };
 
-/// Acceleration along a segment that is run at most at `speed`; `eased`: beside a jump.
+/// Acceleration along a segment that is run at most at `speed`; `reduced`: beside a jump.
 [[nodiscard]] double acceleration_along(const QueuedSegment& entry, double speed, const MotionLimits& limits,
-                                        bool eased) noexcept;
+                                        bool reduced) noexcept;
 
 /// A ring of segments: segment `index`, counted from the first ever pushed, is entry `index & mask`.
 class SegmentRing {

@@ -62,7 +62,7 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
   require_not_below_zero(settings.smoothing_time_s, "smoothing time", "s");
   const double periods = std::round(settings.smoothing_time_s / settings.period_s);
   const auto length =
-      std::max<std::int64_t>(1, require_count(periods, most_filter_samples, "the smoothing time", "periods"));
+      std::max<std::int64_t>(1, require_count(periods, max_filter_samples, "the smoothing time", "periods"));
   const Fir average = Fir::moving_average(static_cast<int>(length));
   const Fir smoothing = convolved(average, average);
   const std::vector<Fir> shapers = shapers_of(settings, n_axes);

@@ -10,8 +10,8 @@
 namespace shapegcode {
 namespace {
 
-constexpr std::size_t least_window = 8;
-constexpr std::size_t most_segments = std::size_t{1} << 24;
+constexpr std::size_t min_window = 8;
+constexpr std::size_t max_segments = std::size_t{1} << 24;
 
 // Share of acceleration and jerk that the changes of a shaper may take which follows a position.
 constexpr double change_share = 0.25;
@@ -56,15 +56,15 @@ int jerk_periods(const ControllerSettings& settings) {
     if (std::isfinite(axis.max_jerk)) longest_s = std::max(longest_s, 2.0 * axis.max_acceleration / axis.max_jerk);
   }
   const double periods = std::ceil(longest_s / settings.period_s - 1e-9);
-  return std::max(1, static_cast<int>(require_count(periods, most_filter_samples, "the jerk time", "periods")));
+  return std::max(1, static_cast<int>(require_count(periods, max_filter_samples, "the jerk time", "periods")));
 }
 
 void check_settings(const ControllerSettings& settings) {
   require_period(settings.period_s);
   check_limits(settings.limits, {settings.contour_tolerance_mm, 1.0, 0.0, 0.0});
-  require(settings.limits.feed_override <= most_override, "feed override", settings.limits.feed_override, "", "<= 2");
-  if (settings.following.size() > most_following_axes) {
-    detail::refuse("{} following axes, at most {} are possible", settings.following.size(), most_following_axes);
+  require(settings.limits.feed_override <= max_override, "feed override", settings.limits.feed_override, "", "<= 2");
+  if (settings.following.size() > max_following_axes) {
+    detail::refuse("{} following axes, at most {} are possible", settings.following.size(), max_following_axes);
   }
   const auto jerk_has_acceleration = [](double jerk, double acceleration, std::size_t axis) {
     if (std::isfinite(jerk) && !std::isfinite(acceleration)) {
@@ -82,9 +82,9 @@ void check_settings(const ControllerSettings& settings) {
     require(axis.max_jerk > 0.0, "jerk limit of a following axis", axis.max_jerk, "", "> 0");
     jerk_has_acceleration(axis.max_jerk, axis.max_acceleration, axis_count + i);
   }
-  require(settings.window >= least_window && settings.window <= most_segments, "window",
+  require(settings.window >= min_window && settings.window <= max_segments, "window",
           static_cast<double>(settings.window), "segments", "8 ... 16777216");
-  require(settings.queue <= most_segments, "queue", static_cast<double>(settings.queue), "segments", "0 ... 16777216");
+  require(settings.queue <= max_segments, "queue", static_cast<double>(settings.queue), "segments", "0 ... 16777216");
 }
 
 MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {

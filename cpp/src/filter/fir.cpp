@@ -22,8 +22,8 @@ namespace {
 using Eigen::Index;
 
 constexpr int taps_per_pass = 8;
-constexpr int most_delay = 100'000'000;  // a day of milliseconds; sums of a few filters stay countable
-constexpr Index block_rows = 1024;       // 8 kB of output: stays in the first-level cache between passes
+constexpr int max_delay = 100'000'000;  // a day of milliseconds; sums of a few filters stay countable
+constexpr Index block_rows = 1024;      // 8 kB of output: stays in the first-level cache between passes
 
 /// Sum of the last `length` samples, free of drift: every rounding of `sum` is caught exactly (two-sum) in `error`.
 struct RunningSum {
@@ -232,8 +232,8 @@ Fir::Fir(std::vector<int> delays, std::vector<double> taps) : delays_(std::move(
   }
   double sum = 0.0;
   for (std::size_t k = 0; k < taps_.size(); ++k) {
-    if (delays_[k] > most_delay) {
-      detail::refuse("filter delay {}, at most {} is possible", delays_[k], most_delay);
+    if (delays_[k] > max_delay) {
+      detail::refuse("filter delay {}, at most {} is possible", delays_[k], max_delay);
     }
     if (k > 0 && delays_[k] <= delays_[k - 1]) {
       detail::refuse("filter delays must ascend: {} follows {}", delays_[k], delays_[k - 1]);
@@ -252,9 +252,9 @@ Fir Fir::on_finer_grid(int factor) const {
   if (factor < 1) {
     detail::refuse("grid {} times as fine, at least 1 needed", factor);
   }
-  if (duration_samples() > most_delay / factor) {
+  if (duration_samples() > max_delay / factor) {
     detail::refuse("filter delay {} on a grid {} times as fine, at most {} is possible", duration_samples(), factor,
-                   most_delay);
+                   max_delay);
   }
   std::vector<int> delays = delays_;
   for (int& delay : delays) delay *= factor;
@@ -265,8 +265,8 @@ Fir Fir::moving_average(int length) {
   if (length < 1) {
     detail::refuse("moving average over {} samples, at least 1 needed", length);
   }
-  if (length > most_delay) {
-    detail::refuse("moving average over {} samples, at most {} are possible", length, most_delay);
+  if (length > max_delay) {
+    detail::refuse("moving average over {} samples, at most {} are possible", length, max_delay);
   }
   std::vector<int> delays(static_cast<std::size_t>(length));
   for (std::size_t k = 0; k < delays.size(); ++k) delays[k] = static_cast<int>(k);
@@ -283,8 +283,8 @@ Fir Fir::exponential(double time_constant_samples, double rest) {
     detail::refuse("share of the exponential that is cut off is {}, must be between 0 and 1", rest);
   }
   const double length = std::max(1.0, std::ceil(-std::log(rest) * time_constant_samples));
-  if (!(length <= most_filter_samples)) {
-    detail::refuse("exponential filter of {:.10g} taps, at most {:.10g} are possible", length, most_filter_samples);
+  if (!(length <= max_filter_samples)) {
+    detail::refuse("exponential filter of {:.10g} taps, at most {:.10g} are possible", length, max_filter_samples);
   }
   const double decay = std::exp(-1.0 / time_constant_samples);
   const double leaving = std::exp(-length / time_constant_samples);

@@ -251,7 +251,7 @@ VectorXd model_response(const ModalFit& fit, std::span<const double> force, doub
 
 // Rounds in which the noise of the response, and with it the weight of the force, is found; they end when the sum of
 // squares changes by less than this share.
-constexpr int most_rounds = 4;
+constexpr int max_rounds = 4;
 constexpr double settled = 1e-3;
 // Samples of a pulse whose force is estimated along with the modes.
 constexpr std::size_t longest_estimated_pulse = 128;
@@ -277,10 +277,10 @@ std::vector<MatrixXd> responses_to_noise(const ModalFit& fit, std::span<const Ta
     const identification::PulseRange pulse = identification::pulse_of(tap.force_n);
     MatrixXd record = MatrixXd::Zero(static_cast<Index>(n), pulse_samples);
     for (std::size_t j = 0; j < pulse.size(); ++j) {
-      // Sample k of the record is sample k - place + reach of the impulse's response.
-      const std::size_t place = pulse.begin + j;
-      const auto from = static_cast<Index>(place > reach ? place - reach : 0);
-      const auto skipped = static_cast<Index>(place > reach ? 0 : reach - place);
+      // Sample k of the record is sample k - sample + reach of the impulse's response.
+      const std::size_t sample = pulse.begin + j;
+      const auto from = static_cast<Index>(sample > reach ? sample - reach : 0);
+      const auto skipped = static_cast<Index>(sample > reach ? 0 : reach - sample);
       const Index length = std::min(static_cast<Index>(n) - from, impulse.size() - skipped);
       record.col(static_cast<Index>(j)).segment(from, length) = impulse.segment(skipped, length);
     }
@@ -353,7 +353,7 @@ MatrixXd covariance_of(const ModalFit& fit, const identification::SeparableFit& 
   return change * logarithmic * change.transpose();
 }
 
-/// Takes the rows of expected force errors, which lie behind the samples, out of what is told of the samples.
+/// Takes the rows of expected force errors, which lie behind the samples, out of the figures of the samples.
 void drop_expectations(identification::SeparableFit& fit, std::span<const TapSignals> taps) {
   fit.expectations = MatrixXd::Zero(fit.inverse_gram.rows(), fit.inverse_gram.cols());
   for (std::size_t r = 0; r < taps.size(); ++r) {
@@ -399,7 +399,7 @@ ModalFit fit_modes(std::span<const TapSignals> taps, double period_s, const Natu
   identification::SeparableFit separable = search(start);
   const bool estimates_force = options.force_noise_n > 0.0 && longest_pulse(taps) <= longest_estimated_pulse;
   const auto freedom = static_cast<double>(samples - parameters);
-  for (int round = 0; estimates_force && round < most_rounds; ++round) {
+  for (int round = 0; estimates_force && round < max_rounds; ++round) {
     const double before = separable.sum_of_squares;
     if (!(before > 0.0)) break;
     model.estimate_force(responses_to_noise(fit, taps, period_s, options), std::sqrt(before / freedom));

@@ -60,8 +60,8 @@ struct SeparableFit {
   std::string reason;  // why not converged
 };
 
-/// Levenberg-Marquardt from `theta` with at most `most_iterations` evaluations. Not reaching a minimum is told in the
-/// result; theta is then the best that was seen.
+/// Levenberg-Marquardt from `theta` with at most `most_iterations` evaluations. Not reaching a minimum is reported in
+/// the result; theta is then the best that was seen.
 [[nodiscard]] SeparableFit fit_separable(const SeparableModel& model, Eigen::VectorXd theta, int most_iterations);
 
 /// Covariance of (common, theta) for residuals that are correlated over time in the same way in all records

@@ -124,7 +124,7 @@ std::vector<std::vector<Complex>> poles_of(const std::vector<std::vector<double>
   return poles;
 }
 
-std::size_t least_samples(int n_max) {
+std::size_t min_samples(int n_max) {
   identification::check_mode_count(n_max);
   return 8 * static_cast<std::size_t>(n_max) + 8;
 }
@@ -132,7 +132,7 @@ std::size_t least_samples(int n_max) {
 }  // namespace
 
 std::vector<std::vector<Complex>> stabilisation_poles(std::span<const TapSignals> taps, int n_max) {
-  const std::size_t least = least_samples(n_max);
+  const std::size_t least = min_samples(n_max);
   check_taps(taps, least);
   std::size_t longest = 0;
   for (const TapSignals& tap : taps) longest = std::max(longest, tap.response.size());
@@ -162,7 +162,7 @@ std::vector<std::vector<Complex>> stabilisation_poles(std::span<const TapSignals
 }
 
 std::vector<std::vector<Complex>> stabilisation_poles(Responses responses, int n_max) {
-  check_responses(responses, least_samples(n_max));
+  check_responses(responses, min_samples(n_max));
   std::vector<std::vector<double>> decays;
   for (const auto response : responses) {
     std::vector<double> decay(response.begin(), response.end());

@@ -18,8 +18,8 @@ using detail::refuse;
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 
-constexpr int most_newton_steps = 100;
-constexpr int most_fit_steps = 200;
+constexpr int max_newton_steps = 100;
+constexpr int max_fit_steps = 200;
 // Points whose spread across a line is below this share of that along it give no circle.
 constexpr double straight_share = 1e-12;
 
@@ -57,7 +57,7 @@ Circle pratt_fit(std::span<const Vector2d> points, const Vector2d& mean) {
   const double a0 = mxz * (mxz * myy - myz * mxy) + myz * (myz * mxx - mxz * mxy) - variance_z * covariance;
   double root = 0.0;
   double value = a0;
-  for (int i = 0; i < most_newton_steps; ++i) {
+  for (int i = 0; i < max_newton_steps; ++i) {
     const double slope = a1 + root * (2.0 * a2 + 16.0 * root * root);
     const double next = root - value / slope;
     if (next == root || !std::isfinite(next)) break;
@@ -127,8 +127,8 @@ CircleFit fit_circle(std::span<const Vector2d> points_mm) {
       damping = std::max(10.0 * damping, 1e-4);
     }
     if (small) break;
-    if (++steps > most_fit_steps) {
-      throw Error(ErrorKind::numeric, fmt::format("the circle fit did not converge in {} steps", most_fit_steps));
+    if (++steps > max_fit_steps) {
+      throw Error(ErrorKind::numeric, fmt::format("the circle fit did not converge in {} steps", max_fit_steps));
     }
   }
   CircleFit fit;

@@ -30,7 +30,7 @@ constexpr double widest_local_window_rad = 1.0;
 constexpr std::size_t group_size = 16;  // a power of two
 constexpr double group_slack = 1e-6;
 constexpr double group_slack_mm = 1e-6;
-// Directions of a straight stretch lie within 5.7 degrees of one, hence 11.5 of each other: then no other segment of it
+// Directions of a straight section lie within 5.7 degrees of one, hence 11.5 of each other: then no other segment of it
 // is nearer than a foot that lies further from both ends of its segment than .104 of the deviation.
 constexpr double straight_cosine2 = 0.99;
 constexpr double nearest_share = 0.125;
@@ -334,7 +334,7 @@ void ContourTracker::straighten() noexcept {
   straight_ = {cursor_, here.direction, cursor_, cursor_, here.s, here.next_s, !is_line, !is_line};
 }
 
-// A stretch grows with the window as far as it runs straight; where it ends, one is begun about each new segment.
+// A section grows with the window as far as it runs straight; where it ends, one is begun about each new segment.
 bool ContourTracker::runs_straight(const Window& window) noexcept {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   if (straight_.about == no_segment) straighten();
@@ -405,7 +405,7 @@ double ContourTracker::step(const Vector3& p, const ContourTracker& driver) noex
 }
 
 // Most points lie beside the middle of a segment, or of the next one, of a path that runs straight about them, and then
-// no other segment needs a look: all points within so straight a stretch that lie `t` of path away from the foot, of
+// no other segment needs a look: all points within so straight a section that lie `t` of path away from the foot, of
 // which `rest` on the foot's own segment, are further off, since t^2 cos^2 - 2 |offset| (t - rest) sin > 0.
 template <typename Bound>
 inline double ContourTracker::follow(const Vector3& p, const Bound& bound) noexcept {

@@ -16,8 +16,8 @@ double distance2(const Vector3& p, const Vector3& from, const Vector3& to) noexc
 
 }  // namespace
 
-CornerReach::CornerReach(const Path& path, double least_angle_rad) {
-  const double straight = std::cos(least_angle_rad);
+CornerReach::CornerReach(const Path& path, double min_angle_rad) {
+  const double straight = std::cos(min_angle_rad);
   Vector3 before = Vector3::Zero();  // direction at the end of the segment before
   for (std::size_t i = 0; i < path.size(); ++i) {
     const Segment segment = path[i];

@@ -15,8 +15,8 @@ namespace {
 
 using detail::refuse;
 
-constexpr double least_circle_rad = std::numbers::pi / 10.0;
-constexpr double least_stations_per_cutoff = 5.0;
+constexpr double min_circle_rad = std::numbers::pi / 10.0;
+constexpr double min_stations_per_cutoff = 5.0;
 constexpr double sampling_lengths = 5.0;
 constexpr double rounding_share = 1e-9;  // of a length that is a whole number of spacings but for rounding
 
@@ -79,7 +79,7 @@ std::vector<double> gaussian_low_pass(std::span<const double> profile_mm, double
 std::optional<double> standard_cutoff_mm(double length_mm, double spacing_mm) noexcept {
   for (const double cutoff : {0.8, 0.25, 0.08}) {
     const bool fits = (sampling_lengths + 2.0) * cutoff <= length_mm * (1.0 + rounding_share);
-    if (fits && cutoff >= least_stations_per_cutoff * spacing_mm * (1.0 - rounding_share)) return cutoff;
+    if (fits && cutoff >= min_stations_per_cutoff * spacing_mm * (1.0 - rounding_share)) return cutoff;
   }
   return std::nullopt;
 }
@@ -124,7 +124,7 @@ std::vector<double> without_line(std::span<const double> profile_mm) {
 
 std::vector<double> without_circle(std::span<const double> profile_mm, double step_rad) {
   const auto n = static_cast<Eigen::Index>(profile_mm.size());
-  if (static_cast<double>(n) * std::abs(step_rad) < least_circle_rad) return without_line(profile_mm);
+  if (static_cast<double>(n) * std::abs(step_rad) < min_circle_rad) return without_line(profile_mm);
   Eigen::MatrixXd basis(n, 3);
   for (Eigen::Index i = 0; i < n; ++i) {
     const double angle = (static_cast<double>(i) - 0.5 * static_cast<double>(n - 1)) * step_rad;

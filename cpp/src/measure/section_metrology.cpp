@@ -17,8 +17,8 @@ using detail::refuse;
 
 using Eigen::Vector2d;
 
-constexpr double least_fitted_rad = std::numbers::pi / 18.0;
-constexpr double least_cutoffs = 3.0;
+constexpr double min_fitted_rad = std::numbers::pi / 18.0;
+constexpr double min_cutoffs = 3.0;
 
 const MetrologyOptions& checked(const Path& path, const std::vector<PathSection>& sections,
                                 const MetrologyOptions& options) {
@@ -242,7 +242,7 @@ std::optional<Roughness> SectionMetrology::roughness_of(const std::vector<double
   const double length = static_cast<double>(whole.size()) * spacing_mm;
   const std::optional<double> cutoff =
       options_.cutoff_mm > 0.0 ? std::optional(options_.cutoff_mm) : standard_cutoff_mm(length, spacing_mm);
-  if (!cutoff || length < least_cutoffs * *cutoff || *cutoff < spacing_mm) return std::nullopt;
+  if (!cutoff || length < min_cutoffs * *cutoff || *cutoff < spacing_mm) return std::nullopt;
   const std::vector<double> profile =
       arc == nullptr ? without_line(whole) : without_circle(whole, arc->turn / static_cast<double>(wall.size()));
   return measure_roughness(profile, spacing_mm, *cutoff, options_.lambda_s_mm);
@@ -253,7 +253,7 @@ void SectionMetrology::measure_arc(const ArcTrack& track, const SweptWalls::Prof
   figures.nominal_radius_mm = track.radius;
   figures.nominal_centre_mm = track.centre;
   figures.turns_left = track.turn > 0.0;
-  if (std::abs(track.turn) < least_fitted_rad) return;
+  if (std::abs(track.turn) < min_fitted_rad) return;
   figures.command_arc = arc_through(track.command, track.centre);
   figures.response_arc = arc_through(track.response, track.centre);
   const bool is_horizontal = track.a == 0 && track.b == 1;

@@ -17,14 +17,14 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double no_wall = std::numeric_limits<double>::quiet_NaN();
 // The programmed path is swept in chords that leave an arc by no more than this.
 constexpr double chord_error_mm = 1e-5;
-constexpr double least_chord_mm = 1e-6;  // also where a spiral ends in its centre
-constexpr double most_discs = 1e8;       // tool radii along the path
+constexpr double min_chord_mm = 1e-6;  // also where a spiral ends in its centre
+constexpr double max_discs = 1e8;      // tool radii along the path
 // How far a disc reaches depends on the largest deviation; so far it may have been less than it will be.
-constexpr double least_deviation_mm = 0.01;
+constexpr double min_deviation_mm = 0.01;
 constexpr double growth = 2.0;
 // Where the programmed wall lies further out than the tool's radius by more than this share, another leg made it.
 constexpr double overlap_share = 1e-3;
-constexpr double least_horizontal = 1e-6;
+constexpr double min_horizontal = 1e-6;
 
 Vector2d horizontal(const Vector3& p) noexcept { return p.head<2>(); }
 
@@ -34,25 +34,25 @@ SweptWalls::Station SweptWalls::station_at(const Path& path, double s, std::size
   Station station{s, Vector2d::Zero(), Vector2d::Zero(), -infinite, infinite};
   station.point = horizontal(path.point(s, cursor));
   const Vector2d along = horizontal(tangent_at(path[cursor], s - path.distance_mm(cursor)));
-  if (along.norm() > least_horizontal) station.normal = Vector2d(-along.y(), along.x()).normalized();
+  if (along.norm() > min_horizontal) station.normal = Vector2d(-along.y(), along.x()).normalized();
   return station;
 }
 
 SweptWalls::SweptWalls(const Path& path, const std::vector<PathSection>& sections, double tool_radius_mm,
-                       double spacing_mm, std::size_t most_stations)
+                       double spacing_mm, std::size_t max_stations)
     : radius_(tool_radius_mm) {
   if (!(tool_radius_mm > 0.0 && std::isfinite(tool_radius_mm) && spacing_mm > 0.0 && std::isfinite(spacing_mm))) {
     refuse("tool radius {} mm and station spacing {} mm must be > 0", tool_radius_mm, spacing_mm);
   }
-  if (path.length_mm() / tool_radius_mm > most_discs) {
+  if (path.length_mm() / tool_radius_mm > max_discs) {
     refuse("tool radius {} mm on a path of {} mm: {:g} radii, limit {:g}", tool_radius_mm, path.length_mm(),
-           path.length_mm() / tool_radius_mm, most_discs);
+           path.length_mm() / tool_radius_mm, max_discs);
   }
   double length = 0.0;
   for (const PathSection& section : sections) length += section.length_mm();
-  deviation_ = least_deviation_mm;
-  least_fall_ = 1.0 / radius_;
-  spacing_ = std::max(spacing_mm, length / static_cast<double>(std::max<std::size_t>(1, most_stations)));
+  deviation_ = min_deviation_mm;
+  min_fall_ = 1.0 / radius_;
+  spacing_ = std::max(spacing_mm, length / static_cast<double>(std::max<std::size_t>(1, max_stations)));
   std::size_t cursor = 0;
   for (const PathSection& section : sections) {
     first_of_.push_back(stations_.size());
@@ -73,7 +73,7 @@ void SweptWalls::take_reference(const Path& path) {
     double step = segment.length_mm;
     if (segment.kind == SegmentKind::arc) {
       const double narrowest = std::min(segment.start_radius_mm, segment.end_radius_mm);
-      step = std::min(step, std::max(std::sqrt(8.0 * narrowest * chord_error_mm), least_chord_mm));
+      step = std::min(step, std::max(std::sqrt(8.0 * narrowest * chord_error_mm), min_chord_mm));
     }
     const double pieces = std::max(1.0, std::ceil(segment.length_mm / std::min(step, radius_)));
     for (double k = 0.0; k < pieces; ++k) {
@@ -86,7 +86,7 @@ void SweptWalls::take_reference(const Path& path) {
     // a line.
     if (segment.kind == SegmentKind::arc) {
       const double narrowest = std::min(segment.start_radius_mm, segment.end_radius_mm);
-      if (narrowest > radius_) least_fall_ = std::min(least_fall_, 1.0 / radius_ - 1.0 / narrowest);
+      if (narrowest > radius_) min_fall_ = std::min(min_fall_, 1.0 / radius_ - 1.0 / narrowest);
     }
   }
   // The disc at the station itself cuts one radius; chords are a little inside of an arc.
@@ -109,7 +109,7 @@ void SweptWalls::sweep(const Vector3& from, const Vector3& to, double from_foot_
   deviation_ = std::max(deviation_, std::abs(deviation_mm));
   // Two discs whose centres deviate by at most d each: one at a distance w reaches beyond the other only where
   // w^2 / 2 times the fall is below 2 d.
-  const double reach = std::sqrt(4.0 * growth * deviation_ / least_fall_) + overlap_share * radius_ + spacing_;
+  const double reach = std::sqrt(4.0 * growth * deviation_ / min_fall_) + overlap_share * radius_ + spacing_;
   sweep_within(from, to, from_foot_mm, to_foot_mm, std::min(reach, radius_));
 }
 

@@ -13,17 +13,17 @@
 namespace shapegcode::detail {
 
 /// So many samples, chords or layers of one path are never meant: a step that is wrong by orders of magnitude.
-inline constexpr double most_pieces = 1e9;
+inline constexpr double max_pieces = 1e9;
 
 inline void check_positive(double value, std::string_view what, std::string_view unit) {
   if (!(value > 0.0 && std::isfinite(value))) refuse("{} is {} {}, must be above 0", what, value, unit);
 }
 
-/// `step`: of what `way_mm` is cut up into.
-inline void check_pieces(double way_mm, double step_mm, std::string_view step) {
-  const double pieces = way_mm / step_mm;
-  if (pieces <= most_pieces) return;
-  refuse("{} of {} mm cuts {} mm into {:g} pieces, limit {:g}", step, step_mm, way_mm, pieces, most_pieces);
+/// `step`: of what `travel_mm` is cut up into.
+inline void check_pieces(double travel_mm, double step_mm, std::string_view step) {
+  const double pieces = travel_mm / step_mm;
+  if (pieces <= max_pieces) return;
+  refuse("{} of {} mm cuts {} mm into {:g} pieces, limit {:g}", step, step_mm, travel_mm, pieces, max_pieces);
 }
 
 inline void check_feeds(std::size_t feeds, const EngagementTrack& track) {

@@ -141,7 +141,7 @@ void ChipTable::prepare_twice() {
   }
 }
 
-void ChipTable::integrate_stretch(double from, double to, Values& sum) const {
+void ChipTable::integrate_section(double from, double to, Values& sum) const {
   Values value{};
   for (std::size_t g = 0; g < gauss_at.size(); ++g) {
     const double y = from + (to - from) * gauss_at[g];
@@ -172,10 +172,10 @@ void ChipTable::integrate(std::size_t cell, const Values& lower, const Values& u
     return;
   }
   for (; kink != kinks_.end() && *kink < end; ++kink) {
-    integrate_stretch(from, *kink, sum);
+    integrate_section(from, *kink, sum);
     from = *kink;
   }
-  integrate_stretch(from, end, sum);
+  integrate_section(from, end, sum);
 }
 
 double ChipTable::chip_mm(double azimuth) const noexcept {

@@ -74,7 +74,7 @@ class ChipTable {
   struct Grid;
   void look_up(const std::vector<double>& nodes, double azimuth, bool odd_sines, Values& out) const noexcept;
   void values(double sine, double cosine, Values& out) const noexcept;
-  void integrate_stretch(double from, double to, Values& sum) const;
+  void integrate_section(double from, double to, Values& sum) const;
   void integrate(std::size_t cell, const Values& lower, const Values& upper, Values& sum) const;
 
   ChipPowers powers_;

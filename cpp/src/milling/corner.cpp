@@ -123,7 +123,7 @@ std::optional<Entry> entry_of(const CornerCut& cut, const Geometry& g, const Too
 }
 
 /// How far a point lies from where the tool's axis has been before.
-double distance_from_way(const CornerCut& cut, const Geometry& g, const ToolPosition& tool, const Vector2d& point) {
+double distance_from_path(const CornerCut& cut, const Geometry& g, const ToolPosition& tool, const Vector2d& point) {
   if (tool.leg == 0) return cut.tool_radius_mm;  // on a straight nothing in front has been swept
   const Vector2d start = position_at(cut, g, 0.0, false).centre;
   const Vector2d corner = position_at(cut, g, cut.before_mm, false).centre;
@@ -177,12 +177,12 @@ double corner_length_mm(const CornerCut& cut) {
 CornerEngagement corner_engagement(const CornerCut& cut, double s_mm, bool behind_vertex) {
   const double length = corner_length_mm(cut);
   if (!(s_mm >= -position_tolerance_mm && s_mm <= length + position_tolerance_mm)) {
-    refuse("place on the corner's path is {} mm, must be 0 to {}", s_mm, length);
+    refuse("position on the corner's path is {} mm, must be 0 to {}", s_mm, length);
   }
   const Geometry g(cut);
   const ToolPosition tool = position_at(cut, g, std::clamp(s_mm, 0.0, length), behind_vertex);
   const std::optional<Entry> met = entry_of(cut, g, tool);
-  if (!met || distance_from_way(cut, g, tool, met->point) < cut.tool_radius_mm - position_tolerance_mm) {
+  if (!met || distance_from_path(cut, g, tool, met->point) < cut.tool_radius_mm - position_tolerance_mm) {
     refuse(
         "at {} mm the tool meets the rough pocket only where it has been itself: no closed form for a turn of {:g} "
         "degrees from a rough radius of {} mm to {} mm",

@@ -21,7 +21,7 @@ using detail::refuse;
 constexpr double arc_slack_rad = 1e-9;
 constexpr double same_end_rad = 1e-9;
 constexpr double parts_per_overhang = 10.0;  // of a load on the beam
-constexpr double most_turns = 1000.0;        // of a flute around the tool
+constexpr double max_turns = 1000.0;         // of a flute around the tool
 constexpr double largest_angle_rad = 1e9;    // beyond it too little is left of an angle within one turn
 
 bool same(const ToolBeam& a, const ToolBeam& b) {
@@ -176,8 +176,8 @@ struct MillingForce::Impl {
              arc.from_rad, arc.to_rad, arc.bottom_mm, arc.top_mm);
     }
     const double turns = set.lag_rad_per_mm * arc.top_mm / (2.0 * std::numbers::pi);
-    if (turns > most_turns) {
-      refuse("a flute winds {:g} times around the tool up to {} mm, limit {}", turns, arc.top_mm, most_turns);
+    if (turns > max_turns) {
+      refuse("a flute winds {:g} times around the tool up to {} mm, limit {}", turns, arc.top_mm, max_turns);
     }
   }
 

@@ -11,7 +11,7 @@ namespace {
 
 using detail::refuse;
 
-constexpr int most_flutes = 1000;
+constexpr int max_flutes = 1000;
 constexpr double steepest_helix_rad = 80.0 / 180.0 * std::numbers::pi;
 
 }  // namespace
@@ -19,7 +19,7 @@ constexpr double steepest_helix_rad = 80.0 / 180.0 * std::numbers::pi;
 void check(const EndMill& tool) {
   detail::check_positive(tool.diameter_mm, "tool diameter", "mm");
   if (tool.flutes < 1) refuse("tool has {} flutes, must have at least 1", tool.flutes);
-  if (tool.flutes > most_flutes) refuse("tool has {} flutes, limit {}", tool.flutes, most_flutes);
+  if (tool.flutes > max_flutes) refuse("tool has {} flutes, limit {}", tool.flutes, max_flutes);
   if (!(tool.helix_rad >= 0.0 && tool.helix_rad <= steepest_helix_rad)) {
     refuse("helix is {:g} degrees, must be 0 to 80", tool.helix_rad * 180.0 / std::numbers::pi);
   }

@@ -16,7 +16,7 @@ constexpr double accepted = 1.0 - 2e-4;
 constexpr double aimed = 1.0 - 8e-5;
 constexpr double first_exponent = 0.85;  // of a force against the feed, before anything is known
 constexpr double narrow = 1e-7;          // bracket, relative
-constexpr int most_steps = 80;
+constexpr int max_steps = 80;
 
 struct Load {
   double share = 0.0;  ///< of the limit that is nearest to being reached
@@ -65,7 +65,7 @@ class Search {
     double last_feed = 0.0;
     double last_share = 0.0;
     double next = std::clamp(start, lowest, highest);
-    for (int step = 0; step < most_steps; ++step) {
+    for (int step = 0; step < max_steps; ++step) {
       const Load load = at(next);
       if (load.share <= 1.0) {
         if (next >= highest) return {highest, FeedLimit::none, true};

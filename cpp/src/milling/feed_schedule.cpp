@@ -14,9 +14,9 @@ using detail::refuse;
 
 constexpr double rounding_mm = 1e-9;
 constexpr double same_position_mm = 1e-6;
-constexpr double border_charge = 0.01;    // of the time of the shortest stretch
+constexpr double border_charge = 0.01;    // of the time of the shortest section
 constexpr double candidates = 4.0;        // for a border, per least length within a block
-constexpr double longest_stretch = 16.0;  // least lengths; longer ones come from equal neighbours
+constexpr double longest_section = 16.0;  // least lengths; longer ones come from equal neighbours
 constexpr double seconds_per_minute = 60.0;
 
 void check(std::span<const FeedBlock> blocks, const FeedStations& stations, const FeedScheduleOptions& options) {
@@ -49,7 +49,7 @@ void check(std::span<const FeedBlock> blocks, const FeedStations& stations, cons
   detail::check_pieces(blocks.back().end_mm, options.least_length_mm / candidates, "a quarter of the least length");
 }
 
-// Lowest feed over a stretch; stretches are asked for in ascending order.
+// Lowest feed over a section; sections are asked for in ascending order.
 class LowestFeed {
  public:
   explicit LowestFeed(const FeedStations& stations) : stations_(stations) {}
@@ -69,7 +69,7 @@ class LowestFeed {
   std::size_t first_ = 0;
 };
 
-// A change of feed spread over the way that it needs at most_change per least length.
+// A change of feed spread over the distance that it needs at max_change per least length.
 FeedStations with_ramps(const FeedStations& stations, const FeedScheduleOptions& options) {
   FeedStations ramped = stations;
   if (!std::isfinite(options.most_change_mm_per_min)) {
@@ -112,9 +112,9 @@ std::vector<double> border_candidates(double begin_mm, std::span<const FeedBlock
   return borders;
 }
 
-// Borders of the stretches of one run: the cheapest way from its begin to its end.
+// Borders of the sections of one run: the cheapest ones from its begin to its end.
 void schedule_run(const std::vector<double>& borders, LowestFeed& lowest, const FeedScheduleOptions& options,
-                  std::vector<FeedStretch>& stretches) {
+                  std::vector<FeedStretch>& sections) {
   const std::size_t count = borders.size();
   std::vector<double> between(count - 1);
   for (std::size_t k = 0; k + 1 < count; ++k) {
@@ -133,10 +133,10 @@ void schedule_run(const std::vector<double>& borders, LowestFeed& lowest, const 
     for (std::size_t from = to; from-- > 0;) {
       feed = std::min(feed, between[from]);
       const double length = borders[to] - borders[from];
-      if (length > longest_stretch * options.least_length_mm && std::isfinite(best[to].cost)) {
+      if (length > longest_section * options.least_length_mm && std::isfinite(best[to].cost)) {
         break;
       }
-      // A run that is too short as a whole is one stretch.
+      // A run that is too short as a whole is one section.
       const bool whole = from == 0 && to + 1 == count;
       if ((length < least && !whole) || !std::isfinite(best[from].cost)) {
         continue;
@@ -149,11 +149,11 @@ void schedule_run(const std::vector<double>& borders, LowestFeed& lowest, const 
       }
     }
   }
-  const std::size_t first = stretches.size();
+  const std::size_t first = sections.size();
   for (std::size_t to = count - 1; to > 0; to = best[to].from) {
-    stretches.push_back({borders[best[to].from], borders[to], best[to].feed});
+    sections.push_back({borders[best[to].from], borders[to], best[to].feed});
   }
-  std::reverse(stretches.begin() + static_cast<std::ptrdiff_t>(first), stretches.end());
+  std::reverse(sections.begin() + static_cast<std::ptrdiff_t>(first), sections.end());
 }
 
 Segment piece_of(const Segment& segment, const Vector3& from, const Vector3& to, double share, double feed_mm_per_s) {
@@ -162,16 +162,15 @@ Segment piece_of(const Segment& segment, const Vector3& from, const Vector3& to,
                                           : make_line(from, to, feed_mm_per_s, segment.line);
 }
 
-void limit_change(std::vector<FeedStretch>& stretches, const std::vector<bool>& kept, double most) {
-  for (std::size_t i = 1; i < stretches.size(); ++i) {
+void limit_change(std::vector<FeedStretch>& sections, const std::vector<bool>& kept, double most) {
+  for (std::size_t i = 1; i < sections.size(); ++i) {
     if (!kept[i]) {
-      stretches[i].feed_mm_per_min = std::min(stretches[i].feed_mm_per_min, stretches[i - 1].feed_mm_per_min + most);
+      sections[i].feed_mm_per_min = std::min(sections[i].feed_mm_per_min, sections[i - 1].feed_mm_per_min + most);
     }
   }
-  for (std::size_t i = stretches.size() - 1; i > 0; --i) {
+  for (std::size_t i = sections.size() - 1; i > 0; --i) {
     if (!kept[i - 1]) {
-      stretches[i - 1].feed_mm_per_min =
-          std::min(stretches[i - 1].feed_mm_per_min, stretches[i].feed_mm_per_min + most);
+      sections[i - 1].feed_mm_per_min = std::min(sections[i - 1].feed_mm_per_min, sections[i].feed_mm_per_min + most);
     }
   }
 }
@@ -183,13 +182,13 @@ std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const 
   check(blocks, stations, options);
   const FeedStations ramped = with_ramps(stations, options);
   LowestFeed lowest(ramped);
-  std::vector<FeedStretch> stretches;
+  std::vector<FeedStretch> sections;
   std::vector<bool> kept;
   double begin = 0.0;
   for (std::size_t i = 0; i < blocks.size();) {
     if (blocks[i].kept_mm_per_min > 0.0) {
       if (blocks[i].end_mm > begin) {
-        stretches.push_back({begin, blocks[i].end_mm, blocks[i].kept_mm_per_min});
+        sections.push_back({begin, blocks[i].end_mm, blocks[i].kept_mm_per_min});
         kept.push_back(true);
       }
       begin = blocks[i].end_mm;
@@ -202,51 +201,51 @@ std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const 
     }
     const std::vector<double> borders = border_candidates(begin, blocks.subspan(i, end - i), options.least_length_mm);
     if (borders.size() > 1) {
-      schedule_run(borders, lowest, options, stretches);
-      kept.resize(stretches.size(), false);
+      schedule_run(borders, lowest, options, sections);
+      kept.resize(sections.size(), false);
     }
     begin = blocks[end - 1].end_mm;
     i = end;
   }
-  limit_change(stretches, kept, options.most_change_mm_per_min);
+  limit_change(sections, kept, options.most_change_mm_per_min);
   std::vector<FeedStretch> merged;
-  for (const FeedStretch& stretch : stretches) {
-    if (!merged.empty() && merged.back().feed_mm_per_min == stretch.feed_mm_per_min) {
-      merged.back().end_mm = stretch.end_mm;
+  for (const FeedStretch& section : sections) {
+    if (!merged.empty() && merged.back().feed_mm_per_min == section.feed_mm_per_min) {
+      merged.back().end_mm = section.end_mm;
     } else {
-      merged.push_back(stretch);
+      merged.push_back(section);
     }
   }
   return merged;
 }
 
-Path with_feeds(const Path& path, std::span<const FeedStretch> stretches) {
-  if (stretches.empty() || std::abs(stretches.back().end_mm - path.length_mm()) > same_position_mm) {
-    refuse("the stretches of a feed schedule must cover the path of {} mm", path.length_mm());
+Path with_feeds(const Path& path, std::span<const FeedStretch> sections) {
+  if (sections.empty() || std::abs(sections.back().end_mm - path.length_mm()) > same_position_mm) {
+    refuse("the sections of a feed schedule must cover the path of {} mm", path.length_mm());
   }
   std::vector<Segment> pieces;
-  pieces.reserve(path.size() + stretches.size());
+  pieces.reserve(path.size() + sections.size());
   std::size_t k = 0;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const Segment& segment = path[i];
     const double begin = path.distance_mm(i);
     const double end = path.distance_mm(i + 1);
-    while (k + 1 < stretches.size() && stretches[k].end_mm <= begin + same_position_mm) {
+    while (k + 1 < sections.size() && sections[k].end_mm <= begin + same_position_mm) {
       ++k;
     }
     Vector3 from = segment.start_mm;
     double at = begin;
-    for (; k < stretches.size(); ++k) {
-      const double feed = stretches[k].feed_mm_per_min / seconds_per_minute;
-      if (k + 1 == stretches.size() || stretches[k].end_mm >= end - same_position_mm) {
+    for (; k < sections.size(); ++k) {
+      const double feed = sections[k].feed_mm_per_min / seconds_per_minute;
+      if (k + 1 == sections.size() || sections[k].end_mm >= end - same_position_mm) {
         pieces.push_back(piece_of(segment, from, segment.end_mm, (end - at) / segment.length_mm, feed));
         pieces.back().stop_at_end = segment.stop_at_end;
         break;
       }
-      const Vector3 to = point_at(segment, stretches[k].end_mm - begin);
-      pieces.push_back(piece_of(segment, from, to, (stretches[k].end_mm - at) / segment.length_mm, feed));
+      const Vector3 to = point_at(segment, sections[k].end_mm - begin);
+      pieces.push_back(piece_of(segment, from, to, (sections[k].end_mm - at) / segment.length_mm, feed));
       from = to;
-      at = stretches[k].end_mm;
+      at = sections[k].end_mm;
     }
   }
   return Path(pieces);
@@ -266,7 +265,7 @@ void look_ahead_on_load(FeedStations& stations, std::span<const double> load_mm_
     if (!std::isfinite(load)) {
       continue;
     }
-    const double begin = i > 0 ? s[i - 1] : 0.0;  // of the stretch for which station i speaks
+    const double begin = i > 0 ? s[i - 1] : 0.0;  // of the section for which station i speaks
     for (std::size_t k = i; k-- > 0 && begin - s[k] < before_s[i] * load / seconds_per_minute;) {
       feed[k] = std::min(feed[k], load);
     }

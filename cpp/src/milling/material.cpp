@@ -18,10 +18,10 @@ using Eigen::Vector2d;
 
 constexpr double level_mm = 1e-6;  // a move that climbs by less stays on its level
 constexpr double same_height_mm = 1e-3;
-constexpr double least_slope = 1e-3;  // horizontal share below which a move is a plunge
+constexpr double min_slope = 1e-3;  // horizontal share below which a move is a plunge
 constexpr double megabyte = 1e6;
-constexpr double largest_mm = 1e9;        // resolution
-constexpr double most_nodes_away = 1e12;  // so far from the origin three digits of a place within its cell are left
+constexpr double largest_mm = 1e9;       // resolution
+constexpr double max_nodes_away = 1e12;  // so far from the origin three digits of a position within its cell are left
 
 double cross(const Vector2d& a, const Vector2d& b) noexcept { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -74,9 +74,9 @@ Material::Material(std::span<const Ring> rings, std::span<const double> borders_
     }
   }
   const double furthest_mm = std::max(low_.cwiseAbs().maxCoeff(), high_.cwiseAbs().maxCoeff());
-  if (!(furthest_mm <= resolution_mm * most_nodes_away)) {
+  if (!(furthest_mm <= resolution_mm * max_nodes_away)) {
     refuse("the stock reaches to {} mm from the origin, limit {:g} mm at a resolution of {} mm", furthest_mm,
-           resolution_mm * most_nodes_away, resolution_mm);
+           resolution_mm * max_nodes_away, resolution_mm);
   }
   // The flags of all tiles, and the tiles along the outline: an estimate before anything is allocated.
   const double tile_mm = resolution_mm * MaterialLayer::tile_nodes;
@@ -212,7 +212,7 @@ std::vector<double> layer_borders(std::span<const Path* const> paths, double bot
       falls = cuts && climb < -level_mm;
       if (std::abs(climb) <= level_mm) {
         levels.push_back(segment.start_mm.z());
-      } else if (cuts && std::abs(climb) < segment.length_mm * std::sqrt(1.0 - least_slope * least_slope)) {
+      } else if (cuts && std::abs(climb) < segment.length_mm * std::sqrt(1.0 - min_slope * min_slope)) {
         ramps.push_back(std::minmax(segment.start_mm.z(), segment.end_mm.z()));
       }
     }

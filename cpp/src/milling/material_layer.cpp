@@ -10,22 +10,22 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::int64_t edge = MaterialLayer::tile_nodes;
-constexpr float least_change = 1e-5F;  // mm; less is rounding
-constexpr std::size_t least_growth_tiles = 32;
+constexpr float min_change = 1e-5F;  // mm; less is rounding
+constexpr std::size_t min_growth_tiles = 32;
 
-double distance_to_edge(const Vector2d& place, const Vector2d& a, const Vector2d& b) noexcept {
+double distance_to_edge(const Vector2d& point, const Vector2d& a, const Vector2d& b) noexcept {
   const Vector2d along = b - a;
   const double squared = along.squaredNorm();
-  const double share = squared > 0.0 ? std::clamp((place - a).dot(along) / squared, 0.0, 1.0) : 0.0;
-  return (place - a - share * along).norm();
+  const double share = squared > 0.0 ? std::clamp((point - a).dot(along) / squared, 0.0, 1.0) : 0.0;
+  return (point - a - share * along).norm();
 }
 
-/// The first index at or beyond a place on the grid, within 0 ... count.
-std::int64_t first_at(double place, double count) noexcept {
-  if (!(place > 0.0)) return 0;
-  if (place >= count) return static_cast<std::int64_t>(count);
-  const auto below = static_cast<std::int64_t>(place);
-  return below + (static_cast<double>(below) < place ? 1 : 0);
+/// The first index at or beyond a position on the grid, within 0 ... count.
+std::int64_t first_at(double position, double count) noexcept {
+  if (!(position > 0.0)) return 0;
+  if (position >= count) return static_cast<std::int64_t>(count);
+  const auto below = static_cast<std::int64_t>(position);
+  return below + (static_cast<double>(below) < position ? 1 : 0);
 }
 
 /// Share of a node's cell that is material.
@@ -33,7 +33,7 @@ double coverage(double distance, double spacing) noexcept { return std::clamp(di
 
 }  // namespace
 
-/// A step and how far it reaches. Lengths and places are in nodes of the grid but for the shape and the radius.
+/// A step and how far it reaches. Lengths and positions are in nodes of the grid but for the shape and the radius.
 struct MaterialLayer::Sweep {
   Sweep(const ToolStep& step, double radius_mm, double band_mm, double spacing, const Vector2d& origin, bool goes_on)
       : shape(step),
@@ -74,7 +74,7 @@ MaterialLayer::MaterialLayer(std::span<const Ring> rings, double resolution_mm)
       high = high.cwiseMax(point);
     }
   }
-  // One more node than the band on every side, so that all beyond the grid is as far outside as can be told.
+  // One more node than the band on every side, so that all beyond the grid is as far outside as the grid reaches.
   const double margin = band_ + spacing_;
   x0_ = low.x() - margin;
   y0_ = low.y() - margin;
@@ -157,10 +157,10 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
     for (std::int64_t n = 0; n < edge * edge; ++n) {
       const std::int64_t i = i0 + n % edge;
       const std::int64_t j = j0 + n / edge;
-      const Vector2d place(x_of(i), y_of(j));
+      const Vector2d point(x_of(i), y_of(j));
       double distance = band_;
       for (auto k = first; k != next; ++k) {
-        distance = std::min(distance, distance_to_edge(place, k->second.a, k->second.b));
+        distance = std::min(distance, distance_to_edge(point, k->second.a, k->second.b));
       }
       tile[static_cast<std::size_t>(n)] = static_cast<float>(inside(i, j) ? distance : -distance);
     }
@@ -169,16 +169,16 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
 }
 
 std::int32_t MaterialLayer::new_tile(float value) {
-  std::int32_t place = 0;
+  std::int32_t tile = 0;
   if (free_.empty()) {
-    place = static_cast<std::int32_t>(pool_.size());
+    tile = static_cast<std::int32_t>(pool_.size());
     pool_.emplace_back();
   } else {
-    place = free_.back();
+    tile = free_.back();
     free_.pop_back();
   }
-  pool_[static_cast<std::size_t>(place)].fill(value);
-  return place;
+  pool_[static_cast<std::size_t>(tile)].fill(value);
+  return tile;
 }
 
 double MaterialLayer::node(std::int64_t i, std::int64_t j) const noexcept {
@@ -314,7 +314,7 @@ bool MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_
       for (int k = 0; k < packets * packet; ++k) {
         const float squared = shape.parts(x + spacing * static_cast<float>(k), y).squared(1.0F);
         const float value = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
-        changed |= static_cast<int>(values[k] - value > least_change);
+        changed |= static_cast<int>(values[k] - value > min_change);
         values[k] = value;
       }
     } else {
@@ -322,7 +322,7 @@ bool MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_
         const auto parts = shape.parts(x + spacing * static_cast<float>(k), y);
         const float squared = parts.squared(std::sqrt(parts.square));
         const float value = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
-        changed |= static_cast<int>(values[k] - value > least_change);
+        changed |= static_cast<int>(values[k] - value > min_change);
         values[k] = value;
       }
     }
@@ -384,7 +384,7 @@ void MaterialLayer::compact() {
   }
   // Next time when those with values have grown by a quarter: uniform ones are passed over quickly, and the search
   // costs little beside what made them.
-  compact_at_tiles_ = tiles() + tiles() / 4 + least_growth_tiles;
+  compact_at_tiles_ = tiles() + tiles() / 4 + min_growth_tiles;
 }
 
 std::size_t MaterialLayer::bytes() const noexcept {

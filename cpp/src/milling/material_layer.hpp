@@ -13,7 +13,7 @@
 
 namespace shapegcode {
 
-/// Material between two heights: on a grid, how far each node lies from the nearest place without material (above 0: in
+/// Material between two heights: on a grid, how far each node lies from the nearest point without material (above 0: in
 /// material, below 0: outside). Between the nodes the distance is interpolated bilinearly, so that a smooth boundary
 /// is known much better than the grid: to h^2/(8 r) at a radius r; only at its kinks the error is of order h. Distances
 /// are kept up to `band_mm`; square tiles that lie wholly beyond carry one flag instead of values.
@@ -26,7 +26,7 @@ class MaterialLayer {
   /// Distance from the boundary, positive in material, mm; within +- band_mm.
   [[nodiscard]] double distance_mm(double x_mm, double y_mm) const noexcept;
 
-  /// No node within `radius_mm` of a place lies in a tile with material.
+  /// No node within `radius_mm` of a point lies in a tile with material.
   [[nodiscard]] bool is_empty_around(double x_mm, double y_mm, double radius_mm) const noexcept;
 
   /// Takes away what a tool of this radius sweeps on a step. `continues`: the disc at the step's start was swept

@@ -37,12 +37,12 @@ void FluteSet::add(const EngagedPart& part, const ChipTable& table, double azimu
   ChipTable::Values lower;
   table.cumulated(low, lower);
   table.cumulated(high, upper);
-  add_stretch(part, table, azimuth, {low, high, lower, upper}, sum);
+  add_section(part, table, azimuth, {low, high, lower, upper}, sum);
 }
 
-void FluteSet::add_stretch(const EngagedPart& part, const ChipTable& table, double azimuth, const FluteStretch& stretch,
+void FluteSet::add_section(const EngagedPart& part, const ChipTable& table, double azimuth, const FluteSection& section,
                            ChipTable::Values& sum) const noexcept {
-  const auto [low, high, lower, upper] = stretch;
+  const auto [low, high, lower, upper] = section;
   const double share = 1.0 / lag_rad_per_mm;
   if (part.slope_per_mm == 0.0) {
     const double weight = part.weight * share;
@@ -89,19 +89,19 @@ void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPart> 
     }
   }
   std::sort(kinks_.begin(), kinks_.end());
-  // Kinks that are nearly the same are one, with no angle between them; a stretch leads from its last to the next's
+  // Kinks that are nearly the same are one, with no angle between them; a section leads from its last to the next's
   // first.
-  stretch_ends_.clear();
+  section_ends_.clear();
   for (std::size_t i = 0; i < kinks_.size(); ++i) {
     const double next = i + 1 < kinks_.size() ? kinks_[i + 1] : kinks_.front() + set.pitch_rad;
-    if (next - kinks_[i] >= same_kink_rad) stretch_ends_.emplace_back(kinks_[i], next);
+    if (next - kinks_[i] >= same_kink_rad) section_ends_.emplace_back(kinks_[i], next);
   }
 
   angle_.clear();
   weight_.clear();
-  stretches_.clear();
-  for (const auto& [first, last] : stretch_ends_) {
-    stretches_.push_back(angle_.size());
+  sections_.clear();
+  for (const auto& [first, last] : section_ends_) {
+    sections_.push_back(angle_.size());
     const double length = last - first;
     const bool brief = length < brief_rad;
     const auto steps = brief ? 1 : 2 * static_cast<std::size_t>(std::ceil(length / panel_rad));
@@ -113,7 +113,7 @@ void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPart> 
       weight_.push_back(step / (brief ? 2.0 : 3.0) * (end ? 1.0 : (k % 2 == 1 ? 4.0 : 2.0)) / set.pitch_rad);
     }
   }
-  stretches_.push_back(angle_.size());
+  sections_.push_back(angle_.size());
 }
 
 // What the flutes of a kind have in a part, pass by pass.
@@ -156,7 +156,7 @@ void Revolution::add(const FluteSet& set, const EngagedPart& part, std::size_t k
       const ChipTable::Values& low = tip_inside ? lower : at_from;
       const ChipTable::Values& high = top_inside ? upper : at_to;
       ChipTable::Values value{};
-      set.add_stretch(part, table, azimuth,
+      set.add_section(part, table, azimuth,
                       {tip_inside ? tip : part.from_rad, top_inside ? top : part.to_rad, low, high}, value);
       for (std::size_t k = 0; k < size_; ++k) to[k * n + j] += value[k];
     }
@@ -199,14 +199,14 @@ void Revolution::weigh(const double* integrals, const ChipTable::Values& by, std
   }
 }
 
-// Largest value on the grid or of a parabola through three neighbours of one stretch.
+// Largest value on the grid or of a parabola through three neighbours of one section.
 double Revolution::peak(const std::vector<double>& values) const noexcept {
   double largest = 0.0;
   for (const double value : values) largest = std::max(largest, value);
   const double worth_a_look = 0.98 * largest;
   double found = largest;
-  for (std::size_t s = 0; s + 1 < stretches_.size(); ++s) {
-    for (std::size_t j = stretches_[s] + 1; j + 1 < stretches_[s + 1]; ++j) {
+  for (std::size_t s = 0; s + 1 < sections_.size(); ++s) {
+    for (std::size_t j = sections_[s] + 1; j + 1 < sections_[s + 1]; ++j) {
       if (values[j] < worth_a_look) continue;
       const double slope = 0.5 * (values[j + 1] - values[j - 1]);
       const double bend = values[j + 1] - 2.0 * values[j] + values[j - 1];

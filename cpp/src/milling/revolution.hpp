@@ -31,7 +31,7 @@ struct ChipMix {
 };
 
 /// What of a flute is in a part: from azimuth `low` to `high`, with the integrals of ChipTable at both.
-struct FluteStretch {
+struct FluteSection {
   double low;
   double high;
   const ChipTable::Values& lower;
@@ -49,8 +49,8 @@ struct FluteSet {
   [[nodiscard]] bool straight(const EngagedPart& part) const noexcept {
     return lag_rad_per_mm * (part.top_mm - part.bottom_mm) < 1e-6;
   }
-  /// Adds the force over a stretch of a part, the flute's tip at `azimuth`.
-  void add_stretch(const EngagedPart& part, const ChipTable& table, double azimuth, const FluteStretch& stretch,
+  /// Adds the force over a section of a part, the flute's tip at `azimuth`.
+  void add_section(const EngagedPart& part, const ChipTable& table, double azimuth, const FluteSection& section,
                    ChipTable::Values& sum) const noexcept;
   /// Adds what a flute whose tip stands at `azimuth` has in a part.
   void add(const EngagedPart& part, const ChipTable& table, double azimuth, ChipTable::Values& sum) const noexcept;
@@ -82,12 +82,12 @@ class Revolution {
   std::size_t kinds_ = 0;   // different flutes
   double pitch_ = 0.0;
   std::vector<double> kinks_;
-  std::vector<std::pair<double, double>> stretch_ends_;
-  std::vector<double> angle_;           // of the tip of the first flute, within a pitch
-  std::vector<double> weight_;          // of Simpson's rule
-  std::vector<std::size_t> stretches_;  // first angle of each stretch between kinks, and the end
-  std::vector<double> flute_;           // [kind][pass][integral][angle]
-  std::vector<double> total_;           // [turn by a pitch][integral][angle]
+  std::vector<std::pair<double, double>> section_ends_;
+  std::vector<double> angle_;          // of the tip of the first flute, within a pitch
+  std::vector<double> weight_;         // of Simpson's rule
+  std::vector<std::size_t> sections_;  // first angle of each section between kinks, and the end
+  std::vector<double> flute_;          // [kind][pass][integral][angle]
+  std::vector<double> total_;          // [turn by a pitch][integral][angle]
   std::vector<double> x_;
   std::vector<double> y_;
   std::vector<double> t_;

@@ -30,13 +30,13 @@ constexpr double largest_turn_rad = 0.35;  // of one step on an arc
 // Behind a vertex the load changes at once: the first step there is cut up at these shares.
 constexpr std::array<double, 4> shares_behind_vertex = {0.0625, 0.125, 0.25, 0.5};
 constexpr double vertex_rad = 0.05;
-// The newest way is kept apart from the grid, exactly, for this share of the radius: beside the tool it has left its
-// own wall a moment ago, and errors of the grid there must not be taken for material.
+// The newest step of the tool is kept apart from the grid, exactly, for this share of the radius: beside the tool it
+// has left its own wall a moment ago, and errors of the grid there must not be taken for material.
 constexpr double exact_share = 0.1;
 constexpr double widest_look_rad = 0.05;  // between two looks along the circumference
 constexpr double azimuth_tolerance_rad = 1e-7;
 constexpr double same_azimuth_rad = 1e-4;
-constexpr double least_horizontal = 1e-6;
+constexpr double min_horizontal = 1e-6;
 constexpr double touching_mm = 1e-6;  // a tip so little below a layer's top stands on it
 constexpr std::size_t samples_between_reports = 1024;
 
@@ -102,7 +102,7 @@ class Sweeper {
     const double spacing = segment.length_mm / count;
     const Vector3 start_tangent = tangent_at(segment, 0.0);
     const Vector2d start_direction = start_tangent.head<2>();
-    if (start_direction.norm() > least_horizontal && !goes_on(start_direction.normalized())) {
+    if (start_direction.norm() > min_horizontal && !goes_on(start_direction.normalized())) {
       for (const double share : shares_behind_vertex) stations_.push_back(share * spacing);
     }
     for (double k = 1.0; k < count; ++k) stations_.push_back(k * spacing);
@@ -136,18 +136,18 @@ class Sweeper {
   }
 
   /// The tool is where the path begins: its disc has gone.
-  void stand_at(const Vector3& place) {
-    last_point_ = place.head<2>();
-    last_lowest_ = material_.lowest_cut(place.z());
+  void stand_at(const Vector3& position) {
+    last_point_ = position.head<2>();
+    last_lowest_ = material_.lowest_cut(position.z());
     pending_.push_back({ToolStep(last_point_, last_point_), last_lowest_, index_, 0.0, false, 0});
   }
 
   void sample(const Segment& segment, double begin_mm, double to_mm, std::size_t lowest) {
-    const Vector3 place = point_at(segment, to_mm);
+    const Vector3 position = point_at(segment, to_mm);
     const Vector3 tangent = tangent_at(segment, to_mm);
-    const Vector2d point = place.head<2>();
+    const Vector2d point = position.head<2>();
     const double along = tangent.head<2>().norm();
-    const bool travels = along > least_horizontal;
+    const bool travels = along > min_horizontal;
     const double horizontal = tangent.z() == 0.0 ? 1.0 : (travels ? std::min(1.0, along) : 0.0);
     const Vector2d direction = travels ? Vector2d(tangent.head<2>() / along) : Vector2d::Zero();
 
@@ -159,10 +159,10 @@ class Sweeper {
         meet(layer, point, direction);
         // A tool takes away everything above its tip, so above a layer without material there is none either.
         if (found_.empty()) break;
-        area += add_arcs(layer, place.z());
+        area += add_arcs(layer, position.z());
       }
     }
-    const double plunged = tangent.z() < 0.0 ? plunged_area(place, lowest) : 0.0;
+    const double plunged = tangent.z() < 0.0 ? plunged_area(position, lowest) : 0.0;
 
     track_.s_mm.push_back(begin_mm + to_mm);
     track_.x_mm.push_back(point.x());
@@ -190,19 +190,20 @@ class Sweeper {
 
   /// Area below the end of a tool on its way down. A layer is taken away when the tip passes its middle: above that it
   /// is looked at, below it counts what was there.
-  [[nodiscard]] double plunged_area(const Vector3& place, std::size_t lowest) {
-    if (lowest > 0 && place.z() < material_.borders_mm()[lowest] - touching_mm) {
+  [[nodiscard]] double plunged_area(const Vector3& position, std::size_t lowest) {
+    if (lowest > 0 && position.z() < material_.borders_mm()[lowest] - touching_mm) {
       plunged_layer_ = lowest - 1;
       // Less than a rim as wide as the grid is what the grid does not know.
       const double rim_mm2 = 2.0 * std::numbers::pi * radius_ * material_.resolution_mm();
-      const double area = area_below(lowest - 1, place.head<2>());
+      const double area = area_below(lowest - 1, position.head<2>());
       plunged_mm2_ = area > rim_mm2 ? area : 0.0;
       return plunged_mm2_;
     }
     return plunged_layer_ == lowest ? plunged_mm2_ : 0.0;
   }
 
-  /// Adds the way to a place to what is pending; on one segment to the latest step, so that the grid has less to do.
+  /// Adds the travel to a position to what is pending; on one segment to the latest step, so that the grid has less to
+  /// do.
   void travel(const Segment& segment, const Vector2d& point, std::size_t lowest, double end_mm) {
     double curvature = 0.0;
     if (segment.kind == SegmentKind::arc) {
@@ -240,13 +241,13 @@ class Sweeper {
     pending_.pop_front();
   }
 
-  /// Distance of a place on the tool's circumference from where there is no material, the newest way included.
-  [[nodiscard]] double distance(std::size_t layer, const Vector2d& place) {
-    double d = material_.layer(layer).distance_mm(place.x(), place.y());
+  /// Distance of a position on the tool's circumference from where there is no material, the newest step included.
+  [[nodiscard]] double distance(std::size_t layer, const Vector2d& position) {
+    double d = material_.layer(layer).distance_mm(position.x(), position.y());
     in_grid_ = d;
     if (d <= 0.0) return d;
     for (const LayerStep& swept : pending_) {
-      if (swept.lowest <= layer) d = std::min(d, swept.step.distance_mm(place) - radius_);
+      if (swept.lowest <= layer) d = std::min(d, swept.step.distance_mm(position) - radius_);
     }
     return d;
   }
@@ -368,7 +369,7 @@ class Sweeper {
   const SweepOptions& options_;
   double grid_error_ = 0.0;
   double touch_ = 0.0;
-  double in_grid_ = 0.0;  // the latest distance, without the newest way: tells how deep a contact is at any step
+  double in_grid_ = 0.0;  // the latest distance, without the newest step: tells how deep a contact is at any step
   double kept_mm_ = 0.0;
   double longest_step_mm_ = 0.0;
   std::vector<Look> looks_;

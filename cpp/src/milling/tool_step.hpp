@@ -1,4 +1,4 @@
-// Private to milling: the way of a tool that the grid and the closed form measure distances from.
+// Private to milling: the step of a tool that the grid and the closed form measure distances from.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,8 +7,8 @@
 
 namespace shapegcode {
 
-/// A short way of the tool's axis in the XY plane, a line or an arc of less than half a turn, and the distance from it.
-/// A line is an arc without curvature; coordinates count from the start, so that large arcs lose no digits.
+/// A short travel of the tool's axis in the XY plane, a line or an arc of less than half a turn, and the distance from
+/// it. A line is an arc without curvature; coordinates count from the start, so that large arcs lose no digits.
 class ToolStep {
  public:
   /// `curvature_per_mm` > 0 turns left, < 0 right, 0 is a line. Start and end may be the same point.
@@ -33,8 +33,8 @@ class ToolStep {
   [[nodiscard]] double curvature() const noexcept { return curvature_; }
   [[nodiscard]] const Eigen::Vector2d& start_tangent() const noexcept { return start_tangent_; }
 
-  /// What the distance is made of at a place (x, y) from the start. Beside the arc (weight 1) it is
-  /// |offset / (1 + sqrt(square))|, where `square` is the squared ratio of the place's distance from the arc's centre
+  /// What the distance is made of at a point (x, y) from the start. Beside the arc (weight 1) it is
+  /// |offset / (1 + sqrt(square))|, where `square` is the squared ratio of the point's distance from the arc's centre
   /// to its radius; elsewhere (weight 0) it is the root of `end`, the squared distance of the nearer end. In between,
   /// for 1 nm, both are the same. A weight instead of a choice keeps rows of a grid free of branches.
   template <typename Scalar>
@@ -51,7 +51,7 @@ class ToolStep {
     }
   };
 
-  /// The constants of a step as the kernels want them: double for single places, float for rows of a grid.
+  /// The constants of a step as the kernels want them: double for single points, float for rows of a grid.
   template <typename Scalar>
   struct Shape {
     explicit Shape(const ToolStep& step)
@@ -78,9 +78,9 @@ class ToolStep {
     Scalar curvature, t0x, t0y, t1x, t1y, cx, cy;
   };
 
-  /// Distance of a place from the step, mm.
-  [[nodiscard]] double distance_mm(const Eigen::Vector2d& place) const noexcept {
-    const Eigen::Vector2d v = place - from_;
+  /// Distance of a point from the step, mm.
+  [[nodiscard]] double distance_mm(const Eigen::Vector2d& point) const noexcept {
+    const Eigen::Vector2d v = point - from_;
     const Parts<double> p = Shape<double>(*this).parts(v.x(), v.y());
     return std::sqrt(p.squared(std::sqrt(p.square)));
   }

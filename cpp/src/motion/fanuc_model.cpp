@@ -22,7 +22,7 @@ void require_wait(const char* name, double value) {
 }
 
 void add_average(std::vector<Fir>& filters, double time_s, double period_s) {
-  const auto length = require_count(std::round(time_s / period_s), most_filter_samples, "a filter", "periods");
+  const auto length = require_count(std::round(time_s / period_s), max_filter_samples, "a filter", "periods");
   if (length > 1) {
     filters.push_back(Fir::moving_average(static_cast<int>(length)));
   }
@@ -75,7 +75,7 @@ void check(const FanucModel& model) {
     require_above_zero(model.rapid_rate_mm_per_s[i], "rapid rate", "mm/s");
     require_ramp("rapid time constant", model.rapid_time_constant_s[i]);
     require_wait("in-position wait", model.in_position_s[i]);
-    require_wait("way that is not known", model.unknown_move_s[i]);
+    require_wait("rapid from an unknown position", model.unknown_move_s[i]);
     require_above_zero(model.position_gain_per_s[i], "position gain", "1/s");
     require_above_zero(model.in_position_width_mm[i], "in-position width", "mm");
     require(model.feed_forward_ratio[i] >= 0.0 && model.feed_forward_ratio[i] <= 1.0, "feed-forward ratio",

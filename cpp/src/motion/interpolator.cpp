@@ -12,7 +12,7 @@ namespace {
 int smoothing_length(const SpeedProfile& profile, double period_s) {
   require_period(period_s);
   const double length = std::round(profile.jerk_time_s() / period_s);
-  return std::max(1, static_cast<int>(require_count(length, most_filter_samples, "the jerk time", "periods")));
+  return std::max(1, static_cast<int>(require_count(length, max_filter_samples, "the jerk time", "periods")));
 }
 
 }  // namespace
@@ -29,7 +29,7 @@ Interpolator::Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<con
   smoothing_.reset({&rest, 1});
   // A ramp that ends on a tick to within rounding ends there.
   const double ramps = std::ceil((profile_->ramp_duration_s() + delay_s) / period_s - 1e-9);
-  sample_count_ = static_cast<std::size_t>(require_count(ramps, most_set_points, "a path", "set-points")) + 1 +
+  sample_count_ = static_cast<std::size_t>(require_count(ramps, max_set_points, "a path", "set-points")) + 1 +
                   static_cast<std::size_t>(smoothing_.fir().duration_samples());
   if (path_->size() > 0) take_segment();
 }

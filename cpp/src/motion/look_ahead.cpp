@@ -109,7 +109,7 @@ class Zones {
 
   [[nodiscard]] bool empty() const noexcept { return at_start_.size() == 0; }
   std::size_t split(std::size_t i, const Segment& segment, double limit, double beside_turn,
-                    std::array<Stretch, most_pieces>& out) const noexcept {
+                    std::array<Section, max_pieces>& out) const noexcept {
     return split_segment(at_start_[i], at_end_[at_end_.size() - 1 - i], segment.length_mm, limit, beside_turn, out);
   }
 
@@ -122,18 +122,18 @@ std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, con
                                const Zones& zones) {
   std::vector<Piece> pieces;
   pieces.reserve(path.size());
-  std::array<Stretch, most_pieces> stretches;
+  std::array<Section, max_pieces> sections;
   for (std::size_t i = 0; i < path.size(); ++i) {
     std::size_t count = 1;
     const Segment segment = path[i];
-    stretches[0] = {segment.length_mm, speeds.on_segment[i], false};
+    sections[0] = {segment.length_mm, speeds.on_segment[i], false};
     if (!zones.empty()) {
       const double beside_turn = speeds.jump.empty() ? MotionLimits::none : limit_beside_turn(segment, limits);
-      count = zones.split(i, segment, speeds.on_segment[i], beside_turn, stretches);
+      count = zones.split(i, segment, speeds.on_segment[i], beside_turn, sections);
     }
     for (std::size_t k = 0; k < count; ++k) {
-      const auto& [length, limit, eased] = stretches[k];
-      pieces.push_back({length, limit, segment_acceleration(segment, limit, limits, eased), MotionLimits::none});
+      const auto& [length, limit, reduced] = sections[k];
+      pieces.push_back({length, limit, segment_acceleration(segment, limit, limits, reduced), MotionLimits::none});
     }
   }
   return pieces;
@@ -209,8 +209,8 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const Filt
   const std::vector<Piece> pieces = planned_pieces(path, limits, filter, caps, jerk_s);
   PhaseMaker maker(limits);
   // Room that is not used is no memory; a list that grows is copied while both stand.
-  maker.ready().reserve(most_phases * pieces.size());
-  std::array<Ramp, most_phases> ramps;
+  maker.ready().reserve(max_phases * pieces.size());
+  std::array<Ramp, max_phases> ramps;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     const double end_speed = i + 1 < pieces.size() ? pieces[i + 1].start_speed : 0.0;
     const std::size_t count = ramps_of(pieces[i], pieces[i].start_speed, end_speed, maker.length_mm(), ramps);

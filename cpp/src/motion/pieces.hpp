@@ -1,4 +1,4 @@
-// Stretches of path with one limit each, the speeds where they meet, and the phases of constant acceleration within
+// Sections of path with one limit each, the speeds where they meet, and the phases of constant acceleration within
 // them. Used by both forms of the look-ahead: over a whole path, and over a window of it.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace shapegcode {
 
-/// A stretch of path with one speed limit and one acceleration.
+/// A section of path with one speed limit and one acceleration.
 struct Piece {
   double length = 0.0;
   double limit = 0.0;
@@ -21,7 +21,7 @@ struct Piece {
   double start_speed = 0.0;
 };
 
-/// A slow or eased stretch that reaches over a junction into a neighbour.
+/// A slow or reduced section that reaches over a junction into a neighbour.
 struct Zone {
   double limit = MotionLimits::none;
   double reach = 0.0;
@@ -62,7 +62,7 @@ inline Zone zone_of_jump(Jump jump, double speed, double steepest, double time_s
   return {static_cast<double>(jump), time_s * (speed + 0.5 * steepest * time_s)};
 }
 
-/// How far before and behind a slow place the smoothing by the jerk time wants its speed.
+/// How far before and behind a slow position the smoothing by the jerk time wants its speed.
 inline double slow_reach(double speed, double jerk_s) noexcept { return 0.5 * speed * jerk_s; }
 
 inline ZoneSet junction_zones(const JunctionSpeeds& at, const MotionLimits& limits, double jerk_s) noexcept {
@@ -103,19 +103,19 @@ inline void cut_to(ZoneSet& zones, double fastest, double time_s) noexcept {
 }
 
 /// Of a segment: a border on each side of each zone, at most.
-inline constexpr std::size_t most_pieces = 2 * zone_kinds + 1;
+inline constexpr std::size_t max_pieces = 2 * zone_kinds + 1;
 
-struct Stretch {
+struct Section {
   double length = 0.0;
   double limit = 0.0;
-  bool eased = false;
+  bool reduced = false;
 };
 
-/// The stretches between the borders of a segment's zones; their number is returned.
+/// The sections between the borders of a segment's zones; their number is returned.
 /// `beside_turn`: limit beside a jump of direction.
 inline std::size_t split_segment(const ZoneSet& at_start, const ZoneSet& at_end, double length, double limit,
-                                 double beside_turn, std::array<Stretch, most_pieces>& stretches) noexcept {
-  std::array<double, most_pieces + 1> marks{0.0, length};
+                                 double beside_turn, std::array<Section, max_pieces>& sections) noexcept {
+  std::array<double, max_pieces + 1> marks{0.0, length};
   std::size_t count = 2;
   const auto mark = [&](double at) {  // in their order
     std::size_t k = count++;
@@ -128,24 +128,24 @@ inline std::size_t split_segment(const ZoneSet& at_start, const ZoneSet& at_end,
     if (from_start > 0.0 && from_start < length) mark(from_start);
     if (from_end > 0.0 && from_end < length) mark(length - from_end);
   }
-  const auto keep = [&](Stretch& stretch, std::size_t kind, double of_zone) {
+  const auto keep = [&](Section& section, std::size_t kind, double of_zone) {
     if (kind == jump_zone) {
-      stretch.eased = true;
-      if (of_zone == static_cast<double>(Jump::turn)) stretch.limit = std::min(stretch.limit, beside_turn);
+      section.reduced = true;
+      if (of_zone == static_cast<double>(Jump::turn)) section.limit = std::min(section.limit, beside_turn);
     } else {
-      stretch.limit = std::min(stretch.limit, of_zone);
+      section.limit = std::min(section.limit, of_zone);
     }
   };
   std::size_t made = 0;
   for (std::size_t k = 0; k + 1 < count; ++k) {
     if (marks[k + 1] <= marks[k]) continue;
     const double middle = 0.5 * (marks[k] + marks[k + 1]);
-    Stretch stretch{marks[k + 1] - marks[k], limit, false};
+    Section section{marks[k + 1] - marks[k], limit, false};
     for (std::size_t kind = 0; kind < zone_kinds; ++kind) {
-      if (middle < at_start[kind].reach) keep(stretch, kind, at_start[kind].limit);
-      if (middle > length - at_end[kind].reach) keep(stretch, kind, at_end[kind].limit);
+      if (middle < at_start[kind].reach) keep(section, kind, at_start[kind].limit);
+      if (middle > length - at_end[kind].reach) keep(section, kind, at_end[kind].limit);
     }
-    stretches[made++] = stretch;
+    sections[made++] = section;
   }
   return made;
 }
@@ -157,20 +157,20 @@ inline double speed_beyond(const Piece& piece, double speed) noexcept {
 
 /// Phases of a profile in a row; one that goes on as its predecessor did is joined to it.
 struct PhaseJoin {
-  /// Time of a ramp or a steady stretch from v0 to v1 over `distance`.
+  /// Time of a ramp or a steady section from v0 to v1 over `distance`.
   static double duration_s(double v0, double v1, double distance) noexcept { return 2.0 * distance / (v0 + v1); }
   static bool joins(const SpeedPhase& last, double v0, double acceleration) noexcept {
     const double scale = std::max(std::abs(last.acceleration_mm_per_s2), std::abs(acceleration));
     const double end_speed = last.speed_mm_per_s + last.acceleration_mm_per_s2 * last.duration_s;
-    // Without an acceleration limit the speed jumps from one steady stretch to the next.
+    // Without an acceleration limit the speed jumps from one steady section to the next.
     const bool goes_on = std::abs(end_speed - v0) <= 1e-6 * (end_speed + v0);
     return goes_on && (std::abs(last.acceleration_mm_per_s2 - acceleration) <= 1e-9 * scale || scale == 0.0);
   }
 };
 
-inline constexpr std::size_t most_phases = 3;  // of a piece: up, steady, down
+inline constexpr std::size_t max_phases = 3;  // of a piece: up, steady, down
 
-/// A ramp or a steady stretch from v0 to v1.
+/// A ramp or a steady section from v0 to v1.
 struct Ramp {
   double v0 = 0.0;
   double v1 = 0.0;
@@ -178,9 +178,9 @@ struct Ramp {
 };
 
 /// The ramps of a piece between two speeds, as short in time as its limits let them be. `behind`: length of all before
-/// it, beside which dust of rounding is no stretch of its own. Their number is returned.
+/// it, beside which round-off is no section of its own. Their number is returned.
 inline std::size_t ramps_of(const Piece& piece, double v0, double v1, double behind,
-                            std::array<Ramp, most_phases>& ramps) noexcept {
+                            std::array<Ramp, max_phases>& ramps) noexcept {
   const double a = piece.acceleration;
   if (!std::isfinite(a)) {
     ramps[0] = {piece.limit, piece.limit, piece.length};

@@ -65,7 +65,7 @@ PlainPlan::Phases::Phases(std::shared_ptr<const PlainPlan> plan) : plan_(std::mo
 bool PlainPlan::Phases::next(SpeedPhase& phase) {
   const std::vector<double>& speeds = plan_->start_speeds_;
   std::vector<SpeedPhase>& ready = maker_.ready();
-  std::array<Ramp, most_phases> ramps;
+  std::array<Ramp, max_phases> ramps;
   while (given_ == ready.size()) {
     ready.clear();
     given_ = 0;
@@ -101,11 +101,11 @@ PlannedMotion::PlannedMotion(Path path, const MotionLimits& limits, double perio
 }
 
 void PlannedMotion::check_count() const {
-  if (plan_->longest_s() / period_s_ < most_set_points) return;
+  if (plan_->longest_s() / period_s_ < max_set_points) return;
   double duration_s = 0.0;
   PlainPlan::Phases all(plan_);
   for (SpeedPhase phase; all.next(phase);) duration_s = phase.start_s + phase.duration_s;
-  static_cast<void>(require_count(std::ceil(duration_s / period_s_ - 1e-9), most_set_points, "a path", "set-points"));
+  static_cast<void>(require_count(std::ceil(duration_s / period_s_ - 1e-9), max_set_points, "a path", "set-points"));
 }
 
 void PlannedMotion::take_segment() noexcept {

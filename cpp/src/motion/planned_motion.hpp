@@ -1,4 +1,4 @@
-// Private: a path under the look-ahead, played once from start to end.
+// Private: a path under the look-ahead, run once from start to end.
 #pragma once
 
 #include <cstddef>
@@ -61,7 +61,7 @@ class PlannedMotion {
   /// Goes on to the phase at a time.
   void pass_to(double time_s);
   void take_segment() noexcept;
-  /// No more than what is played in all, or Error(argument).
+  /// No more than what is run in all, or Error(argument).
   void check_count() const;
 
   Path path_;
@@ -72,7 +72,7 @@ class PlannedMotion {
   SpeedPhase next_;
   bool has_next_ = false;
   std::size_t index_ = 0;
-  // The segment under way, as in Interpolator.
+  // The current segment, as in Interpolator.
   std::size_t cursor_ = 0;
   Segment on_;
   double on_begin_mm_ = 0.0;

@@ -8,14 +8,14 @@
 namespace shapegcode {
 namespace {
 
-// Length, rate and acceleration of one evenly driven way: the whole path of a linear rapid, or one axis.
-struct Way {
+// Length, rate and acceleration of one move at a constant rate: the whole path of a linear rapid, or one axis.
+struct EvenMove {
   double length_mm = 0.0;
   double rate_mm_per_s = MotionLimits::none;
   double acceleration_mm_per_s2 = MotionLimits::none;
 };
 
-Way axis_way(const Vector3& travel_mm, int axis, const FanucModel& model) noexcept {
+EvenMove axis_move(const Vector3& travel_mm, int axis, const FanucModel& model) noexcept {
   const double full_rate = model.rapid_rate_mm_per_s[axis];
   const double ramp_s = model.rapid_time_constant_s[axis];
   return {std::abs(travel_mm[axis]), full_rate * model.rapid_override,
@@ -23,18 +23,18 @@ Way axis_way(const Vector3& travel_mm, int axis, const FanucModel& model) noexce
 }
 
 // fanuc.md B1: v = min_i(1420_i L/d_i), a = min_i(1420_i/1620_i L/d_i).
-Way straight_way(const Vector3& travel_mm, const FanucModel& model) noexcept {
-  Way way;
-  way.length_mm = travel_mm.norm();
+EvenMove straight_move(const Vector3& travel_mm, const FanucModel& model) noexcept {
+  EvenMove move;
+  move.length_mm = travel_mm.norm();
   for (int i = 0; i < axis_count; ++i) {
     if (travel_mm[i] != 0.0) {
-      const Way axis = axis_way(travel_mm, i, model);
-      const double share = way.length_mm / axis.length_mm;
-      way.rate_mm_per_s = std::min(way.rate_mm_per_s, axis.rate_mm_per_s * share);
-      way.acceleration_mm_per_s2 = std::min(way.acceleration_mm_per_s2, axis.acceleration_mm_per_s2 * share);
+      const EvenMove axis = axis_move(travel_mm, i, model);
+      const double share = move.length_mm / axis.length_mm;
+      move.rate_mm_per_s = std::min(move.rate_mm_per_s, axis.rate_mm_per_s * share);
+      move.acceleration_mm_per_s2 = std::min(move.acceleration_mm_per_s2, axis.acceleration_mm_per_s2 * share);
     }
   }
-  return way;
+  return move;
 }
 
 struct Counts {
@@ -47,32 +47,34 @@ int countable(double periods) {
   return static_cast<int>(require_count(periods, most_periods, "rapid", "periods"));
 }
 
-int full_ramp(const Way& way, double period_s) {
-  return countable(std::round(way.rate_mm_per_s / way.acceleration_mm_per_s2 / period_s));
+int full_ramp(const EvenMove& move, double period_s) {
+  return countable(std::round(move.rate_mm_per_s / move.acceleration_mm_per_s2 / period_s));
 }
 
 // Paper 004: eq. 6 for a rapid that reaches its rate, eq. 9 to 11 for a short one.
-Counts counts_in_closed_form(const Way& way, double period_s) {
-  const Counts full{countable(whole_periods(way.length_mm / way.rate_mm_per_s / period_s)), full_ramp(way, period_s)};
+Counts counts_in_closed_form(const EvenMove& move, double period_s) {
+  const Counts full{countable(whole_periods(move.length_mm / move.rate_mm_per_s / period_s)),
+                    full_ramp(move, period_s)};
   if (full.travel >= full.ramp) {
     return full;
   }
-  const double half_s = std::sqrt(way.length_mm / way.acceleration_mm_per_s2);
+  const double half_s = std::sqrt(move.length_mm / move.acceleration_mm_per_s2);
   const int half = std::max(1, countable(whole_periods(half_s / period_s)));
   return {half, half};
 }
 
 // The same by trial: the fewest periods in which neither the rate nor the acceleration is exceeded.
-Counts counts_by_trial(const Way& way, double period_s) {
-  countable(way.length_mm / way.rate_mm_per_s / period_s);
+Counts counts_by_trial(const EvenMove& move, double period_s) {
+  countable(move.length_mm / move.rate_mm_per_s / period_s);
   constexpr double slack = 1.0 + 1e-7;  // a rapid that ends on a tick to within rounding ends there
-  Counts counts{1, full_ramp(way, period_s)};
-  while (way.length_mm / (counts.travel * period_s) > way.rate_mm_per_s * slack) {
+  Counts counts{1, full_ramp(move, period_s)};
+  while (move.length_mm / (counts.travel * period_s) > move.rate_mm_per_s * slack) {
     ++counts.travel;
   }
   if (counts.travel < counts.ramp) {
     counts = {1, 1};
-    while (way.length_mm / (counts.travel * period_s) / (counts.ramp * period_s) > way.acceleration_mm_per_s2 * slack) {
+    while (move.length_mm / (counts.travel * period_s) / (counts.ramp * period_s) >
+           move.acceleration_mm_per_s2 * slack) {
       ++counts.travel;
       ++counts.ramp;
     }
@@ -98,28 +100,28 @@ RapidShape shape_of(const Vector3& travel_mm, const FanucModel& model, CountsOf&
     return shape;
   }
   const bool linear = model.rapid_path == RapidPath::linear;
-  const Way straight = straight_way(travel_mm, model);
+  const EvenMove straight = straight_move(travel_mm, model);
   int longest = 0;
   for (int i = 0; i < axis_count; ++i) {
     if (travel_mm[i] == 0.0) {
       continue;
     }
     const auto axis = static_cast<std::size_t>(i);
-    const Way way = linear ? straight : axis_way(travel_mm, i, model);
-    const Counts counts = counts_of(way, model.period_s);
+    const EvenMove move = linear ? straight : axis_move(travel_mm, i, model);
+    const Counts counts = counts_of(move, model.period_s);
     shape.travel[axis] = counts.travel;
     shape.ramp[axis] = counts.ramp;
     if (periods_of(shape, axis) > longest) {
       longest = periods_of(shape, axis);
-      shape.even_s = way.length_mm / way.rate_mm_per_s;
-      shape.rate_mm_per_s = way.length_mm / (counts.travel * model.period_s);
+      shape.even_s = move.length_mm / move.rate_mm_per_s;
+      shape.rate_mm_per_s = move.length_mm / (counts.travel * model.period_s);
     }
   }
   return shape;
 }
 
 // What a smoothing over n periods leaves of the error that the servo loop has when the smoothing begins to run out: the
-// mean of decay^k, and of its two ends as RapidPlayer joins them.
+// mean of decay^k, and of its two ends as RapidInterpolator joins them.
 double smoothing_share(int n, double decay) noexcept {
   return n > 0 ? (1.0 - std::pow(decay, n)) / (n * (1.0 - decay)) * 0.5 * (1.0 + decay) : 1.0;
 }
@@ -173,7 +175,7 @@ double in_position_wait_s(const Vector3& travel_mm, const FanucModel& model) {
   return in_position_wait_s(error, moved, model);
 }
 
-RapidPlayer::RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model)
+RapidInterpolator::RapidInterpolator(const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model)
     : start_mm_(start_mm), travel_mm_(end_mm - start_mm), end_mm_(end_mm) {
   check(model);
   const RapidShape shape = shape_of(travel_mm_, model, counts_by_trial);
@@ -190,7 +192,7 @@ RapidPlayer::RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const F
   }
 }
 
-bool RapidPlayer::step(Vector3& position) noexcept {
+bool RapidInterpolator::step(Vector3& position) noexcept {
   if (index_ > count_) {
     position = end_mm_;
     return false;
@@ -212,12 +214,12 @@ bool RapidPlayer::step(Vector3& position) noexcept {
 }
 
 Samples rapid_samples(const Vector3& start_mm, const Vector3& end_mm, const FanucModel& model) {
-  RapidPlayer player(start_mm, end_mm, model);
+  RapidInterpolator interpolator(start_mm, end_mm, model);
   Samples samples;
   samples.period_s = model.period_s;
-  samples.positions_mm.resize(player.period_count() + 1, axis_count);
+  samples.positions_mm.resize(interpolator.period_count() + 1, axis_count);
   Vector3 position;
-  for (Eigen::Index row = 0; player.step(position); ++row) {
+  for (Eigen::Index row = 0; interpolator.step(position); ++row) {
     samples.positions_mm.row(row) = position;
   }
   return samples;

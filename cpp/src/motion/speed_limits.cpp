@@ -82,8 +82,8 @@ double polyline_curvature(const Segment& before, const Segment& after, double an
   return reach > 0.0 ? angle / reach : 0.0;
 }
 
-// Speed at which the turn of the direction by `change`, spread over the way between the middles of both blocks, costs
-// no axis more than its contour acceleration: a = |change| v^2 / reach.
+// Speed at which the turn of the direction by `change`, spread over the distance between the middles of both blocks,
+// costs no axis more than its contour acceleration: a = |change| v^2 / reach.
 double contour_speed(const Vector3& change, double reach, const MotionLimits& limits) noexcept {
   return std::sqrt(tangential_limit(change.cwiseAbs(), limits.contour_acceleration_mm_per_s2) * reach);
 }
@@ -144,7 +144,7 @@ void check_limits(const MotionLimits& limits, const FilterTolerance& filter) {
 }
 
 double segment_acceleration(const Segment& segment, double speed_limit, const MotionLimits& limits,
-                            bool eased) noexcept {
+                            bool reduced) noexcept {
   const double whole = tangential_limit(axis_share(segment), limits.max_acceleration_mm_per_s2);
   double axes = whole;
   const bool turns = segment.kind == SegmentKind::arc && std::isfinite(axes);
@@ -155,11 +155,11 @@ double segment_acceleration(const Segment& segment, double speed_limit, const Mo
   if (looks_at_jumps(limits)) {
     const double jerk = limits.max_jerk_mm_per_s3.minCoeff();
     if (!turns || !std::isfinite(jerk)) {
-      axes = std::min(axes, eased ? eased_share * whole : whole);
+      axes = std::min(axes, reduced ? reduced_share * whole : whole);
     } else {
       // What is left of the jerk beside that of the turn itself, along the path and (3 v a / r) across it.
-      const double across = (eased ? 0.1 : 0.5 / 3.0) * jerk / (speed_limit * curvature(segment));
-      axes = std::min({axes, (eased ? 0.15 : 0.6) * whole, across});
+      const double across = (reduced ? 0.1 : 0.5 / 3.0) * jerk / (speed_limit * curvature(segment));
+      axes = std::min({axes, (reduced ? 0.15 : 0.6) * whole, across});
     }
   }
   if (limits.law == AccelerationLaw::constant_time) {
@@ -183,8 +183,8 @@ double jerk_time(const MotionLimits& limits, double fastest) noexcept {
 double jump_speed(const AxisJump& jump, const JunctionShape& shape, const JumpResponse& response) noexcept {
   const bool jumps = jump.speed > tangent_change;
   const auto within = [&](double v) {
-    const double way = 2.0 * v * response.duration_s;
-    const double share = jump_share * (way > shape.shortest_mm ? shape.shortest_mm / way : 1.0);
+    const double travel = 2.0 * v * response.duration_s;
+    const double share = jump_share * (travel > shape.shortest_mm ? shape.shortest_mm / travel : 1.0);
     const double acceleration = jumps ? v * jump.speed * response.acceleration_per_s : 0.0;
     const double jerk =
         v * jump.speed * response.jerk_per_s2 + v * v * jump.acceleration_per_mm * response.acceleration_per_s;
@@ -218,7 +218,7 @@ double limit_beside_turn(const Segment& segment, const MotionLimits& limits) noe
 
 double fastest_speed(const Segment& segment, const MotionLimits& limits, const FilterTolerance& filter) noexcept {
   Segment fast = segment;
-  fast.feed_mm_per_s *= most_override;
+  fast.feed_mm_per_s *= max_override;
   return segment_speed_limit(fast, limits, filter);
 }
 

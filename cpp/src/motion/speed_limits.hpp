@@ -13,12 +13,12 @@ namespace shapegcode {
 void check_limits(const MotionLimits& limits, const FilterTolerance& filter);
 
 /// Share of acceleration and jerk that is the path's beside a jump; the other half is the jump's.
-inline constexpr double eased_share = 0.5;
+inline constexpr double reduced_share = 0.5;
 
-/// Acceleration along a segment that is run at most at `speed_limit`. `eased`: beside a jump of speed or acceleration,
-/// which has the other half of the limits.
+/// Acceleration along a segment that is run at most at `speed_limit`. `reduced`: beside a jump of speed or
+/// acceleration, which has the other half of the limits.
 [[nodiscard]] double segment_acceleration(const Segment& segment, double speed_limit, const MotionLimits& limits,
-                                          bool eased = false) noexcept;
+                                          bool reduced = false) noexcept;
 
 /// How long the smoothing of the acceleration lasts, if no segment is accelerated by more than `fastest`.
 [[nodiscard]] double jerk_time(const MotionLimits& limits, double fastest) noexcept;
@@ -58,11 +58,11 @@ struct JunctionShape {
                                 const JumpResponse& response) noexcept;
 
 /// By how much the feeds may be raised; how fast a segment can ever be run.
-inline constexpr double most_override = 2.0;
+inline constexpr double max_override = 2.0;
 [[nodiscard]] double fastest_speed(const Segment& segment, const MotionLimits& limits,
                                    const FilterTolerance& filter) noexcept;
 
-/// What X, Y and Z do at the junction of two segments: of direction, and of its derivative by the way.
+/// What X, Y and Z do at the junction of two segments: of direction, and of its derivative by path length.
 struct JunctionJumps {
   Vector3 turn = Vector3::Zero();
   Vector3 bend = Vector3::Zero();

@@ -29,7 +29,7 @@ struct ArcFrame {
   }
 
   /// From `from` to `to`, in the plane.
-  [[nodiscard]] Eigen::Vector2d way(const Vector3& from, const Vector3& to) const noexcept {
+  [[nodiscard]] Eigen::Vector2d offset(const Vector3& from, const Vector3& to) const noexcept {
     return {to[a] - from[a], to[b] - from[b]};
   }
 

@@ -21,7 +21,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int most_balancing_sweeps = 100;
+constexpr int max_balancing_sweeps = 100;
 constexpr double worthwhile = 0.95;  // a scale factor must bring row and column sum at least this far down
 constexpr double rest_tolerance = 1e-9;
 
@@ -54,7 +54,7 @@ VectorXd balance(const MatrixXd& matrix) {
   MatrixXd off = matrix.cwiseAbs();
   off.diagonal().setZero();
   bool changed = true;
-  for (int sweep = 0; changed && sweep < most_balancing_sweeps; ++sweep) {
+  for (int sweep = 0; changed && sweep < max_balancing_sweeps; ++sweep) {
     changed = false;
     for (Index i = 0; i < off.rows(); ++i) {
       const double column = off.col(i).sum();

@@ -15,12 +15,12 @@ namespace shapegcode {
 namespace {
 
 constexpr double peak_steps_per_swing = 20.0;
-constexpr double most_substeps = 1024.0;
+constexpr double max_substeps = 1024.0;
 constexpr double residual_steps_per_swing = 64.0;
-constexpr double most_residual_steps = 1e6;
+constexpr double max_residual_steps = 1e6;
 constexpr double node_angle_rad = 1e-3;       // omega*period between neighbouring nodes of a mode that varies
 constexpr double surely_below = 1.0 - 1e-12;  // rounding included
-constexpr double most_matrices = 262144;      // of a mode that varies: 8 MB
+constexpr double max_matrices = 262144;       // of a mode that varies: 8 MB
 
 double fastest_hz(const std::vector<Mode>& modes) {
   double fastest = 0.0;
@@ -100,7 +100,7 @@ ModalPlant::ModalPlant(AxisModes modes, double period_s, AxisModeTables tables)
       for (const double frequency : table.frequency_hz) fastest = std::max(fastest, frequency);
     }
     const double substeps = std::ceil(period_s * peak_steps_per_swing * fastest);
-    substeps_[axis] = static_cast<int>(std::clamp(substeps, 1.0, most_substeps));
+    substeps_[axis] = static_cast<int>(std::clamp(substeps, 1.0, max_substeps));
     first_sub_[axis] = sub_.size();
     for (int k = 1; k <= substeps_[axis]; ++k) {
       for (const Mode& mode : axis_modes) sub_.push_back(sub_transition(axis, mode, k));
@@ -119,7 +119,7 @@ ModalPlant::Varying ModalPlant::tabulate(std::size_t axis, std::size_t mode, con
   Varying varying{axis, mode, table, {0}, {}, {}};
   const Mode& nominal = modes_[axis][mode];
   const std::size_t rows = table.position_mm.size();
-  const double most_nodes = most_matrices / static_cast<double>((substeps_[axis] + 1) * static_cast<int>(rows));
+  const double max_nodes = max_matrices / static_cast<double>((substeps_[axis] + 1) * static_cast<int>(rows));
   const auto add = [&](double position) {
     const Mode here = mode_at(nominal, table, position);
     varying.nodes.push_back(node_of(here, period_s_));
@@ -130,7 +130,7 @@ ModalPlant::Varying ModalPlant::tabulate(std::size_t axis, std::size_t mode, con
     const double to = table.position_mm[row + 1];
     const std::complex<double> turn = pole(mode_at(nominal, table, to)) - pole(mode_at(nominal, table, from));
     const double wanted = std::ceil(std::abs(turn) * period_s_ / node_angle_rad);
-    const double intervals = std::clamp(wanted, 1.0, std::max(1.0, std::floor(most_nodes)));
+    const double intervals = std::clamp(wanted, 1.0, std::max(1.0, std::floor(max_nodes)));
     for (double k = 0.0; k < intervals; ++k) add(from + k / intervals * (to - from));
     varying.first_node.push_back(varying.nodes.size());
   }
@@ -294,7 +294,7 @@ Vector3 ModalPlant::step(const Vector3& command) noexcept {
 
 Vector3 ModalPlant::residual_peak(int n_periods) const {
   if (n_periods < 1) {
-    throw Error(ErrorKind::argument, fmt::format("residual over {} swings, at least 1 needed", n_periods));
+    throw Error(ErrorKind::argument, fmt::format("residual over {} periods, at least 1 needed", n_periods));
   }
   Vector3 result = Vector3::Zero();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
@@ -305,7 +305,7 @@ Vector3 ModalPlant::residual_peak(int n_periods) const {
     std::vector<State> free(states_.begin() + static_cast<std::ptrdiff_t>(first_[axis]),
                             states_.begin() + static_cast<std::ptrdiff_t>(first_[axis + 1]));
     const double step_s = 1.0 / (residual_steps_per_swing * fastest_hz(modes));
-    const double steps = std::min(std::ceil(n_periods / (slowest_hz(modes) * step_s)), most_residual_steps);
+    const double steps = std::min(std::ceil(n_periods / (slowest_hz(modes) * step_s)), max_residual_steps);
     Motion before{deflection_[a], 0.0};
     for (std::size_t m = 0; m < free.size(); ++m) {
       free[m].velocity += command_velocity_[a];  // the command stops

@@ -125,8 +125,8 @@ struct Group {
       }
       if (until == done + until_look) {
         for (std::size_t m = 0; m < count; ++m) {
-          d[m] = (d[m].abs() < least_state).select(0.0, d[m]);
-          v[m] = (v[m].abs() < least_state).select(0.0, v[m]);
+          d[m] = (d[m].abs() < min_state).select(0.0, d[m]);
+          v[m] = (v[m].abs() < min_state).select(0.0, v[m]);
         }
       }
       done = until;
@@ -144,7 +144,7 @@ struct ModalResponse::Impl {
   double rate_hz = 0.0;
   Index axes = 0;
   Index row = 0;  // of the whole record that comes next
-  bool begun = false;
+  bool started = false;
   std::vector<Group> groups;
 };
 
@@ -183,9 +183,9 @@ void ModalResponse::apply(const Record& command, Result response) {
                             command.cols(), response.rows(), response.cols(), self.axes));
   }
   if (command.rows() == 0) return;
-  if (!self.begun) {
+  if (!self.started) {
     for (Group& group : self.groups) group.begin(command);
-    self.begun = true;
+    self.started = true;
   }
   for (Index first = 0; first < command.rows(); first += piece_rows) {
     const Index rows = std::min(piece_rows, command.rows() - first);

@@ -179,9 +179,9 @@ ExtraInsensitive extra_insensitive(const Mode& mode, double vibration_limit, int
                 fmt::format("the vibration limit of an extra-insensitive shaper is {:g}, must be above 0 and below 1",
                             vibration_limit));
   }
-  if (humps < 1 || humps > most_humps) {
+  if (humps < 1 || humps > max_humps) {
     throw Error(ErrorKind::argument,
-                fmt::format("an extra-insensitive shaper has 1 to {} humps: {} asked for", most_humps, humps));
+                fmt::format("an extra-insensitive shaper has 1 to {} humps: {} asked for", max_humps, humps));
   }
   Unknowns x = chebyshev(vibration_limit, humps);
   double zeta = 0.0;

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double merge_tolerance = 1e-12;  // of the duration
 constexpr double mzv_spacing = 0.375;      // of the damped period
-constexpr double damping_step = 0.02;      // of the way from no damping to the mode's
+constexpr double damping_step = 0.02;      // of the range from no damping to the mode's
 constexpr int zero_newton_steps = 30;
 constexpr double newton_converged = 1e-15;
 
@@ -87,9 +87,9 @@ Shaper zv_on_grid(const Mode& mode, double period_s) {
 }
 
 Shaper repeated_zv(const Mode& mode, int zeros) {
-  if (zeros < 1 || zeros > most_repeated_zeros) {
+  if (zeros < 1 || zeros > max_repeated_zeros) {
     throw Error(ErrorKind::argument,
-                fmt::format("a ZV shaper has 1 to {} zeros at its mode: {} asked for", most_repeated_zeros, zeros));
+                fmt::format("a ZV shaper has 1 to {} zeros at its mode: {} asked for", max_repeated_zeros, zeros));
   }
   const Shaper once = zv(mode);
   Shaper shaper = once;

@@ -25,10 +25,10 @@ using Complex = std::complex<double>;
 
 constexpr double relative_gap = 1e-6;
 constexpr double absolute_gap = 1e-12;
-constexpr std::size_t most_parts = 1'000'000;
+constexpr std::size_t max_parts = 1'000'000;
 constexpr double touching = 1e-9;        // of the limit: a hump of exactly that height does not end the band
 constexpr double smallest_step = 1e-12;  // of the mode's frequency
-constexpr int most_steps = 1'000'000;
+constexpr int max_steps = 1'000'000;
 
 /// The first terms of S at one frequency, turned by the best tau.
 struct Expansion {
@@ -146,12 +146,12 @@ WorstResidual worst_residual(const Shaper& shaper, const Mode& mode, double lowe
   };
   add(turn * lowest_hz, turn * highest_hz);
   while (parts.top().bound > worst.residual_ratio + std::max(relative_gap * worst.residual_ratio, absolute_gap)) {
-    if (parts.size() > most_parts) {
+    if (parts.size() > max_parts) {
       throw Error(
           ErrorKind::design,
           fmt::format("the worst residual from {:g} Hz to {:g} Hz lies between {:g} and {:g}: more than {} parts "
                       "of the band are needed to say more",
-                      lowest_hz, highest_hz, worst.residual_ratio, parts.top().bound, most_parts));
+                      lowest_hz, highest_hz, worst.residual_ratio, parts.top().bound, max_parts));
     }
     const Part part = parts.top();
     parts.pop();
@@ -176,7 +176,7 @@ FrequencyBand insensitive_band(const Shaper& shaper, const Mode& mode, double vi
   const double nominal = turn * mode.frequency_hz;
   const auto walk = [&](double sign, double last) {
     double omega = nominal;
-    for (int count = 0; count < most_steps; ++count) {
+    for (int count = 0; count < max_steps; ++count) {
       const double left = sign * (last - omega);
       const double step = safe_step(residual, omega, sign, limit, std::min(left, 0.25 * omega));
       omega += sign * step;

@@ -92,7 +92,7 @@ class Fitter {
 
  private:
   // Makes the last line an arc where the original ends with one. A line that does not move in the arc's plane (the end
-  // of a steep helix) gets one increment of way in it from its predecessor.
+  // of a steep helix) gets one increment of travel in it from its predecessor.
   void end_with_arc(std::vector<FittedBlock>& blocks) const {
     if (options_.last_kind == FittedKind::line || blocks.empty()) {
       return;
@@ -120,7 +120,7 @@ class Fitter {
     return ArcFrame(normal).radius(shape_.to_mm(to), shape_.to_mm(from));
   }
 
-  // Takes one increment of the last way in the plane from the line that made it, or from the line before the last
+  // Takes one increment of the last travel in the plane from the line that made it, or from the line before the last
   // block.
   [[nodiscard]] bool lend_increment(std::vector<FittedBlock>& blocks, int normal) const {
     for (std::size_t i = blocks.size() - 1; i-- > 0;) {
@@ -128,10 +128,10 @@ class Fitter {
       const auto a = static_cast<std::size_t>(ArcFrame(normal).a);
       const auto b = static_cast<std::size_t>(ArcFrame(normal).b);
       const std::size_t axis = blocks[i].end[a] != start[a] ? a : b;
-      const std::int64_t way = blocks[i].end[axis] - start[axis];
+      const std::int64_t travel = blocks[i].end[axis] - start[axis];
       Position behind = blocks[i].end;
-      behind[axis] -= way > 0 ? 1 : -1;
-      if (way == 0 || behind == start) {
+      behind[axis] -= travel > 0 ? 1 : -1;
+      if (travel == 0 || behind == start) {
         continue;
       }
       // All blocks from there to the last but one stay one increment behind; lines only, so that no arc changes its
@@ -142,7 +142,7 @@ class Fitter {
         }
       }
       for (std::size_t k = i; k + 1 < blocks.size(); ++k) {
-        blocks[k].end[axis] -= way > 0 ? 1 : -1;
+        blocks[k].end[axis] -= travel > 0 ? 1 : -1;
       }
       shape_.set_feed(blocks[i], (shape_.to_mm(blocks[i].end) - shape_.to_mm(start)).norm());
       return true;
@@ -171,9 +171,9 @@ class Fitter {
   // Where the block from period k must end: at a break, or as one of equal blocks.
   std::uint32_t next_limit(std::uint32_t k) {
     const std::uint32_t limit = next_break(k);
-    const double way = (grid_.row(k + 1) - grid_.row(k)).norm() / options_.increment_mm;
+    const double travel = (grid_.row(k + 1) - grid_.row(k)).norm() / options_.increment_mm;
     const double ticks = options_.block_period_s / options_.interpolation_period_s;
-    if (options_.most_periods >= limit - k || way <= options_.equal_above_increments * ticks) {
+    if (options_.most_periods >= limit - k || travel <= options_.equal_above_increments * ticks) {
       return limit;
     }
     const std::uint32_t margin = options_.equal_periods;

@@ -14,10 +14,10 @@ namespace {
 // A position so near to an increment, in increments, is on it.
 constexpr double on_increment = 1e-6;
 // Memory stays bounded: a longer run is rounded in pieces of so many blocks.
-constexpr std::size_t longest_stretch = 4096;
-// Rounds in which blocks that a choice would spoil are taken back to their nearest ends; then the whole stretch is.
-constexpr int most_rounds = 4;
-// Way that a block may stand still at its end and be left out of account, in increments.
+constexpr std::size_t longest_section = 4096;
+// Rounds in which blocks that a choice would spoil are taken back to their nearest ends; then the whole section is.
+constexpr int max_rounds = 4;
+// Distance that a block may stand still at its end and be left out of account, in increments.
 constexpr double negligible_early = 0.1;
 
 class BlockRounder {
@@ -42,7 +42,7 @@ class BlockRounder {
     from_ = shape_.rounded(0);
     while (first_ < blocks_.size()) {
       find_end();
-      round_stretch();
+      round_section();
       begin_period_ = end_of_blocks_;
       from_ = blocks_[first_ + count_ - 1].end;
       first_ += count_;
@@ -55,14 +55,14 @@ class BlockRounder {
     return block + 1 < blocks_.size() ? blocks_[block + 1].first_period : covered_;
   }
 
-  // The stretch goes to the last block that ends before the next rest, where everything behind it is rest.
+  // The section goes to the last block that ends before the next rest, where everything behind it is rest.
   void find_end() {
     while (rest_ < rests_.size() && rests_[rest_] < end_period(first_)) {
       ++rest_;
     }
     const std::uint32_t rest = rest_ < rests_.size() ? rests_[rest_] : static_cast<std::uint32_t>(grid_.rows() - 1);
     count_ = 1;
-    const std::size_t most = std::min(longest_stretch, blocks_.size() - first_);
+    const std::size_t most = std::min(longest_section, blocks_.size() - first_);
     while (count_ < most && end_period(first_ + count_) <= rest) {
       ++count_;
     }
@@ -71,7 +71,7 @@ class BlockRounder {
     rest_period_ = rest;
   }
 
-  void round_stretch() {
+  void round_section() {
     starts_.resize(count_);
     std::uint32_t at = begin_period_;
     for (std::size_t n = 0; n < count_; ++n) {
@@ -94,7 +94,7 @@ class BlockRounder {
       find_excitation(axis);
     }
     for (int round = 0;; ++round) {
-      if (round == most_rounds) {
+      if (round == max_rounds) {
         forced_.assign(count_, true);
       }
       for (std::size_t axis = 0; axis < axis_count; ++axis) {
@@ -102,7 +102,7 @@ class BlockRounder {
           choose(axis);
         }
       }
-      if (shape_blocks() || round == most_rounds) {
+      if (shape_blocks() || round == max_rounds) {
         break;
       }
     }
@@ -194,7 +194,7 @@ class BlockRounder {
     return exact(k + 1, axis) - exact(k, axis);
   }
 
-  // Calls `visit` with every border of periods within a block and its way so far there, between nearest ends.
+  // Calls `visit` with every border of periods within a block and its travel so far there, between nearest ends.
   template <typename Visit>
   void follow(std::size_t n, std::size_t axis, const Visit& visit) const {
     const FittedBlock& block = blocks_[first_ + n];
@@ -256,10 +256,10 @@ class BlockRounder {
     for (unsigned pair = 1; pair < 4; ++pair) {
       const int from = (pair & 2U) != 0 ? before : 0;
       const int to = (pair & 1U) != 0 ? after : 0;
-      const std::int64_t way = move + to - from;
+      const std::int64_t travel = move + to - from;
       const bool still = std::abs(step) < on_increment;
-      if ((still && way != 0) || (!still && step > 0.0 && way < 0) || (!still && step < 0.0 && way > 0) ||
-          (carries && way == 0) || !stays_inside(n, axis, from, to)) {
+      if ((still && travel != 0) || (!still && step > 0.0 && travel < 0) || (!still && step < 0.0 && travel > 0) ||
+          (carries && travel == 0) || !stays_inside(n, axis, from, to)) {
         continue;
       }
       mask = static_cast<std::uint8_t>(mask | 1U << pair);
@@ -270,9 +270,9 @@ class BlockRounder {
   // Whether the axis is the one that moves most, which must not come to a stand.
   [[nodiscard]] bool carries_block(std::size_t n, std::size_t axis) const {
     const BlockPosition& from = nearest_start(n);
-    const auto way = [&](std::size_t i) { return std::abs(nearest_[n][i] - from[i]); };
+    const auto travel = [&](std::size_t i) { return std::abs(nearest_[n][i] - from[i]); };
     for (std::size_t i = 0; i < axis_count; ++i) {
-      if (way(i) > way(axis) || (way(i) == way(axis) && i < axis)) {
+      if (travel(i) > travel(axis) || (travel(i) == travel(axis) && i < axis)) {
         return false;
       }
     }
@@ -336,14 +336,14 @@ class BlockRounder {
   double limit_;  // increments by which a block may be off its command
   std::vector<ModalRounder> rounders_;
 
-  // The stretch under work: blocks first_ ... first_ + count_ - 1.
+  // The section under work: blocks first_ ... first_ + count_ - 1.
   std::size_t first_ = 0;
   std::size_t count_ = 0;
   std::size_t rest_ = 0;
   bool at_rest_ = false;
   std::uint32_t rest_period_ = 0;
-  std::uint32_t begin_period_ = 0;   // in which it begins as played, which lags where time was lent
-  std::uint32_t end_of_blocks_ = 0;  // period in which it ends as played
+  std::uint32_t begin_period_ = 0;   // in which it begins when simulated, which lags where time was lent
+  std::uint32_t end_of_blocks_ = 0;  // period in which it ends when simulated
   BlockPosition from_{};             // where it begins
   std::vector<std::uint32_t> starts_;
   std::vector<BlockPosition> nearest_;

@@ -10,7 +10,7 @@ namespace {
 constexpr double largest_radius_increments = 99999999.0;  // a word has eight digits
 // Ticks by which a block ends before its last tick: far over the rounding of any controller, far under what matters.
 constexpr double tick_margin = 1e-4;
-// Way, and share of its time, that a block may stand still at its end for the sake of a shorter F, and by which an
+// Distance, and share of its time, that a block may stand still at its end for the sake of a shorter F, and by which an
 // arc's middle may be off for the sake of a shorter R, in increments: a tenth of what an end is off by its rounding.
 constexpr double negligible_increments = 0.25;
 constexpr double negligible_share = 0.005;
@@ -48,13 +48,13 @@ std::optional<std::int64_t> BlockShape::feed(double length_mm, std::uint32_t per
   const auto wanted = static_cast<double>(periods * ticks_per_period_);
   const auto early = [&](std::int64_t value) {
     const double speed = static_cast<double>(value) * options_.feed_unit_mm_per_s;
-    return wanted * options_.interpolation_period_s * speed - length_mm;  // way not used, mm
+    return wanted * options_.interpolation_period_s * speed - length_mm;  // travel not used, mm
   };
-  const auto last_tick = [&](std::int64_t value) {
+  const auto last_period = [&](std::int64_t value) {
     return static_cast<double>(value) * options_.feed_unit_mm_per_s * options_.interpolation_period_s;
   };
   const std::int64_t up = nearest_feed(length_mm, periods);
-  if (early(up) <= 0.5 * options_.increment_mm && early(up) < (1.0 - tick_margin) * last_tick(up)) {
+  if (early(up) <= 0.5 * options_.increment_mm && early(up) < (1.0 - tick_margin) * last_period(up)) {
     return up;
   }
   const std::int64_t exact =
@@ -75,19 +75,19 @@ BlockShape::FeedRange BlockShape::feeds_like(const FittedBlock& block, double le
   const double time_s = static_cast<double>(block.periods * ticks_per_period_) * options_.interpolation_period_s;
   const double unit = options_.feed_unit_mm_per_s;
   const double in_time = (length_mm + negligible_increments * options_.increment_mm) / (time_s * unit);
-  const double in_last_tick = length_mm / ((time_s - (1.0 - tick_margin) * options_.interpolation_period_s) * unit);
+  const double in_last_period = length_mm / ((time_s - (1.0 - tick_margin) * options_.interpolation_period_s) * unit);
   const double hardly_faster = static_cast<double>(block.feed) * (1.0 + negligible_share);
-  const auto most = static_cast<std::int64_t>(std::floor(std::min({in_time, in_last_tick, hardly_faster})));
+  const auto most = static_cast<std::int64_t>(std::floor(std::min({in_time, in_last_period, hardly_faster})));
   return {block.feed, std::max(block.feed, most)};
 }
 
 double BlockShape::length_mm(const BlockPosition& from, const FittedBlock& block) const {
-  const Vector3 way = to_mm(block.end) - to_mm(from);
+  const Vector3 travel = to_mm(block.end) - to_mm(from);
   if (block.kind == FittedKind::line) {
-    return way.norm();
+    return travel.norm();
   }
   const ChordArc arc = arc_of(from, block);
-  return std::hypot(arc.radius * arc.sweep, way[block.normal]);
+  return std::hypot(arc.radius * arc.sweep, travel[block.normal]);
 }
 
 void BlockShape::set_feed(FittedBlock& block, double length_mm) const {
@@ -113,7 +113,7 @@ std::optional<ChordArc> BlockShape::chord_arc(const BlockPosition& from, const B
   const Vector3 p = to_mm(from);
   ChordArc arc;
   arc.start = frame.project(p);
-  const Eigen::Vector2d chord = frame.way(p, to_mm(to));
+  const Eigen::Vector2d chord = frame.offset(p, to_mm(to));
   arc.chord = chord.norm();
   if (arc.chord < options_.arc_min_chord_mm) {
     return std::nullopt;
@@ -158,7 +158,7 @@ std::int64_t BlockShape::short_radius(double radius, double chord) const {
 ChordArc BlockShape::arc_of(const BlockPosition& from, const FittedBlock& block) const {
   const ArcFrame frame(block.normal);
   const Vector3 p = to_mm(from);
-  const Eigen::Vector2d chord = frame.way(p, to_mm(block.end));
+  const Eigen::Vector2d chord = frame.offset(p, to_mm(block.end));
   ChordArc arc;
   arc.start = frame.project(p);
   arc.chord = chord.norm();

@@ -39,7 +39,7 @@ class BlockShape {
 
   // F, rounded up, that makes the block end just before its last tick, so that a controller that starts blocks on ticks
   // takes exactly the intended number of them, whatever its own rounding. What it then stands still may be no more than
-  // half an increment of way; a longer steady block may have an F that is exact. nullopt if no F of this resolution
+  // half an increment of travel; a longer steady block may have an F that is exact. nullopt if no F of this resolution
   // will do.
   [[nodiscard]] std::optional<std::int64_t> feed(double length_mm, std::uint32_t periods) const;
 
@@ -50,7 +50,7 @@ class BlockShape {
   };
   [[nodiscard]] FeedRange feeds_like(const FittedBlock& block, double length_mm) const;
 
-  // Way of a block from where it begins, as the controller goes it.
+  // Length of a block from where it begins, as the controller runs it.
   [[nodiscard]] double length_mm(const BlockPosition& from, const FittedBlock& block) const;
 
   // Gives a block its F for the periods that it has. One too slow for the resolution of F is run a little faster, in

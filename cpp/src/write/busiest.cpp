@@ -7,7 +7,7 @@
 namespace shapegcode {
 namespace {
 
-/// One end of a stretch that slides over blocks.
+/// One end of a time window that slides over blocks.
 struct Edge {
   std::span<const double> durations_s, amounts;
   std::size_t block = 0;
@@ -31,21 +31,21 @@ struct Edge {
 
 }  // namespace
 
-double busiest_per_s(std::span<const double> durations_s, std::span<const double> amounts, double stretch_s) noexcept {
+double busiest_per_s(std::span<const double> durations_s, std::span<const double> amounts, double window_s) noexcept {
   double whole_s = 0.0;
   for (const double duration_s : durations_s) whole_s += duration_s;
-  const double stretch = std::min(stretch_s, whole_s);
-  if (!(stretch > 0.0)) return 0.0;
+  const double window = std::min(window_s, whole_s);
+  if (!(window > 0.0)) return 0.0;
   Edge first{durations_s, amounts};
   Edge last = first;
   double largest = 0.0;
-  // The amount is piecewise linear in the place of the stretch: it is largest where a block begins or ends at its edge.
-  // Every turn leaves a block behind, whatever the sums were rounded to.
+  // The amount is piecewise linear in the position of the window: it is largest where a block begins or ends at its
+  // edge. Every turn leaves a block behind, whatever the sums were rounded to.
   for (double begin_s = 0.0;;) {
-    while (!last.ended() && last.end_s() <= begin_s + stretch) last.next();
-    largest = std::max(largest, last.amount_to(begin_s + stretch) - first.amount_to(begin_s));
-    if (last.ended()) return largest / stretch;
-    const double ends_s = last.end_s() - stretch;
+    while (!last.ended() && last.end_s() <= begin_s + window) last.next();
+    largest = std::max(largest, last.amount_to(begin_s + window) - first.amount_to(begin_s));
+    if (last.ended()) return largest / window;
+    const double ends_s = last.end_s() - window;
     Edge& reached = first.end_s() <= ends_s ? first : last;
     begin_s = std::max(begin_s, std::min(first.end_s(), ends_s));
     reached.next();

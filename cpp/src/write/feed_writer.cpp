@@ -19,7 +19,7 @@ namespace shapegcode {
 namespace {
 
 constexpr double same_position_mm = 1e-6;
-constexpr int most_feed_decimals = 4;
+constexpr int max_feed_decimals = 4;
 constexpr double largest_sweep_by_radius = 0.5 * std::numbers::pi;
 constexpr std::size_t longest_line = 100000;  // the reader has held the program's own limit already
 
@@ -101,9 +101,9 @@ bool divisible(const SourceLine& line, const Block& block, const Segment& segmen
 
 class Writer {
  public:
-  Writer(const Program& program, const Region& region, std::span<const FeedStretch> stretches,
+  Writer(const Program& program, const Region& region, std::span<const FeedStretch> sections,
          const FeedWriterOptions& options)
-      : path_(*region.path), region_(region), stretches_(stretches), options_(options), line_end_(program.line_end) {
+      : path_(*region.path), region_(region), sections_(sections), options_(options), line_end_(program.line_end) {
     modal_feed_ = options.modal_feed > 0.0 ? options.modal_feed : region.entry.feed;
   }
 
@@ -116,13 +116,13 @@ class Writer {
     const double end = path_.distance_mm(line.first + line.count);
     std::vector<double> ends;
     std::vector<double> feeds;
-    while (stretch_ + 1 < stretches_.size() && stretches_[stretch_].end_mm <= begin + same_position_mm) {
-      ++stretch_;
+    while (section_ + 1 < sections_.size() && sections_[section_].end_mm <= begin + same_position_mm) {
+      ++section_;
     }
-    feeds.push_back(stretches_[stretch_].feed_mm_per_min);
-    for (std::size_t k = stretch_; k + 1 < stretches_.size() && stretches_[k].end_mm < end - same_position_mm; ++k) {
-      ends.push_back(stretches_[k].end_mm - begin);
-      feeds.push_back(stretches_[k + 1].feed_mm_per_min);
+    feeds.push_back(sections_[section_].feed_mm_per_min);
+    for (std::size_t k = section_; k + 1 < sections_.size() && sections_[k].end_mm < end - same_position_mm; ++k) {
+      ends.push_back(sections_[k].end_mm - begin);
+      feeds.push_back(sections_[k + 1].feed_mm_per_min);
     }
     if (!ends.empty() && !divisible(line, block, path_[line.first], options_)) {
       throw Error(ErrorKind::argument,
@@ -152,7 +152,7 @@ class Writer {
   void append_feed_word(double feed) {
     int decimals = 0;
     double scaled = feed;
-    while (decimals < most_feed_decimals && std::abs(scaled - std::round(scaled)) > 1e-6) {
+    while (decimals < max_feed_decimals && std::abs(scaled - std::round(scaled)) > 1e-6) {
       scaled *= 10.0;
       ++decimals;
     }
@@ -331,11 +331,11 @@ class Writer {
 
   const Path& path_;
   const Region& region_;
-  std::span<const FeedStretch> stretches_;
+  std::span<const FeedStretch> sections_;
   const FeedWriterOptions& options_;
   std::string_view line_end_;
   double modal_feed_ = 0.0;  // as a word
-  std::size_t stretch_ = 0;
+  std::size_t section_ = 0;
   std::uint32_t line_count_ = 0;
   RefedRegion result_;
 };
@@ -369,15 +369,15 @@ std::vector<bool> divisible_segments(const Program& program, const Region& regio
   return result;
 }
 
-RefedRegion write_feeds(const Program& program, const Region& region, std::span<const FeedStretch> stretches,
+RefedRegion write_feeds(const Program& program, const Region& region, std::span<const FeedStretch> sections,
                         const FeedWriterOptions& options) {
-  if (stretches.empty() || stretches.front().begin_mm > same_position_mm ||
-      std::abs(stretches.back().end_mm - region.path->length_mm()) > same_position_mm) {
+  if (sections.empty() || sections.front().begin_mm > same_position_mm ||
+      std::abs(sections.back().end_mm - region.path->length_mm()) > same_position_mm) {
     throw Error(ErrorKind::argument,
-                fmt::format("the stretches of a feed schedule must cover the region's path of {:g} mm",
+                fmt::format("the sections of a feed schedule must cover the region's path of {:g} mm",
                             region.path->length_mm()));
   }
-  Writer writer(program, region, stretches, options);
+  Writer writer(program, region, sections, options);
   for_each_line(program, region, [&](const SourceLine& line, const Block& block) { writer.write(line, block); });
   return writer.finish();
 }

@@ -15,16 +15,16 @@ namespace shapegcode {
 namespace {
 
 // Choices followed at a time; more of them on the last free blocks before a rest, where it shows most.
-constexpr std::size_t width_on_the_way = 4;
+constexpr std::size_t width_underway = 4;
 constexpr std::size_t width_before_rest = 128;
 constexpr std::size_t free_nodes_before_rest = 8;
-// How much what is left now counts against one period of what was left on the way.
+// How much what is left now counts against one period of what was left underway.
 constexpr double weight_now = 4.0;
-constexpr double most_decay = 2.0;  // natural logarithm
+constexpr double max_decay = 2.0;  // natural logarithm
 // So few choices are ranked by comparing each with each.
-constexpr std::size_t small_field = 2 * width_on_the_way;
+constexpr std::size_t small_field = 2 * width_underway;
 constexpr double never = std::numeric_limits<double>::infinity();
-constexpr std::size_t room = 2 * std::max(width_on_the_way, width_before_rest);
+constexpr std::size_t room = 2 * std::max(width_underway, width_before_rest);
 
 }  // namespace
 
@@ -247,7 +247,7 @@ void ModalRounder::choose(std::span<const RoundingNode> nodes, std::span<const s
   // What comes late is met from the last free nodes on, but not so early that most of it would have decayed again.
   std::size_t late = nodes.size();
   double late_periods = 0.0;
-  while (late > last_ones && decay_ * (late_periods + nodes[late - 1].periods) < most_decay) {
+  while (late > last_ones && decay_ * (late_periods + nodes[late - 1].periods) < max_decay) {
     late_periods += nodes[--late].periods;
   }
   for (std::size_t n = 0; n < nodes.size(); ++n) {
@@ -255,7 +255,7 @@ void ModalRounder::choose(std::span<const RoundingNode> nodes, std::span<const s
       add_late(end.late_excitation, late_periods);
     }
     expand(nodes[n], &excitation[n * modes_.size()]);
-    keep_best(n < last_ones ? width_on_the_way : width_before_rest);
+    keep_best(n < last_ones ? width_underway : width_before_rest);
   }
   if (late == nodes.size() && !end.late_excitation.empty()) {
     add_late(end.late_excitation, 0.0);

@@ -19,7 +19,7 @@ struct RoundingNode {
       0xF;  ///< bit 2 f + t: the block may go from candidate f to t (0: nearest); bit 0 is always set
 };
 
-/// How a stretch of blocks ends. `late_excitation` (per mode, see ModalRounder::advance): what the blocks leave besides
+/// How a section of blocks ends. `late_excitation` (per mode, see ModalRounder::advance): what the blocks leave besides
 /// their ends, which only the last choices before a rest meet; anywhere else it is no vibration but the path's own
 /// curvature. Where the command comes to rest, what it still moves behind the last block's end is
 /// left out by the blocks; `rest_periods` and `rest_excitation` (per mode, see ModalRounder::advance) account for it.
@@ -37,8 +37,8 @@ struct RoundingEnd {
 /// modal velocity w, dw/dt = s w - s de/dt, so a block of n periods T takes w to z w + (1 - z)/(n T) * (change of e),
 /// z = exp(s n T): exact, no time is sampled. At rest |w| / Im(s) is the amplitude of the vibration left. The ends are
 /// found by a beam search (M-algorithm, Jelinek & Anderson 1971, "Instrumentable tree encoding of information
-/// sources"): of all choices so far, those are kept that left least on the way and now. The state is carried from
-/// stretch to stretch.
+/// sources"): of all choices so far, those are kept that left least underway and now. The state is carried from
+/// section to section.
 class ModalRounder {
  public:
   /// Throws Error(argument) if a mode is none (see pole), the period is not finite and above 0 or it has no tick.
@@ -59,7 +59,7 @@ class ModalRounder {
   void choose(std::span<const RoundingNode> nodes, std::span<const std::complex<double>> excitation,
               const RoundingEnd& end, std::span<std::int8_t> shift);
 
-  /// Goes on from the end of the stretch last chosen.
+  /// Goes on from the end of the section last chosen.
   void accept() { state_ = chosen_state_; }
 
  private:
@@ -74,7 +74,7 @@ class ModalRounder {
   // Choices made so far, side by side. States are per mode one behind the other, `room` apart.
   struct Choices {
     std::size_t count = 0;
-    std::vector<double> cost;   // of what was left on the way
+    std::vector<double> cost;   // of what was left underway
     std::vector<double> shift;  // of the last node, increments from its nearest
     std::vector<double> real;   // modal states
     std::vector<double> imag;
@@ -90,8 +90,8 @@ class ModalRounder {
 
   std::vector<ModeStep> modes_;
   double decay_ = 0.0;                              // of the most damped mode over a period
-  std::vector<std::complex<double>> state_;         // per mode, at the begin of the next stretch
-  std::vector<std::complex<double>> chosen_state_;  // at the end of the stretch last chosen
+  std::vector<std::complex<double>> state_;         // per mode, at the begin of the next section
+  std::vector<std::complex<double>> chosen_state_;  // at the end of the section last chosen
   Choices kept_;
   Choices grown_;
   std::vector<double> left_;  // per grown choice, what is left now

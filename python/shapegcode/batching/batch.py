@@ -11,14 +11,14 @@ from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 
-from shapegcode.batching.manifest import Manifest, begun_in
+from shapegcode.batching.manifest import Manifest, base_folder
 from shapegcode.batching.plan import COMMANDS, find_programs, plan
 from shapegcode.batching.process import Base, Cluster, Hosts, cluster_executor, pack, run_packed
 from shapegcode.batching.result import Batch
 from shapegcode.batching.runs import KeptRows, OnBatch, Runs, summary_lines
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import is_temporary, write_lines
-from shapegcode.verdict.ahead import cores
+from shapegcode.program.computer import cores
 
 _SCRATCH = ".batch-scratch"
 _SUMMARY = "summary.csv"
@@ -83,7 +83,7 @@ def batch(
         sources = tuple(source for source in sources if not source.subprogram)
         if not sources:
             raise ArgumentError(f"{called[0]}: a subprogram (M99), as all that were named: name what calls them")
-        base = Base(begun_in(output) if resume else os.getcwd())
+        base = Base(base_folder(output) if resume else os.getcwd())
         planned = plan(sources, [str(each) for each in machines], str(output), command, options, html, base)
         # A scheduler that does not answer is found before anything is written; processes of this machine end before
         # the folder goes that they work in.

@@ -1,6 +1,6 @@
 """What a batch has done, row by row: a file of JSON lines that outlives it.
 
-The first line says what the file is, and in which folder the batch was begun. Each further one is the row of a run,
+The first line says what the file is, and in which folder the batch was started. Each further one is the row of a run,
 written when its files are complete; of several with one key the last counts. A row that was cut off in the middle is
 not there. Rows stay on the disk: in memory is where they stand.
 """
@@ -28,8 +28,8 @@ _HEAD = {"shapegcode": "batch", "format": 2}
 _FOLDER = "folder"
 
 
-def begun_in(output: str | Path) -> str:
-    """The folder in which the batch of an output folder was begun."""
+def base_folder(output: str | Path) -> str:
+    """The folder in which the batch of an output folder was started."""
     try:
         with (Path(output) / MANIFEST).open("rb") as stream:
             return _base_of(stream, output) or os.getcwd()
@@ -43,17 +43,7 @@ def short(text: str) -> bytes:
 
 
 class Manifest:
-    """The manifest of an output folder, held by one batch at a time.
-
-    Args:
-        folder: of the results; it is made.
-        resume: keep the rows that are there; False: forget them.
-        base: folder in which the batch was begun; empty: the current one.
-
-    Raises:
-        ArgumentError: another batch writes into the folder, or the file is no manifest of this version.
-        OSError: it cannot be written.
-    """
+    """The manifest of an output folder, held by one batch at a time."""
 
     def __init__(self, folder: Path, *, resume: bool, base: str = "") -> None:
         folder.mkdir(parents=True, exist_ok=True)

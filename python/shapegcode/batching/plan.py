@@ -70,7 +70,7 @@ def _each(given: Iterable[str], avoid: Path) -> Iterator[Source]:
 
 
 def _listed(file: Path, avoid: Path) -> Iterator[Source]:
-    """What a list names; a message says where it stands."""
+    """The entries of a list; error messages give the line of each."""
     try:
         text = read_file(file, MAX_SETTINGS_BYTES).decode()
     except UnicodeDecodeError:
@@ -193,7 +193,7 @@ class _OnMachine:
 class Plan:
     """What is to be done: a run is made when its turn comes, machine by machine."""
 
-    base: Base  # folder in which the batch was begun
+    base: Base  # folder in which the batch was started
     sources: Sequence[Source]  # the programs, in the order in which they were given
     lines: tuple[_OnMachine, ...]  # one for each machine
     command: str  # of `COMMANDS`

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import named_errors
-from shapegcode.program.reading import MEMORY_NEEDED
+from shapegcode.program.computer import MEMORY_NEEDED
 from shapegcode.results.json import this_version
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ FAILED_CODES = {97: "crashed", 98: "out of memory"}
 
 @dataclass(frozen=True)
 class Base:
-    """The folder in which a batch was begun: a run sees names from there, also when it goes on from another folder."""
+    """The folder in which a batch was started: names are seen from there, also when it goes on from another folder."""
 
     folder: str  # its absolute path
 
@@ -53,7 +53,7 @@ class Base:
 
 @dataclass(frozen=True)
 class BatchJob:
-    """A run that is to be done."""
+    """A run that is still to be executed."""
 
     program: str  # what it is of, as it was given
     machine: str
@@ -106,7 +106,7 @@ def pack(
 
 _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",  # other runs have the other cores
-    "LD_BIND_NOW": "1",  # functions are linked once, not in each run anew
+    "LD_BIND_NOW": "1",  # functions are linked once, not in each run
     # Memory that is returned comes back page by page: what glibc would find out in a long run stands from the start.
     "MALLOC_ARENA_MAX": "1",
     "MALLOC_MMAP_THRESHOLD_": "33554432",
@@ -175,7 +175,7 @@ class Hosts:
             shutil.rmtree(folder, ignore_errors=True)
 
     def end(self) -> None:
-        """End all of them with what they run; whoever asks later is told that his job was killed."""
+        """End all of them with what they run; whoever asks later gets a job that was killed."""
         with self._lock:
             self._ended = True
             hosts = list(self._all)
@@ -184,7 +184,7 @@ class Hosts:
             host.end()
 
     def _host(self, command: str) -> _Host | None:
-        """That of this thread; None: there shall be none any more."""
+        """The fork server of this thread; None after shutdown."""
         host: _Host | None = getattr(self._own, "host", None)
         with self._lock:
             if self._ended:
@@ -233,7 +233,7 @@ _of_worker = Hosts()
 
 
 def run_packed(packed: Packed) -> JobOutcome:
-    """`Hosts.run` on a Dask worker, whose hosts last as long as it does."""
+    """`Hosts.run` on a Dask worker, whose fork servers live as long as the worker."""
     return _of_worker.run(packed)
 
 
@@ -339,7 +339,7 @@ def cluster_executor(cluster: Cluster, processes: int) -> Iterator[tuple[Executo
 
 
 def _checked_slots(client: Client, scheduler: str) -> int:
-    """How many jobs the workers run at a time; all of them have this version."""
+    """Check that all workers have this version, and count the jobs that they run at a time."""
     try:
         versions = client.run(this_version)
     except ModuleNotFoundError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, ClassVar, Literal
@@ -95,13 +95,10 @@ def _contour(report: Mapping[str, Any]) -> object:
     return tracks.get(target or "response")
 
 
-def _pair(value: object, take: Any) -> dict[str, float] | None:
-    if isinstance(value, Mapping) and {"original", "emitted"} <= value.keys():
-        found = {name: take(value[name]) for name in ("original", "emitted")}
-    else:
-        one = take(value)
-        found = {"original": one, "emitted": one}
-    return None if None in found.values() else found
+def _pair(value: object, take: Callable[[Any], float | None]) -> Pair[float] | None:
+    both = isinstance(value, Mapping) and {"original", "emitted"} <= value.keys()
+    original, emitted = (take(value[name] if both else value) for name in ("original", "emitted"))  # type: ignore[index]
+    return None if original is None or emitted is None else Pair(original, emitted)
 
 
 def _largest(value: object) -> float | None:

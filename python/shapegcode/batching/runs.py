@@ -7,7 +7,6 @@ import contextlib
 import csv
 import errno
 import hashlib
-import io
 import json
 import os
 import signal
@@ -19,6 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, overload
 
 from shapegcode.batching.manifest import Manifest
@@ -46,23 +46,24 @@ def row_of(job: BatchJob, outcome: JobOutcome) -> tuple[BatchRow, Mapping[str, b
     # Of a file with several programs (--program all) there is one of each: they have no figures in common.
     several = report if isinstance(report, list) else [report]
     output = next((str(each["output"]) for each in several if "output" in each), "")
-    row = {
-        "program": job.program,
-        "machine": job.machine,
-        "ended": ended,
-        "said": _said(outcome, ended),
+    row = BatchRow(
+        job.program,
+        job.machine,
+        ended,
+        _answer(outcome, ended),
         **figures_of(several[0] if len(several) == 1 else {}),
-        "output": output,
-        "report": job.report if job.report in written else "",
-        "page": next((name for name in written if name.endswith(".html")), ""),
-        "wall_s": outcome.wall_s,
-        "cpu_s": outcome.cpu_s,
-        "peak_bytes": outcome.peak_bytes,
-    }
-    return row_read(row, earlier=False), written
+        output=output,
+        report=job.report if job.report in written else "",
+        page=next((name for name in written if name.endswith(".html")), ""),
+        earlier=False,
+        wall_s=outcome.wall_s,
+        cpu_s=outcome.cpu_s,
+        peak_bytes=outcome.peak_bytes,
+    )
+    return row, written
 
 
-def _said(outcome: JobOutcome, ended: Ended) -> str:
+def _answer(outcome: JobOutcome, ended: Ended) -> str:
     """The answer, or what went wrong."""
     text = outcome.said if ended in ("ok", "not ok") else outcome.complained
     lines = [line for line in text.strip().splitlines() if line]
@@ -70,28 +71,8 @@ def _said(outcome: JobOutcome, ended: Ended) -> str:
     return first.removeprefix(_PREFIX)
 
 
-def row_read(row: Mapping[str, Any], *, earlier: bool) -> BatchRow:
-    """A row of JSON."""
-    pairs: dict[str, Any] = {
-        name: None if row[name] is None else Pair(row[name]["original"], row[name]["emitted"]) for name in _PAIRS
-    }
-    values: dict[str, Any] = {
-        field.name: row[field.name] for field in fields(BatchRow) if field.name not in (*_PAIRS, "earlier")
-    }
-    return BatchRow(**values, **pairs, earlier=earlier)
-
-
 class KeptRows(Sequence[BatchRow]):
-    """KeptRows of a batch that stand in its manifest and are read when somebody looks at them.
-
-    A later batch writes another file, so that these stay what they were.
-
-    Args:
-        manifest: the file.
-        planned: the runs.
-        places: where the row of each run begins in the file; -1: there is none.
-        earlier: of each run: not 0 if an earlier batch did it.
-    """
+    """Rows of a batch that stand in its manifest and are read when somebody looks at them."""
 
     def __init__(self, manifest: Path, planned: Plan, places: Sequence[int], earlier: Sequence[int]) -> None:
         self._stream = manifest.open("rb")
@@ -125,7 +106,9 @@ class KeptRows(Sequence[BatchRow]):
         job, base = self._planned.job(rank), self._planned.base
         files = {name: base.path_of(row[name]) for name in ("output", "report", "page") if row[name]}
         given = {"program": job.program, "machine": job.machine}
-        return row_read(row | files | given, earlier=bool(self._earlier[rank]))
+        pairs = {name: None if row[name] is None else Pair(**row[name]) for name in _PAIRS}
+        values = {field.name: row[field.name] for field in fields(BatchRow)}
+        return BatchRow(**values | files | given | pairs | {"earlier": bool(self._earlier[rank])})
 
 
 def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
@@ -133,26 +116,12 @@ def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
     heads: list[str] = []
     for field in fields(BatchRow):
         heads += [f"{field.name}.original", f"{field.name}.emitted"] if field.name in _PAIRS else [field.name]
-    yield _csv_line(heads)
-    for row in rows:
-        flat = _flat(plain(row))
-        yield _csv_line([flat.get(head, "") for head in heads])
-
-
-def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for name, value in row.items():
-        if isinstance(value, Mapping):
-            flat |= {f"{name}.{key}": inner for key, inner in value.items()}
-        else:
-            flat[name] = value
-    return flat
-
-
-def _csv_line(cells: Sequence[object]) -> str:
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerow(["" if cell is None else cell for cell in cells])
-    return stream.getvalue()
+    # A writer gives back what its stream's `write` does: the line.
+    writer = csv.DictWriter(SimpleNamespace(write=str), heads, extrasaction="ignore", lineterminator="\n")
+    yield str(writer.writeheader())
+    for row in map(plain, rows):
+        pairs = {f"{name}.{key}": value for name in _PAIRS if row[name] for key, value in row[name].items()}
+        yield str(writer.writerow(row | pairs))
 
 
 OnBatch = Callable[[float, str], None]
@@ -165,7 +134,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class _CtrlC:
-    """Ctrl-C waits while files of one run are written: all of them stand there, or none."""
+    """Delays Ctrl-C while the files of one run are written, so that all of them exist or none."""
 
     def __init__(self) -> None:
         self._asked = self._busy = False
@@ -196,15 +165,7 @@ class _CtrlC:
 
 
 class Runs:
-    """The runs of one batch.
-
-    Args:
-        planned: what is to be done.
-        manifest: where it is written down.
-        folders: in which runs may write.
-        resume: leave what is done.
-        on_progress: see `OnBatch`.
-    """
+    """The runs of one batch."""
 
     def __init__(
         self, planned: Plan, manifest: Manifest, folders: Sequence[Path], resume: bool, on_progress: OnBatch

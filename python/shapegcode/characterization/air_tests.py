@@ -49,7 +49,7 @@ class AirBox:
         return cls(tuple(values[::2]), tuple(values[1::2]))  # type: ignore[arg-type]
 
     def travel_mm(self, axis: str) -> float:
-        """Signed way from the start point to the farther side, in mm."""
+        """Signed travel from the start point to the farther side, in mm."""
         index = AXES.index(axis)
         low, high = self.low[index], self.high[index]
         return high if high >= -low else low
@@ -127,13 +127,13 @@ def check(test: AirTest, box: AirBox) -> None:
         index = AXES.index(part.axis)
         for step in steps(part):
             at[part.axis] += step.length_mm
-            place = at[part.axis]
-            if not box.low[index] - 1e-6 <= place <= box.high[index] + 1e-6:
+            position = at[part.axis]
+            if not box.low[index] - 1e-6 <= position <= box.high[index] + 1e-6:
                 raise ArgumentError(
-                    f"test {test.name}: {part.axis} would go to {place:.3f} mm, the box is "
+                    f"test {test.name}: {part.axis} would go to {position:.3f} mm, the box is "
                     f"{box.low[index]:g} to {box.high[index]:g} mm"
                 )
-    if not all(math.isclose(place, 0.0, abs_tol=1e-6) for place in at.values()):
+    if not all(math.isclose(position, 0.0, abs_tol=1e-6) for position in at.values()):
         raise ArgumentError(f"test {test.name} would not end where it began: {at}")
 
 
@@ -155,7 +155,7 @@ _PER_MINUTE = 60.0
 
 
 class _Maker:
-    """Draws up the parts of tests for one machine and one box."""
+    """Designs the parts of tests for one machine and one box."""
 
     def __init__(self, machine: Machine, box: AirBox) -> None:
         self._box = box
@@ -341,7 +341,7 @@ def _rapid_s(part: Part, timing: ControllerTiming) -> float:
     if nominal >= ramp:
         moving = whole_periods(nominal, timing.period_s) + ramp
     else:
-        # acceleration = rate / time constant; half the way up, half the way down
+        # acceleration = rate / time constant; half of the travel up, half down
         moving = 2.0 * whole_periods(math.sqrt(nominal * ramp), timing.period_s)
     return moving + timing.rapid_bell_s[part.axis] + timing.in_position_s[part.axis]
 

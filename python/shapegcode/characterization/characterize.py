@@ -40,7 +40,7 @@ def characterize(
         results: a filled-in RESULTS.toml, the folder that holds it and the logs, or one log beside it.
         machine: whose file gets the values.
         units: of time and length in the logs, for example "ms,um"; None: from their headers.
-        on_progress: told the share of the work done, 0 to 1.
+        on_progress: called with the share of the work done, 0 to 1.
 
     Returns:
         What is known, with 95 % intervals, and the machine with it.
@@ -67,7 +67,7 @@ def characterize(
     if sheet.times_s:
         watch = fit_stopwatch(sheet)
         found, contradictions = combine(found, watch.found), watch.contradictions
-    rank = {name: place for place, name in enumerate(_ORDER)}
+    rank = {name: index for index, name in enumerate(_ORDER)}
     facts = sorted([*found, _NOT_SEEN], key=lambda each: rank.get(each.quantity, len(rank)))
     fitted, remarks = _fitted(machine, facts)
     return Characterisation(
@@ -99,13 +99,13 @@ def _sheet(source: Path) -> FilledSheet:
 
 def _assumed(machine: Machine, key: str) -> float | str | None:
     """What the machine file has for a key; None where it has none."""
-    place: Any = machine
+    held: Any = machine
     for name in key.split("."):
-        inner = getattr(place, name, None)
+        inner = getattr(held, name, None)
         if inner is None:  # one value for all axes
             break
-        place = inner
-    return place if isinstance(place, int | float | str) else None
+        held = inner
+    return held if isinstance(held, int | float | str) else None
 
 
 def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine, dict[str, str]]:

@@ -45,7 +45,7 @@ def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list
         fit_cutting(facts, stops)
         stop_pitch = _dwells(facts, stops[0])
     else:
-        facts.unknown("cutting time constant", "needs log_cutting")
+        facts.add_unknown("cutting time constant", "needs log_cutting")
     _runs(facts, run, parts.get("log_blocks", []))
     rapids = {
         axis: fit_rapids(facts, axis, parts[f"log_rapid_{axis.lower()}"])
@@ -69,17 +69,17 @@ def _period(facts: LogFacts, logs: Mapping[str, ServoLog], stops: list[PartLog],
         count, note = bend, f"the speed of the command changes every {bend} samples"
     if count > 1:
         facts.period, facts.held = round(count * sampling, 6), True
-        facts.known(name, facts.period, 1e-3 * facts.period, key, note)
+        facts.add(name, facts.period, 1e-3 * facts.period, key, note)
         return
     for found in (_period_of_stops(stops), _period_of_run(run, sampling)):
         if found is not None:
             facts.period, half, note = found
-            facts.known(name, facts.period, half, key, note)
+            facts.add(name, facts.period, half, key, note)
             return
     why = f"not longer than the {sampling * 1e3:g} ms between samples, or interpolated between periods"
     if len(stops) < 2 or not run:
         why += "; log_cutting and log_run together may tell"
-    facts.unknown(name, why)
+    facts.add_unknown(name, why)
 
 
 def _period_of_stops(stops: list[PartLog]) -> tuple[float, float, str] | None:
@@ -118,7 +118,7 @@ def _dwells(facts: LogFacts, part: PartLog) -> float:
     if facts.stop_s is not None:
         extra = moving - whole_periods(part.part.duration_s, facts.tick) - facts.stop_s
         waits = extra > 2.0 * (half + facts.cutting_half) + 1.5 * (facts.period or 0.004)
-        facts.said("in-position wait before a dwell", f"yes, {extra * 1e3:.1f} ms" if waits else "no")
+        facts.add_word("in-position wait before a dwell", f"yes, {extra * 1e3:.1f} ms" if waits else "no")
     return moving
 
 
@@ -145,7 +145,7 @@ def _waits(facts: LogFacts, stops: dict[str, _Interval], rapids: dict[str, list[
         name, key = f"in-position time {axis}", f"controller.in_position_s.{axis.lower()}"
         after, stop = rapids.get(axis, []), stops.get(axis)
         if not after and stop is None:
-            facts.unknown(name, f"needs log_exact or log_rapid_{axis.lower()}")
+            facts.add_unknown(name, f"needs log_exact or log_rapid_{axis.lower()}")
             continue
         value, half = mean(*zip(*after, strict=True)) if after else (0.0, math.inf)
         note = "after rapids"
@@ -158,9 +158,9 @@ def _waits(facts: LogFacts, stops: dict[str, _Interval], rapids: dict[str, list[
                 value, half = mean([value, stop[0]], [half, stop[1]])
                 note = "after rapids and exact stops"
         if value < -half:
-            facts.unknown(name, f"{value * 1e3:.1f} ms: the next move begins too early")
+            facts.add_unknown(name, f"{value * 1e3:.1f} ms: the next move begins too early")
         else:
-            facts.known(name, max(value, 0.0), half, key, note)
+            facts.add(name, max(value, 0.0), half, key, note)
 
 
 def _runs(facts: LogFacts, run: list[PartLog], blocks: list[PartLog]) -> None:
@@ -170,11 +170,11 @@ def _runs(facts: LogFacts, run: list[PartLog], blocks: list[PartLog]) -> None:
     if run:
         end = _block_end(facts, run[0], settle)
     else:
-        facts.unknown("block end", "needs log_run", "")
+        facts.add_unknown("block end", "needs log_run", "")
     if blocks:
         _block_time(facts, blocks[0], settle, end)
     else:
-        facts.unknown("block time", "needs log_blocks")
+        facts.add_unknown("block time", "needs log_blocks")
 
 
 def _block_end(facts: LogFacts, run: PartLog, settle: float) -> str | None:
@@ -191,9 +191,9 @@ def _block_end(facts: LogFacts, run: PartLog, settle: float) -> str | None:
     elif full is not None and abs(lasts - nominal) < 0.3 * full and slack < 0.3 * full:
         end = "carry"
     if end:
-        facts.said("block end", end, "controller.block_end", note)
+        facts.add_word("block end", end, "controller.block_end", note)
     else:
-        facts.unknown("block end", note + ": neither fits, or the period is not known", "")
+        facts.add_unknown("block end", note + ": neither fits, or the period is not known", "")
     return end
 
 
@@ -202,7 +202,7 @@ def _block_time(facts: LogFacts, blocks: PartLog, settle: float, end: str | None
     lasting = f"blocks of {part.duration_s * 1e3:.2f} ms"
     steady = line_slope(blocks, settle)
     if steady is None:
-        facts.unknown(name, f"{lasting} are over before the speed is steady: it is short")
+        facts.add_unknown(name, f"{lasting} are over before the speed is steady: it is short")
         return
     speed, half = steady
     lasts = abs(part.length_mm) / speed
@@ -212,40 +212,40 @@ def _block_time(facts: LogFacts, blocks: PartLog, settle: float, end: str | None
         floor = whole_periods(part.duration_s, facts.period)
     if lasts <= 1.02 * floor + slack:
         why = f"{lasting} last {lasts * 1e3:.2f} ms: it hides behind the period"
-        facts.unknown(name, why, high=lasts + slack)
+        facts.add_unknown(name, why, high=lasts + slack)
         return
     if facts.exponential:
         slack += 0.005 * lasts  # the tail of the start
-    facts.known(name, lasts, slack, "controller.block_time_s", f"{lasting} last so long")
+    facts.add(name, lasts, slack, "controller.block_time_s", f"{lasting} last so long")
 
 
 def _feed_steps(facts: LogFacts, parts: list[PartLog]) -> None:
     """The shortest distance over which the speed follows a step of the feed between F and F/2 by 90 %."""
     name = f"feed-control interval at F{parts[0].part.feed_mm_per_min:g}" if parts else "feed-control interval"
     if not parts:
-        facts.unknown(name, "needs log_feed_steps", "mm")
+        facts.add_unknown(name, "needs log_feed_steps", "mm")
         return
     depths = {abs(log.part.length_mm): depth for log in parts if (depth := _followed_share(log)) is not None}
     followed = [d for d in depths if all(depths[e] >= _FOLLOWED for e in depths if e >= d)]
     shown = ", ".join(f"{d:g} mm {max(0.0, min(1.0, depths[d])) * 100:.0f} %" for d in sorted(depths))
     if not followed:
-        facts.unknown(name, f"no distance that fits into the box is followed: {shown}", "mm")
+        facts.add_unknown(name, f"no distance that fits into the box is followed: {shown}", "mm")
         return
     best = min(followed)
     below = max((d for d in depths if d < best), default=0.0)
-    facts.between(name, best, below, best, "", f"followed: {shown}", "mm")
+    facts.add_interval(name, best, below, best, "", f"followed: {shown}", "mm")
 
 
 def _followed_share(log: PartLog) -> float | None:
-    """How much of the step the speed follows; None where nothing of the way is steady."""
+    """Share of the speed step that is followed; None where no part of the move has a constant speed."""
     part = log.part
-    top = int(np.argmax(log.way_mm))  # the turn, which smoothing cuts short
-    begin = log.times_s[int(np.argmax(log.way_mm > max(0.02, 5 * log.noise_mm)))]
+    top = int(np.argmax(log.travel_mm))  # the turn, which smoothing cuts short
+    begin = log.times_s[int(np.argmax(log.travel_mm > max(0.02, 5 * log.noise_mm)))]
     settle = min(_STEPS_SETTLE_S, 0.25 * (log.times_s[top] - begin))
     inside = (log.times_s > begin + settle) & (log.times_s < log.times_s[top] - settle)
     pitch = float(np.median(np.diff(log.times_s)))
     width = max(1, round(min(0.02, 0.25 * part.duration_s) / pitch))
-    speed = (log.way_mm[width:] - log.way_mm[:-width]) / (log.times_s[width:] - log.times_s[:-width])
+    speed = (log.travel_mm[width:] - log.travel_mm[:-width]) / (log.times_s[width:] - log.times_s[:-width])
     seen = speed[inside[width:] & inside[:-width]]
     if not len(seen):
         return None
@@ -256,7 +256,7 @@ def _followed_share(log: PartLog) -> float | None:
 
 # --- time constants from the shape of single moves --------------------------------------------------------------------
 
-_ODD_SHAPE = 0.002  # of the way: a fit that leaves more is no fit
+_ODD_SHAPE = 0.002  # of the travel: a fit that leaves more is no fit
 _BELL_GAIN = 0.8  # a second moving average must lower the variance below this share
 _FINE = 1.7  # periods
 _FINE_BENT = 1.0
@@ -266,7 +266,7 @@ _SHAPE_NOTES = {"linear": "linear", "bell": "the longer of two moving averages",
 
 @dataclass
 class LogFacts(Facts):
-    """What the logs have told so far; times in s."""
+    """What is known from the logs so far; times in s."""
 
     source: str = "log"
     period: float | None = None  # interpolation period; None: not known
@@ -313,27 +313,27 @@ def fit_cutting(facts: LogFacts, stops: list[PartLog]) -> None:
             "was a look-ahead mode on?"
         )
         for name in names:
-            facts.unknown(name, why)
+            facts.add_unknown(name, why)
         return
     # Of each fit the longest time first.
     times = [
         sorted(zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True), reverse=True) for fit in fits[best]
     ]
     value, half = mean(*zip(*(pairs[0] for pairs in times), strict=True))
-    facts.known(names[0], value, half, "controller.time_constant_s", _SHAPE_NOTES[best])
-    facts.said("cutting acceleration shape", best, "controller.after_interpolation_shape")
+    facts.add(names[0], value, half, "controller.time_constant_s", _SHAPE_NOTES[best])
+    facts.add_word("cutting acceleration shape", best, "controller.after_interpolation_shape")
     facts.exponential = best == "exponential"
     facts.cutting, facts.cutting_half = value, half
     bell_key = "controller.bell_time_s"
     if best == "bell":
         second, second_half = mean(*zip(*(pairs[1] for pairs in times), strict=True))
-        facts.known(names[1], second, second_half, bell_key)
+        facts.add(names[1], second, second_half, bell_key)
         facts.cutting, facts.cutting_half = value + second, math.hypot(half, second_half)
     elif best == "linear":
-        facts.between(names[1], 0.0, 0.0, max(facts.fine_s, 0.002), bell_key, _NO_BELL)
+        facts.add_interval(names[1], 0.0, 0.0, max(facts.fine_s, 0.002), bell_key, _NO_BELL)
     if not facts.exponential:
         # What a stopwatch sees.
-        facts.known(CUTTING_SUM, facts.cutting, facts.cutting_half)
+        facts.add(CUTTING_SUM, facts.cutting, facts.cutting_half)
 
 
 def _cutting_fits(facts: LogFacts, stops: list[PartLog]) -> dict[str, list[ShapeFit]]:
@@ -400,30 +400,30 @@ def fit_rapids(facts: LogFacts, axis: str, parts: list[PartLog]) -> list[tuple[f
     fits = [fit for fit, part in zip(every, parts, strict=True) if fit.rms_mm < _ODD_SHAPE * abs(part.part.length_mm)]
     if not fits:
         why = f"the rapids are no constant acceleration: the best fit leaves {every[0].rms_mm * 1e3:.1f} µm"
-        facts.unknown(name, why)
-        facts.unknown(bell_name, why)
+        facts.add_unknown(name, why)
+        facts.add_unknown(bell_name, why)
         return []
     key = f"controller.rapid_time_constant_s.{axis.lower()}"
     long = [fit.ramp for fit in fits if fit.long]
     if long:
         value, half = mean(*zip(*long, strict=True))
-        facts.known(name, value, half, key, "ramp of rapids that reach the rate")
+        facts.add(name, value, half, key, "ramp of rapids that reach the rate")
     else:
         low, high = _short_ramp(facts, fits)
         if low <= high:
             note = "no rapid reaches the rate: from their acceleration, in whole periods"
-            facts.between(name, (low + high) / 2.0, low, high, key, note)
+            facts.add_interval(name, (low + high) / 2.0, low, high, key, note)
         else:
-            facts.unknown(
+            facts.add_unknown(
                 name, "rapids of different length have different accelerations; is the rate in the machine file right?"
             )
     bells = [fit.bell for fit in fits if fit.bell is not None]
     bell_key = f"controller.rapid_bell_time_s.{axis.lower()}"
     if len(bells) * 2 > len(fits):
         value, half = mean(*zip(*bells, strict=True))
-        facts.known(bell_name, value, half, bell_key)
+        facts.add(bell_name, value, half, bell_key)
     else:
-        facts.between(bell_name, 0.0, 0.0, max(facts.fine_s, 0.002), bell_key, _NO_BELL)
+        facts.add_interval(bell_name, 0.0, 0.0, max(facts.fine_s, 0.002), bell_key, _NO_BELL)
     return [fit.wait for fit in fits]
 
 
@@ -456,18 +456,18 @@ def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
         name = f"position gain {axis}"
         gain, rest = _lag_of(records)
         if rest < 0.02 or not 2.0 * GAINS[0] < gain < 0.5 * GAINS[1]:
-            facts.unknown(name, "the actual position follows the command without a lag that tells it", "1/s")
+            facts.add_unknown(name, "the actual position follows the command without a lag that determines it", "1/s")
             continue
         spread = np.std(np.array([_lag_of([record]) for record in records]), axis=0) / math.sqrt(len(records))
         # Command and actual position may be sampled up to half a sample apart, which looks like lag.
         apart = 0.5 * min(log.sampling_s for log in logs.values()) * gain
         half = float(spread[0]) + (_SERVO_SLACK + apart / rest) * gain
-        facts.known(name, gain, half, f"controller.position_gain_per_s.{axis.lower()}", unit="1/s")
+        facts.add(name, gain, half, f"controller.position_gain_per_s.{axis.lower()}", unit="1/s")
         half = float(spread[1]) + _SERVO_SLACK + apart
         key = f"controller.feed_forward_ratio.{axis.lower()}"
-        facts.known(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, key, unit="1")
+        facts.add(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, key, unit="1")
     if not done:
-        facts.unknown("position gain", "no actual positions in the logs", "1/s")
+        facts.add_unknown("position gain", "no actual positions in the logs", "1/s")
 
 
 def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, float] | None:
@@ -480,12 +480,12 @@ def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, floa
     def rows(values: FloatArray) -> FloatArray:
         return np.asarray(values[first : first + n * count].reshape(n, count).mean(axis=1))
 
-    way = rows(log.command_mm[:, index] - log.command_mm[0, index])
-    if np.ptp(way) < 1.0:
+    travel = rows(log.command_mm[:, index] - log.command_mm[0, index])
+    if np.ptp(travel) < 1.0:
         return None
-    error = way - rows(log.actual_mm[:, index] - log.actual_mm[0, index])
+    error = travel - rows(log.actual_mm[:, index] - log.actual_mm[0, index])
     step = count * log.sampling_s
-    return way, error - np.median(error[: max(3, round(0.1 / step))]), step
+    return travel, error - np.median(error[: max(3, round(0.1 / step))]), step
 
 
 def _lag_of(records: list[tuple[FloatArray, FloatArray, float]]) -> tuple[float, float]:
@@ -494,8 +494,8 @@ def _lag_of(records: list[tuple[FloatArray, FloatArray, float]]) -> tuple[float,
 
     def solve(gain: float) -> tuple[float, float]:
         cross = square = power = 0.0
-        for way, error, step in records:
-            model = lag_way(way, gain, step)
+        for travel, error, step in records:
+            model = lag_way(travel, gain, step)
             cross += float(model @ error)
             square += float(model @ model)
             power += float(error @ error)

@@ -1,6 +1,6 @@
 """Single moves in a servo log: when the command changes, where the moves are, what shape they have.
 
-A move that starts and ends at rest is a rectangle of speed, smoothed. Its way is a sum of powers of time for moving
+A move that starts and ends at rest is a rectangle of speed, smoothed. Its travel is a sum of powers of time for moving
 averages, and a closed form for an exponential; time constants come from fitting that to all moves of a part at once.
 """
 
@@ -47,7 +47,7 @@ class _Bends:
 
     share: float  # of all bending
     first: int  # index of such a sample
-    place: float  # of the bend between the two samples, 0 to 1
+    fraction: float  # of the bend between the two samples, 0 to 1
     energy: float  # all bending above the noise
 
 
@@ -85,11 +85,11 @@ def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
         found = _bends(log, bend)
         before = np.arange(found.first, len(log.times_s) - 2, bend)
         before = before[before > 0]
-        times = log.times_s[before] + found.place * log.sampling_s
+        times = log.times_s[before] + found.fraction * log.sampling_s
         x = log.command_mm
         # The straight pieces on both sides meet at the bend.
-        left = x[before] + found.place * (x[before] - x[before - 1])
-        right = x[before + 1] - (1.0 - found.place) * (x[before + 2] - x[before + 1])
+        left = x[before] + found.fraction * (x[before] - x[before - 1])
+        right = x[before + 1] - (1.0 - found.fraction) * (x[before + 2] - x[before + 1])
         return times, (left + right) / 2.0
     if count == 1:
         return log.times_s, log.command_mm
@@ -111,24 +111,24 @@ class PartLog:
 
     part: Part
     times_s: FloatArray
-    way_mm: FloatArray  # way of the part's axis from its start, in the direction of the first move
+    travel_mm: FloatArray  # travel of the part's axis from its start, in the direction of the first move
     noise_mm: float  # standard deviation of a sample at rest
 
     def middles_s(self) -> FloatArray:
-        """The times at which a there-and-back part passes the middle of its way, (n,)."""
+        """The times at which a there-and-back part passes the middle of its travel, (n,)."""
         length = abs(self.part.length_mm) * self.part.stride
-        u = self.way_mm / length - 0.5
+        u = self.travel_mm / length - 0.5
         # hysteresis, so that noise at the middle does not count twice
         state = np.where(u > 0.2, 1, np.where(u < -0.2, -1, 0))
         known = np.flatnonzero(state)
         turns = np.flatnonzero(np.diff(state[known])) if len(known) else np.array([], dtype=int)
         middles = []
         for i, j in zip(known[turns], known[turns + 1], strict=True):
-            times, places = self.times_s[i : j + 1], u[i : j + 1]
+            times, shares = self.times_s[i : j + 1], u[i : j + 1]
             if j - i > 1:
-                slope, offset = np.polyfit(times - times[0], places, 1)
+                slope, offset = np.polyfit(times - times[0], shares, 1)
             else:
-                slope, offset = (places[1] - places[0]) / (times[1] - times[0]), places[0]
+                slope, offset = (shares[1] - shares[0]) / (times[1] - times[0]), shares[0]
             middles.append(times[0] - offset / slope)
         return np.array(middles)
 
@@ -168,22 +168,22 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
         low, high = max(0, first - margin), min(len(times), last + reach + margin)
         axis = AXES.index(part.axis)
         rest = positions[low : max(low + 2, first), axis]
-        way = (positions[low:high, axis] - rest.mean()) * math.copysign(1.0, part.length_mm)
+        travel = (positions[low:high, axis] - rest.mean()) * math.copysign(1.0, part.length_mm)
         spread = float(noise[used.index(axis)])
-        out.append(PartLog(part, times[low:high], way, spread))
+        out.append(PartLog(part, times[low:high], travel, spread))
         expected = abs(part.length_mm) * part.stride
         # A turn without a stop is cut short by the smoothing.
         least = 0.98 if part.pattern in ("dwell", "exact", "rapid") else 0.5
-        if not least * expected < way.max() - way.min() < 1.02 * expected + 10.0 * spread:
+        if not least * expected < travel.max() - travel.min() < 1.02 * expected + 10.0 * spread:
             raise ArgumentError(
-                f"{log.file}: {part.axis} moves over {way.max() - way.min():.3f} mm in part {len(out)}, test "
+                f"{log.file}: {part.axis} moves over {travel.max() - travel.min():.3f} mm in part {len(out)}, test "
                 f"{test.name} has {expected:.3f} mm there: wrong log, units or scale"
             )
     return out
 
 
 def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
-    """Share of the way at the times after the start, for a rectangle and moving averages of these lengths in s."""
+    """Share of the travel at the times after the start, for a rectangle and moving averages of these lengths in s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power = len(used)
     if not power:
@@ -231,9 +231,9 @@ def fit_shape(
     edges = [log.times_s[0], *((middles[1:] + middles[:-1]) / 2.0), log.times_s[-1]]
     for k, middle in enumerate(middles):
         inside = (log.times_s >= edges[k]) & (log.times_s <= edges[k + 1])
-        way = log.way_mm[inside] / length
+        travel = log.travel_mm[inside] / length
         pieces_t.append(log.times_s[inside] - middle)
-        pieces_y.append(way if k % 2 == 0 else 1.0 - way)
+        pieces_y.append(travel if k % 2 == 0 else 1.0 - travel)
     t, y = np.concatenate(pieces_t), np.concatenate(pieces_y)
     every = -(-len(t) // _MAX_SAMPLES)
     t, y = t[::every], y[::every]
@@ -257,15 +257,15 @@ def fit_shape(
 
 
 def line_slope(log: PartLog, settle_s: float) -> tuple[float, float] | None:
-    """Mean speed in mm/s of the way out, and its 95 % half-width; None if too little of it is steady."""
-    top = int(np.argmax(log.way_mm))
-    begin = int(np.argmax(log.way_mm > max(8.0 * log.noise_mm, 0.003)))
+    """Mean speed in mm/s of the outward travel, and its 95 % half-width; None if too little of it is steady."""
+    top = int(np.argmax(log.travel_mm))
+    begin = int(np.argmax(log.travel_mm > max(8.0 * log.noise_mm, 0.003)))
     first, last = log.times_s[begin] + settle_s, log.times_s[top] - settle_s
     inside = (log.times_s > first) & (log.times_s < last)
     if last - first < 0.15 * (log.times_s[top] - log.times_s[begin]) or inside.sum() < 20:
         return None
     x = log.times_s[inside] - log.times_s[inside].mean()
-    y = log.way_mm[inside]
+    y = log.travel_mm[inside]
     slope = float(x @ (y - y.mean()) / (x @ x))
     rest = y - y.mean() - slope * x
     # The ripple of the blocks is not white: it may tilt the line by its own height over the length of the line.

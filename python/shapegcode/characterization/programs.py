@@ -55,15 +55,15 @@ def write_characterization_tests(
         OSError: the folder or a file cannot be written.
     """
     box = AirBox.parse(box) if isinstance(box, str) else box
-    place = Path(folder)
+    out = Path(folder)
     tests = make_tests(machine, box)
-    if (place / SHEET).exists():
-        raise ArgumentError(f"{place / SHEET} exists and may hold results: name another folder")
-    place.mkdir(parents=True, exist_ok=True)
+    if (out / SHEET).exists():
+        raise ArgumentError(f"{out / SHEET} exists and may hold results: name another folder")
+    out.mkdir(parents=True, exist_ok=True)
     for test in {test.number: test for test in reversed(tests)}.values():
-        write_text(place / test.program, program_text(test, box, machine))
-    write_text(place / "README.txt", readme_text(tests, machine, box))
-    write_text(place / SHEET, sheet_text(tests, machine, box))
+        write_text(out / test.program, program_text(test, box, machine))
+    write_text(out / "README.txt", readme_text(tests, machine, box))
+    write_text(out / SHEET, sheet_text(tests, machine, box))
     timing = ControllerTiming.of(machine)
     written = [
         WrittenTest(
@@ -249,8 +249,8 @@ def read_sheet(path: Path) -> FilledSheet:
         if file.is_file():
             logs[name] = file
         elif test.log:
-            place = f"tests.{name}.log"
-            raise FileError(str(path), (Problem(place, test.log, f"no such file: {file}", line_of(place, text)),))
+            where = f"tests.{name}.log"
+            raise FileError(str(path), (Problem(where, test.log, f"no such file: {file}", line_of(where, text)),))
     return FilledSheet(
         file=str(path),
         tests=tests,

@@ -1,4 +1,4 @@
-"""Facts of a controller with their intervals; what its tests are, and what their results say."""
+"""Parameters of a controller with their intervals, its tests, and what follows from their results."""
 
 from __future__ import annotations
 
@@ -70,21 +70,21 @@ class Facts:
     source: str  # "log" or "stopwatch"
     found: list[ControllerFact] = field(default_factory=list)  # one for each quantity, known or not
 
-    def known(self, quantity: str, value: float, half: float, key: str = "", note: str = "", unit: str = "s") -> None:
+    def add(self, quantity: str, value: float, half: float, key: str = "", note: str = "", unit: str = "s") -> None:
         """A number with a symmetric interval of half-width *half*, cut off at 0."""
-        self.between(quantity, value, max(0.0, value - half), value + half, key, note, unit)
+        self.add_interval(quantity, value, max(0.0, value - half), value + half, key, note, unit)
 
-    def between(
+    def add_interval(
         self, quantity: str, value: float, low: float, high: float, key: str = "", note: str = "", unit: str = "s"
     ) -> None:
         """A number with its interval."""
         self.found.append(ControllerFact(quantity, value, low, high, unit, key, self.source, note))
 
-    def said(self, quantity: str, word: str, key: str = "", note: str = "") -> None:
+    def add_word(self, quantity: str, word: str, key: str = "", note: str = "") -> None:
         """A word."""
         self.found.append(ControllerFact(quantity, word, None, None, "", key, self.source, note))
 
-    def unknown(self, quantity: str, why: str, unit: str = "s", high: float | None = None) -> None:
+    def add_unknown(self, quantity: str, why: str, unit: str = "s", high: float | None = None) -> None:
         """A quantity that the data do not determine; *high* is a limit that they do give."""
         self.found.append(ControllerFact(quantity, None, None, high, unit, "", self.source, why))
 
@@ -223,10 +223,10 @@ class Characterisation(Result):
     def answer(self) -> str:
         """How much is known."""
         known = sum(each.value is not None for each in self.findings)
-        said = (
+        sentence = (
             f"{known} of {len(self.findings)} quantities of {self.machine} are known, {len(self.remarks)} keys measured"
         )
-        return said if self.ok else f"{said}; {len(self.warnings)} CONTRADICTIONS"
+        return sentence if self.ok else f"{sentence}; {len(self.warnings)} CONTRADICTIONS"
 
     @property
     def next_step(self) -> str:

@@ -38,20 +38,20 @@ _NAMES = ("overhead", "cutting", "X", "Y", "Z", "block")
 
 @dataclass
 class WatchFacts(Facts):
-    """What the times have told so far."""
+    """What the times have shown so far."""
 
     source: str = "stopwatch"
     contradictions: list[str] = field(default_factory=list)  # times that do not go with the others, in words
 
-    def if_narrow(self, name: str, value: float, half: float, key: str, needs: str, note: str) -> None:
+    def add_if_narrow(self, name: str, value: float, half: float, key: str, needs: str, note: str) -> None:
         """A time in s, unknown where its interval is too wide or below 0."""
         if half > _WIDE * max(abs(value), 0.002):
-            self.unknown(name, f"needs {needs}; the interval would be ±{half * 1e3:.1f} ms", high=value + half)
+            self.add_unknown(name, f"needs {needs}; the interval would be ±{half * 1e3:.1f} ms", high=value + half)
         elif value < -half:
             why = f"{value * 1e3:.1f} ms ± {half * 1e3:.1f} ms is negative: {needs} contradict each other"
-            self.unknown(name, why)
+            self.add_unknown(name, why)
         else:
-            self.known(name, value, half, key, note)
+            self.add(name, value, half, key, note)
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def fit_stopwatch(results: FilledSheet) -> WatchFacts:
     exponential = _shape(rows, facts)
     used = _used(rows, exponential)
     if not used:
-        facts.unknown("all but rapids", "no times of the cutting tests", "")
+        facts.add_unknown("all but rapids", "no times of the cutting tests", "")
         return facts
     fits = [_least_squares(used, period, end) for period in (NO_PERIOD_S, *PERIODS_S) for end in ("ceil", "carry")]
     best, period = _discrete(fits, facts)
@@ -160,12 +160,12 @@ def _least_squares(rows: Sequence[TimedTest], period: float, end: BlockEnd) -> _
 
 
 def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
-    """Time constant of an exponential, whose way to a stop lasts longer from a higher feed; 0 if it does not."""
+    """Time constant of an exponential, whose deceleration lasts longer from a higher feed; 0 if it does not."""
     fast = rows.get("stop_below")
     slow = [rows[name] for name in _SLOW if name in rows]
     name = "cutting acceleration shape"
     if fast is None or not slow:
-        facts.unknown(name, "needs stop_below and stop_slower", "")
+        facts.add_unknown(name, "needs stop_below and stop_slower", "")
         return 0.0
     points = []
     for row in (fast, *slow):
@@ -179,15 +179,15 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
     slope = float(weight @ ((x - centre) * y)) / spread
     half = 1.96 / math.sqrt(spread)
     if slope <= half + 0.002:
-        note = "a stop takes equally long from every feed; linear or bell cannot be told apart"
-        facts.said(name, "linear or bell", _SHAPE_KEY, note)
+        note = "a stop takes equally long from every feed; linear or bell cannot be distinguished"
+        facts.add_word(name, "linear or bell", _SHAPE_KEY, note)
         return 0.0
-    facts.said(name, "exponential", "", "stops from a higher feed last longer")
+    facts.add_word(name, "exponential", "", "stops from a higher feed last longer")
     # Each stop ends on a period that is not known well: half of the longest usual one, evenly spread.
     away = float(((x - centre) ** 2).sum())
     slack = 1.96 * 0.008 / math.sqrt(12.0) * math.sqrt(away) / away
     key, note = "controller.time_constant_s", "from stops at several feeds"
-    facts.known("cutting time constant", slope, math.hypot(half, slack), key, note)
+    facts.add("cutting time constant", slope, math.hypot(half, slack), key, note)
     return slope
 
 
@@ -202,14 +202,14 @@ def _discrete(fits: Sequence[_Fit], facts: WatchFacts) -> tuple[_Fit, float | No
     if len(periods) == 1 and periods[0] > NO_PERIOD_S:
         period = periods[0]
         note = "of the usual periods, the only one that fits"
-        facts.between(name, period, period, period, "controller.interpolation_period_s", note)
+        facts.add_interval(name, period, period, period, "controller.interpolation_period_s", note)
     else:
         shown = ", ".join("none" if t <= NO_PERIOD_S else f"{t * 1e3:g} ms" for t in periods)
-        facts.unknown(name, f"these fit equally well: {shown}", high=max(periods))
+        facts.add_unknown(name, f"these fit equally well: {shown}", high=max(periods))
     if len(ends) == 1:
-        facts.said("block end", best.end, "controller.block_end")
+        facts.add_word("block end", best.end, "controller.block_end")
     else:
-        facts.unknown("block end", "both fit: needs run_above, and a known period", "")
+        facts.add_unknown("block end", "both fit: needs run_above, and a known period", "")
     return best, period
 
 
@@ -218,27 +218,27 @@ def _cutting(best: _Fit, exponential: bool, facts: WatchFacts) -> None:
     if not exponential:
         note = "a stopwatch sees only the sum"
         key = "controller.time_constant_s"
-        facts.if_narrow(CUTTING_SUM, *best.get("cutting"), key, "stop_below, overhead", note)
-        facts.unknown("cutting bell time", "a stopwatch sees only the sum of both times")
+        facts.add_if_narrow(CUTTING_SUM, *best.get("cutting"), key, "stop_below, overhead", note)
+        facts.add_unknown("cutting bell time", "a stopwatch sees only the sum of both times")
     note = "after exact stops, if a dwell does not wait for in-position"
     for axis in AXES:
         key, needs = f"controller.in_position_s.{axis.lower()}", f"exact_{axis.lower()}, stop_below"
-        facts.if_narrow(f"in-position time {axis}", *best.get(axis), key, needs, note)
+        facts.add_if_narrow(f"in-position time {axis}", *best.get(axis), key, needs, note)
 
 
 def _block_time(best: _Fit, tiny: TimedTest | None, facts: WatchFacts) -> None:
     value, half = best.get("block")
     if tiny is None:
-        facts.unknown("block time", "needs blocks_tiny")
+        facts.add_unknown("block time", "needs blocks_tiny")
         return
     part = tiny.test.parts[0]
     floor = part_time_s(replace(part, count=1), ControllerTiming(best.period, best.end, 0.0, 0.0))
     if value <= 1.02 * floor + half or half > _WIDE * value:
         lasts = max(value, floor) * 1e3
         why = f"blocks of {part.duration_s * 1e3:.2f} ms last {lasts:.2f} ms: it hides behind the period"
-        facts.unknown("block time", why, high=floor + 2.0 * tiny.sigma_s / part.count)
+        facts.add_unknown("block time", why, high=floor + 2.0 * tiny.sigma_s / part.count)
         return
-    facts.known("block time", value, half, "controller.block_time_s")
+    facts.add("block time", value, half, "controller.block_time_s")
 
 
 def _override(best: _Fit, rows: dict[str, TimedTest], facts: WatchFacts) -> None:
@@ -250,7 +250,7 @@ def _override(best: _Fit, rows: dict[str, TimedTest], facts: WatchFacts) -> None
         half = 1.96 * seen * row.sigma_s / moving
         right = abs(seen - row.test.override_percent) <= half + 1.0
         note = "time goes with 1 / override" if right else "the feed does not follow the override"
-        facts.known(f"feed at override {row.test.override_percent} %", seen, half, "", note, "%")
+        facts.add(f"feed at override {row.test.override_percent} %", seen, half, "", note, "%")
 
 
 _RAMPS_S = np.arange(0.005, 1.0, 0.00025)
@@ -279,7 +279,7 @@ def fit_timed_rapids(
     names = (f"rapid time constant {axis}", f"rapid bell time {axis}")
     if len(timed) < 2:
         for name in names:
-            facts.unknown(name, f"needs two of the rapid_{axis.lower()} tests or more")
+            facts.add_unknown(name, f"needs two of the rapid_{axis.lower()} tests or more")
         return ""
     parts = [each.test.parts[0] for each in timed]
     count = np.array([part.count for part in parts])
@@ -300,7 +300,7 @@ def fit_timed_rapids(
     floor = float(chi2.min())
     if floor > _CONTRADICTS**2 + 3.0 * len(timed):
         for name in names:
-            facts.unknown(name, "the times contradict each other")
+            facts.add_unknown(name, "the times contradict each other")
         tests = ", ".join(each.test.name for each in timed)
         return (
             f"{tests}: no time constant gives these times (chi² {floor:.0f}); is the rapid rate of the machine file "
@@ -324,9 +324,9 @@ def _ramp(facts: Facts, axis: str, ramps: FloatArray, likely: FloatArray) -> Non
     value = float(likely @ ramps / likely.sum())
     if high - low > 2.0 * _WIDE * value:
         why = f"from {low * 1e3:.0f} to {high * 1e3:.0f} ms all fit; longer moves would tell more"
-        facts.unknown(name, why, high=high)
+        facts.add_unknown(name, why, high=high)
     else:
-        facts.between(name, value, low, high, f"controller.rapid_time_constant_s.{axis.lower()}")
+        facts.add_interval(name, value, low, high, f"controller.rapid_time_constant_s.{axis.lower()}")
 
 
 def _bell(
@@ -338,12 +338,12 @@ def _bell(
     bell = total - wait[0]
     if wait[1] > _WAIT_UNKNOWN_S:
         why = f"needs exact_{axis.lower()}: rapids alone show bell and in-position time together, {total * 1e3:.1f} ms"
-        facts.unknown(name, why, high=total)
+        facts.add_unknown(name, why, high=total)
     elif low <= 0.0 and high > 2.0 * slack + 0.02:
-        facts.unknown(name, f"anything up to {high * 1e3:.0f} ms fits", high=high)
+        facts.add_unknown(name, f"anything up to {high * 1e3:.0f} ms fits", high=high)
     elif low <= 0.0:
-        facts.between(name, 0.0, 0.0, max(high, 0.0), key, "none, or below the upper end")
+        facts.add_interval(name, 0.0, 0.0, max(high, 0.0), key, "none, or below the upper end")
     elif high - low > 2.0 * _WIDE * bell:
-        facts.unknown(name, f"from {low * 1e3:.0f} to {high * 1e3:.0f} ms all fit", high=high)
+        facts.add_unknown(name, f"from {low * 1e3:.0f} to {high * 1e3:.0f} ms all fit", high=high)
     else:
-        facts.between(name, bell, low, high, key, "if rapids and exact stops wait equally long for in-position")
+        facts.add_interval(name, bell, low, high, key, "if rapids and exact stops wait equally long for in-position")

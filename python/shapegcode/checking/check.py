@@ -15,13 +15,12 @@ from shapegcode._core import ProgramError
 from shapegcode.checking.result import Check, Finding, FindingCounts, SerialLine, ShortBlocks, ShortRun, StarvedRun
 from shapegcode.checking.runs import BlockTable, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
-from shapegcode.model.playable import SimulatedPrograms
-from shapegcode.model.shaped_program import shaped_warnings
+from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program
-from shapegcode.program.operating import no_room
-from shapegcode.program.reading import is_program_text, program_bytes, require_memory_for_lines
+from shapegcode.program.computer import require_memory_for_lines
+from shapegcode.program.reading import given_text
 from shapegcode.program.several import index_of, programs_of
-from shapegcode.program.stamp import STAMP_BEGIN
+from shapegcode.program.stamp import STAMP_BEGIN, no_room
 
 MOST_FINDINGS = 1000
 """Findings of one code that are listed; the counts hold them all."""
@@ -37,7 +36,7 @@ _WORK_LIMIT = re.compile(r"controller\.max_(program|expansion)_")  # in the mess
 _NOT_AS_WRITTEN = re.compile(r"does not end with M30|^text behind the '%'|^G68 R|byte-order mark")
 _ROUNDING = 1e-9
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
-# Of one reading (most_alarms in the core's reader).
+# Of one reading (max_alarms in the core's reader).
 _MAX_ALARMS = 200
 _MEMORY_PER_LINE = 350  # bytes
 
@@ -65,11 +64,8 @@ def check(
         program.require_machine(machine)
         text, source, folder = program.text, program.source, program.folder
         program_number = program.number if program_number is None else program_number
-    elif is_program_text(program):
-        return check_text(str(program), machine, program_number=program_number)
     else:
-        text = program_bytes(program, machine.controller.max_program_bytes)
-        source, folder = str(program), Path(program).parent
+        text, source, folder = given_text(program, machine)
     return check_text(text, machine, source=source, program_number=program_number, folder=folder)
 
 
@@ -118,8 +114,8 @@ def check_text(
     else:
         found += _reader_findings(program)
         if kind := program.other_arc_centre(data):
-            said = f"with {kind} I J K the whole program reads: --set input.arc_centre={kind}, or in the machine file"
-            found.append(Finding("note", "arc_centre", 0, source, 0, 0, said))
+            remedy = f"with {kind} I J K the whole program reads: --set input.arc_centre={kind}, or in the machine file"
+            found.append(Finding("note", "arc_centre", 0, source, 0, 0, remedy))
         found += (_at(program, "warning", code, 1, message) for code, message in shaped_warnings(program, machine))
         table = block_table(program, machine)
         for stop in look_ahead_breakers(program, machine, table):
@@ -199,8 +195,8 @@ def _size_and_macros(data: bytes, lines_before: int, source: str, machine: Machi
             yield Finding("note", "program_memory", 0, source, 0, 0, f"{over}: it can only be drip fed")
         else:
             # Only text that was shaped can be made smaller there.
-            ways = no_room(controller.program_memory_bytes) if STAMP_BEGIN in data else "drip feed it, or split it"
-            message = f"{over}: the control cannot store it; {ways}"
+            remedy = no_room(controller.program_memory_bytes) if STAMP_BEGIN in data else "drip feed it, or split it"
+            message = f"{over}: the control cannot store it; {remedy}"
             yield Finding("warning", "program_memory", _NO_ROOM, source, 0, 0, message)
     if not fed:
         return
@@ -216,8 +212,8 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.alarms:
         if _WORK_LIMIT.search(message):
             # No control refuses it: it is more than is computed here.
-            said = f"{message}: what follows is not checked"
-            yield _finding("warning", "work_limit", 0, file or program.source, line, column, said)
+            sentence = f"{message}: what follows is not checked"
+            yield _finding("warning", "work_limit", 0, file or program.source, line, column, sentence)
         else:
             yield _finding("alarm", "alarm", alarm, file or program.source, line, column, message)
     if len(program.core.alarms) >= _MAX_ALARMS:
@@ -334,8 +330,8 @@ def _dnc_findings(program: Program, line: SerialLine, runs: Iterable[CuttingRun]
 
 def _end(program: Program, run: CuttingRun) -> str:
     """The last line of a run, with its file if it is another one than that of the first line."""
-    (number, file), (_, begun) = program.core.origin(run.last_line), program.core.origin(run.first_line)
-    return f"line {number}" if file == begun else f"line {number} of {file or program.source}"
+    (number, file), (_, first_file) = program.core.origin(run.last_line), program.core.origin(run.first_line)
+    return f"line {number}" if file == first_file else f"line {number} of {file or program.source}"
 
 
 def _lines(program: Program, run: CuttingRun) -> tuple[int, int]:

@@ -6,14 +6,16 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from shapegcode.model.playable import SimulatedPrograms
-from shapegcode.program.operating import no_room
+from shapegcode.model.programs import SimulatedPrograms
+from shapegcode.program.stamp import no_room
 from shapegcode.results.json import hidden
-from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
+
+if TYPE_CHECKING:
+    from shapegcode.results.page.model import Figure
 
 _SHOWN_ALIKE = 5
 _SHOWN_ALARMS = 20  # with one number
@@ -176,7 +178,7 @@ class Check(Result):
         memory_bytes: of the control.
         short_blocks: blocks that last less than the block time; None: the program was not read.
         dnc: the serial line; None: not drip fed, or not read.
-        simulated: the program, to play it for a page; None: the control refuses something in it.
+        simulated: the program, to simulate it for a page; None: the control refuses something in it.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "refused": bool}
@@ -199,7 +201,7 @@ class Check(Result):
 
     @property
     def ok(self) -> bool:
-        """Nothing is refused, and all would run as programmed."""
+        """Whether nothing is refused and everything would run as programmed."""
         return not self.refused and self.counts.warning == 0
 
     @property
@@ -214,6 +216,8 @@ class Check(Result):
 
     def key_figures(self) -> tuple[Figure, ...]:
         """How many alarms, warnings and notes."""
+        from shapegcode.results.page.model import Figure
+
         return tuple(
             Figure(f"{name}s", "", None, float(count), 0, key_after=f"counts.{name}")
             for name, count in vars(self.counts).items()
@@ -256,7 +260,7 @@ class Check(Result):
         return "shapegcode time tells how long it takes, shapegcode simulate how it vibrates."
 
     def tables(self) -> list[Table]:
-        """The findings in the order of places; of many alike the first ones and how many more there are."""
+        """The findings in the order of their positions; of many equal ones the first, and the number of the others."""
         if not self.findings:
             return []
         columns = (

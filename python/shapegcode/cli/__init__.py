@@ -65,7 +65,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("shaper", "compare input shapers for some vibration modes, and recommend one"),
     Command("simulate", "simulate a program on the machine's model: cycle time, vibration, contour error"),
     Command("feed", "set the feeds of a program so that cutting force and deflection stay within the tool's limits"),
-    Command("expand", "write the plain program that calls, macros and coordinate modes come to"),
+    Command("expand", "write the expanded program: calls, macros and coordinate modes resolved"),
     Command("measure", "measure the part that programs would cut: contour, radius, walls, roughness, vibration"),
     Command("time", "predict the cycle time of a program and show where the time goes"),
     Command("check", "list what the controller would refuse in a program, or not run as programmed"),
@@ -75,10 +75,10 @@ COMMANDS: tuple[Command, ...] = (
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
     Command("identify", "find vibration modes in a tap test or decay, and put them into the machine file"),
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
-    Command("batch", "run a command over many programs and machines, and go on where it stopped"),
+    Command("batch", "run a command over many programs and machines, and resume where it stopped"),
     Command(
         "study",
-        "simulate a program on sampled machines (Monte Carlo): how likely it stays within tolerance, what decides",
+        "simulate a program on sampled machines (Monte Carlo): how likely it stays within tolerance, and why",
     ),
     Command(
         "optimize", "choose settings for the shortest program that stays within tolerance on most sampled machines"
@@ -174,7 +174,7 @@ class _Interrupts:
     """Whether Ctrl-C came: a module that is being loaded may make another error of it."""
 
     def __init__(self, of_process: bool) -> None:
-        self.came = self.told = False
+        self.came = self.reported = False
         self._mine = of_process and signal.getsignal(signal.SIGINT) is signal.default_int_handler
         if self._mine:
             signal.signal(signal.SIGINT, self._handle)
@@ -188,7 +188,7 @@ class _Interrupts:
         raise KeyboardInterrupt
 
     def _stop_now(self, _number: int, _frame: object) -> None:
-        if not self.told:
+        if not self.reported:
             os.write(2, b"shapegcode: stopped\n")
         os._exit(ExitCode.INTERRUPTED)
 
@@ -219,7 +219,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BaseException as error:  # a compiled module may make a panic of Ctrl-C, which is no Exception
         if ctrl_c.came or isinstance(error, KeyboardInterrupt):
             print("shapegcode: stopped", file=sys.stderr)
-            ctrl_c.told = True
+            ctrl_c.reported = True
             return ExitCode.INTERRUPTED
         if _DEBUG in words or not isinstance(error, Exception) or not _expected(error):
             raise

@@ -6,7 +6,7 @@ import argparse
 import math
 import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NoReturn
 
 _MAX_OVERRIDE = 2.54
@@ -338,14 +338,14 @@ class CommandParser(argparse.ArgumentParser):
             self.epilog = kept
 
     def epilogue(self) -> str | None:
-        """What stands below the options: examples, and the exit codes."""
+        """Text below the options: examples and exit codes."""
         words = self.prog.split(maxsplit=1)
         lines = EXAMPLES.get(words[1] if len(words) > 1 else "", ())
         if not lines:
             return self.epilog
         # What a command's exit codes mean stands in its description, where it is not the usual.
-        said = (self.description or "").lower()
-        codes = "" if "exit code 0" in said else f"\n\nexit codes: {_EXIT_CODES}."
+        settings = (self.description or "").lower()
+        codes = "" if "exit code 0" in settings else f"\n\nexit codes: {_EXIT_CODES}."
         return "\n".join(["examples:", *(f"  {line}" for line in lines)]) + codes + (self.epilog or "")
 
 
@@ -353,6 +353,29 @@ def one_of(parser: argparse.ArgumentParser, title: str, *, required: bool = Fals
     """Options of which one alone can be given, in their group."""
     group = parser.group(title) if isinstance(parser, CommandParser) else parser.add_argument_group(title)
     return group.add_mutually_exclusive_group(required=required)
+
+
+NEEDED = object()
+"""In place of a default: the option must be given."""
+
+
+def add_options(parser: argparse._ActionsContainer, rows: Iterable[tuple[Any, ...]]) -> None:
+    """Declare options: names, metavar, type, help and, where it is not None, the default or `NEEDED` of each.
+
+    As type `bool` is a switch, a tuple one of its words, and a list of one type that type, several times.
+    """
+    for names, metavar, kind, text, *default in rows:
+        settings: dict[str, Any] = {"default": default[0]} if default and default[0] is not NEEDED else {}
+        settings |= {"required": True} if default and default[0] is NEEDED else {}
+        if kind is bool:
+            settings["action"] = "store_true"
+        elif isinstance(kind, tuple):
+            settings |= {"choices": kind, "metavar": metavar}
+        else:
+            settings |= {"metavar": metavar} | (
+                {"action": "append", "type": kind[0]} if isinstance(kind, list) else {"type": kind}
+            )
+        parser.add_argument(*names.split(), help=text, **settings)
 
 
 def add_alias(parser: argparse.ArgumentParser, old: str, option: str) -> None:

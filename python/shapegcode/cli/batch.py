@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import count, seconds, size
+from shapegcode.cli.arguments import NEEDED, add_options, count, seconds, size
 from shapegcode.cli.options import add_amount_arguments, add_cluster_arguments, cluster_of
 
 _INDEX = "index.html"
@@ -29,15 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="files, folders (with all below them), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
         "these per line",
     )
-    parser.add_argument(
-        "-m",
-        "--machine",
-        required=True,
-        action="append",
-        metavar="MACHINE",
-        help="machine file or built-in machine; more than one -m: every program on each of them",
-    )
-    parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder of the results")
+    add_options(parser, (
+        ("-m --machine", "MACHINE", [None],
+         "machine file or built-in machine; more than one -m: every program on each of them", NEEDED),
+        ("-o --output", "DIR", None, "folder of the results", NEEDED),
+    ))  # fmt: skip
     parser.add_argument(
         "--command",
         dest="batch_command",
@@ -45,20 +41,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="convert",
         help="what is done with each program (default: convert)",
     )
-    parser.add_argument("--resume", action="store_true", help="do only what is missing, failed or changed since")
-    parser.add_argument(
-        "--jobs", type=count, default=0, metavar="N", help="processes at a time (default: one per processor)"
-    )
-    parser.add_argument(
-        "--time-limit", type=seconds, default=3600.0, metavar="TIME", help="of each run (default: 3600s)"
-    )
-    parser.add_argument(
-        "--memory-limit",
-        type=size,
-        default=0,
-        metavar="SIZE",
-        help="of each run, such as 2G, beyond what is loaded (default: none; Linux only)",
-    )
+    add_options(parser, (
+        ("--resume", None, bool, "do only what is missing, failed or changed since"),
+        ("--jobs", "N", count, "processes at a time (default: one per processor)", 0),
+        ("--time-limit", "TIME", seconds, "of each run (default: 3600s)", 3600.0),
+        ("--memory-limit", "SIZE", size,
+         "of each run, such as 2G, beyond what is loaded (default: none; Linux only)", 0),
+    ))  # fmt: skip
     add_cluster_arguments(parser, "run")
     parser.add_argument("--json", metavar="FILE", help="write all rows as JSON; - for standard output")
     parser.add_argument(
@@ -79,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     name = f"{args.batch_command}: "
     with runner.progress(f"{name}reading", args) as bar:
 
-        def tell(share: float, text: str) -> None:
+        def show(share: float, text: str) -> None:
             bar.update(share)
             bar.say(name + text)
 
@@ -95,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
             html=html,
             time_limit_s=args.time_limit,
             memory_limit_bytes=args.memory_limit,
-            on_progress=tell,
+            on_progress=show,
         )
     tables = result.tables()
     if html is not None:

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import one_of
+from shapegcode.cli.arguments import add_options, one_of
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 
 if TYPE_CHECKING:
@@ -23,56 +23,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "runs. Exit code 1 if results contradict each other, no axis tells its loop, or a run is not told within 2 %%."
     )
     action = one_of(parser, "what to do", required=True)
-    action.add_argument(
-        "--write", metavar="DIR", help="write the test programs, RESULTS.toml to fill in, and README.txt"
-    )
-    action.add_argument(
-        "--fit", metavar="RESULTS", help="fit a filled-in RESULTS.toml, a folder with it and logs, or one log beside it"
-    )
-    action.add_argument(
-        "--servo",
-        metavar="LOG",
-        help="fit the position loops to one half of a log and judge them on the other: a capture of a Sinumerik "
-        "control (JSON, gzip, zip), or a CSV with columns of commands and actual positions",
-    )
-    action.add_argument(
-        "--runs",
-        metavar="RUNS.toml",
-        help="learn what the clock depends on from programs and the logs of their runs (SHDR text, MTConnect streams, "
-        "Sinumerik Edge, CSV), which this file pairs",
-    )
+    add_options(action, (
+        ("--write", "DIR", None, "write the test programs, RESULTS.toml to fill in, and README.txt"),
+        ("--fit", "RESULTS", None, "fit a filled-in RESULTS.toml, a folder with it and logs, or one log beside it"),
+        ("--servo", "LOG", None,
+         "fit the position loops to one half of a log and judge them on the other: a capture of a Sinumerik control "
+         "(JSON, gzip, zip), or a CSV with columns of commands and actual positions"),
+        ("--runs", "RUNS.toml", None,
+         "learn what the clock depends on from programs and the logs of their runs (SHDR text, MTConnect streams, "
+         "Sinumerik Edge, CSV), which this file pairs"),
+    ))  # fmt: skip
     add_machine_argument(parser)
-    parser.add_argument(
-        "--look-ahead",
-        metavar="KIND",
-        action="append",
-        help='with --runs: kind of look-ahead that is tried, for example "speed difference"; several times for several '
-        "(default: all; the one that tells left-out runs best is taken)",
-    )
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", help="with --fit, --servo, --runs: machine file to write, with what is known"
-    )
-    parser.add_argument(
-        "--axes", metavar="X=1,Y=6,Z=2", help="with --servo: axes of the log that are X, Y, Z (default: by their names)"
-    )
-    parser.add_argument(
-        "--drive",
-        action="store_true",
-        help="with --servo: fit a drive with friction too, some ten seconds for each axis",
-    )
+    add_options(parser, (
+        ("--look-ahead", "KIND", [None],
+         'with --runs: kind of look-ahead that is tried, for example "speed difference"; several times for several '
+         "(default: all; the one that tells left-out runs best is taken)"),
+        ("-o --output", "FILE", None, "with --fit, --servo, --runs: machine file to write, with what is known"),
+        ("--axes", "X=1,Y=6,Z=2", None, "with --servo: axes of the log that are X, Y, Z (default: by their names)"),
+        ("--drive", None, bool, "with --servo: fit a drive with friction too, some ten seconds for each axis"),
+    ))  # fmt: skip
     add_plots_argument(parser, "with --servo, --runs: write the pictures (PNG and SVG) into this folder")
-    parser.add_argument(
-        "--units",
-        metavar="TIME,LENGTH",
-        help="with --fit, --servo: of CSV logs, for example ms,um (default: from their headers)",
-    )
-    parser.add_argument(
-        "--box",
-        metavar="X0:X1,Y0:Y1,Z0:Z1",
-        default="0:100,0:100,0:20",
-        help="where the tests may move, in mm from the point at which they are started (default: %(default)s); write "
-        "--box=-50:0,... if it begins with a minus sign",
-    )
+    add_options(parser, (
+        ("--units", "TIME,LENGTH", None,
+         "with --fit, --servo: of CSV logs, for example ms,um (default: from their headers)"),
+        ("--box", "X0:X1,Y0:Y1,Z0:Z1", None,
+         "where the tests may move, in mm from the point at which they are started (default: %(default)s); write "
+         "--box=-50:0,... if it begins with a minus sign", "0:100,0:100,0:20"),
+    ))  # fmt: skip
     add_result_arguments(parser)
 
 

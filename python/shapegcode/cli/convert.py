@@ -12,9 +12,9 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import add_alias, line_ranges, positive, ratio, seconds, size
-from shapegcode.cli.feed import add_cutting_arguments
+from shapegcode.cli.arguments import add_alias, add_options, line_ranges, positive, ratio, seconds, size
 from shapegcode.cli.options import (
+    add_cutting_arguments,
     add_machine_argument,
     add_override_arguments,
     add_plots_argument,
@@ -23,6 +23,7 @@ from shapegcode.cli.options import (
     load_machine,
     output_file,
     overridden,
+    read_cutting_arguments,
 )
 from shapegcode.cli.runner import ProgressBar
 
@@ -62,57 +63,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--arc-feed", metavar="RATIO", type=ratio, help="feed on arcs relative to the programmed feed, for example 60%%"
     )
     add_override_arguments(parser, MACHINE_KEYS)
-    parser.add_argument(
-        "--shape-all",
-        action="store_true",
-        help="shape every cut within the price: also where that gains less than shaping.least_gain_um or becomes "
-        "worse, and where the original is within its tolerance; without it such a cut is left unchanged",
-    )
-    parser.add_argument(
-        "--only",
-        metavar="A-B,...",
-        type=line_ranges,
-        help="shape nothing but the cuts in these lines of IN, for example 12-80,95-240",
-    )
-    parser.add_argument(
-        "--leave", metavar="A-B,...", type=line_ranges, default=(), help="leave the cuts in these lines of IN unchanged"
-    )
+    add_options(parser, (
+        ("--shape-all", None, bool,
+         "shape every cut within the price: also where that gains less than shaping.least_gain_um or becomes worse, "
+         "and where the original is within its tolerance; without it such a cut is left unchanged"),
+        ("--only", "A-B,...", line_ranges, "shape nothing but the cuts in these lines of IN, for example 12-80,95-240"),
+        ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines of IN unchanged", ()),
+    ))  # fmt: skip
     parser.add_argument(
         "--tolerance-curve",
         action=argparse.BooleanOptionalAction,
         default=True,
         help="work out what other contour tolerances would cost in time (default: %(default)s)",
     )
-    parser.add_argument(
-        "--block-period",
-        metavar="TIME",
-        type=seconds,
-        help="duration of the shortest block, for example 5ms (default: chosen for the modes)",
-    )
-    parser.add_argument(
-        "--max-bytes",
-        metavar="N[k|M]",
-        type=size,
-        help="largest size of the emitted program, for example 256k (1k = 1024): what gains least is left unchanged",
-    )
-    parser.add_argument(
-        "--baud",
-        metavar="N",
-        type=positive,
-        help="speed of the serial line that feeds the program: longer block periods, then cuts left unchanged",
-    )
-    parser.add_argument(
-        "--max-blocks-per-second",
-        metavar="N",
-        type=positive,
-        help="blocks that the control reads per second; as --baud",
-    )
-    parser.add_argument(
-        "--feed-schedule",
-        action="store_true",
-        help="first set the feeds so that the cut of the shaped program keeps the tool's limits, as `shapegcode feed`; "
-        "needs --tool and --stock",
-    )
+    add_options(parser, (
+        ("--block-period", "TIME", seconds,
+         "duration of the shortest block, for example 5ms (default: chosen for the modes)"),
+        ("--max-bytes", "N[k|M]", size,
+         "largest size of the emitted program, for example 256k (1k = 1024): what gains least is left unchanged"),
+        ("--baud", "N", positive,
+         "speed of the serial line that feeds the program: longer block periods, then cuts left unchanged"),
+        ("--max-blocks-per-second", "N", positive, "blocks that the control reads per second; as --baud"),
+        ("--feed-schedule", None, bool,
+         "first set the feeds so that the cut of the shaped program keeps the tool's limits, as `shapegcode feed`; "
+         "needs --tool and --stock"),
+    ))  # fmt: skip
     add_cutting_arguments(parser, required=False)
     add_program_argument(parser)
     add_plots_argument(parser)
@@ -154,7 +129,8 @@ def run(args: argparse.Namespace) -> int:
         names = ", ".join(place.address for place in needed)
         notes.append(f"calls of {names} were kept: as they are in {args.input}, they stand behind the program")
     content = alone_with(result.emitted.view(), program.text, needed)
-    return runner.finish(result, args, notes=notes, output=(target, content))
+    tables = result.tables(every_cut=args.verbose)
+    return runner.finish(result, args, tables=tables, notes=notes, output=(target, content))
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
@@ -213,7 +189,6 @@ def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar
 
 def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:
     """Feeds and shaping in one go."""
-    from shapegcode.cli.feed import read_cutting_arguments
     from shapegcode.conversion.scheduled import convert_scheduled
 
     return convert_scheduled(program, machine, **read_cutting_arguments(args), **_options(args), on_progress=bar.update)

@@ -1,10 +1,11 @@
-"""``shapegcode expand``: the plain program that calls, macros and coordinate modes come to."""
+"""``shapegcode expand``: the expanded program: calls, macros and coordinate modes resolved."""
 
 from __future__ import annotations
 
 import argparse
 
 from shapegcode.cli import runner
+from shapegcode.cli.arguments import NEEDED, add_options
 from shapegcode.cli.options import add_input_arguments, add_result_arguments, load_machine
 
 
@@ -16,13 +17,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "shaped. The input is never overwritten."
     )
     add_input_arguments(parser)
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write; - for standard output")
-    parser.add_argument(
-        "--compensation",
-        choices=("expand", "keep"),
-        default="expand",
-        help="G41/G42 as plain moves of the tool centre, or as they stand (default: %(default)s)",
-    )
+    add_options(parser, (
+        ("-o --output", "OUT", None, "program to write; - for standard output", NEEDED),
+        ("--compensation", None, ("expand", "keep"),
+         "G41/G42 as plain moves of the tool centre, or as they stand (default: %(default)s)", "expand"),
+    ))  # fmt: skip
     add_result_arguments(parser)
 
 

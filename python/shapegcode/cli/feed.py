@@ -3,61 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import micrometres, share
 from shapegcode.cli.options import (
+    add_cutting_arguments,
     add_input_arguments,
     add_plots_argument,
     add_result_arguments,
     load_machine,
     output_file,
+    read_cutting_arguments,
 )
-
-
-def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
-    """Declare what a feed schedule needs beside program and machine: tool, stock, margin, resolution."""
-    parser.add_argument(
-        "--tool",
-        metavar="T.toml",
-        action="append",
-        required=required,
-        help="tool file: end mill, cutting force, limits (docs/reference/tool_files.md); repeated, each file needs "
-        "its T number",
-    )
-    parser.add_argument(
-        "--stock",
-        metavar="S.toml",
-        required=required,
-        help="stock file: what is there before the first block (docs/reference/tool_files.md)",
-    )
-    parser.add_argument(
-        "--margin",
-        metavar="RATIO",
-        type=share,
-        help="share of each limit that is left free, for example 3%% (default: 1.5%%)",
-    )
-    parser.add_argument(
-        "--resolution",
-        metavar="LENGTH",
-        type=micrometres,
-        help="grid of the material, for example 50um (default: a hundredth of the tool's diameter)",
-    )
-
-
-def read_cutting_arguments(args: argparse.Namespace) -> dict[str, Any]:
-    """What `add_cutting_arguments` declared, as `schedule_feed` and `convert_scheduled` take it."""
-    from shapegcode.cutting.stock import Stock
-    from shapegcode.cutting.tool import Tool
-    from shapegcode.feed.schedule import MARGIN
-
-    return {
-        "tools": [Tool.load(name) for name in args.tool],
-        "stock": Stock.load(args.stock),
-        "margin": MARGIN if args.margin is None else args.margin,
-        "resolution_mm": None if args.resolution is None else args.resolution * 1e-3,
-    }
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -31,10 +31,7 @@ _LOADED = (
     "importlib.readers", "email.parser", "shlex",
 )  # fmt: skip
 _OF_COMMAND = {
-    "convert": (
-        "shapegcode.conversion.convert", "shapegcode.shaping", "shapegcode.cli.feed",
-        "shapegcode.model.signatures",
-    ),
+    "convert": ("shapegcode.conversion.convert", "shapegcode.shaping.registry", "shapegcode.model.signatures"),
     "time": ("shapegcode.timing.cycle_time",),
     "check": ("shapegcode.checking.check",),
     "feed": ("shapegcode.feed.schedule",),

@@ -135,7 +135,7 @@ def _identify(args: argparse.Namespace) -> int:
 
 
 def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> None:
-    """Have somebody decide over modes of the other axes that were not measured on this machine."""
+    """Ask what to do with modes of the other axes that were not measured on this machine."""
     from shapegcode.identification.update import open_modes, require_decisions
 
     found = open_modes(machine, axis)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.cli import runner
+from shapegcode.cli.arguments import add_options
 from shapegcode.cli.options import add_modes_arguments, add_result_arguments, decided_modes, write_new
 from shapegcode.io.atomic import write_text
 
@@ -36,19 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=_DEFAULT_MACHINE,
         help="built-in machine to start from (default: %(default)s)",
     )
-    init.add_argument(
-        "-o",
-        "--output",
-        metavar="FILE",
-        default=_DEFAULT_FILE,
-        help="file to write (default: %(default)s); - for standard output",
-    )
-    init.add_argument(
-        "--full",
-        action="store_true",
-        help="every key with its meaning (600 lines), not only what differs from a default",
-    )
-    init.add_argument("--force", action="store_true", help="overwrite an existing file")
+    add_options(init, (
+        ("-o --output", "FILE", None, "file to write (default: %(default)s); - for standard output", _DEFAULT_FILE),
+        ("--full", None, bool, "every key with its meaning (600 lines), not only what differs from a default"),
+        ("--force", None, bool, "overwrite an existing file"),
+    ))  # fmt: skip
 
     take = actions.add_parser(
         "import",
@@ -112,6 +105,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     scheme.add_argument("kind", choices=FILES, nargs="?", default="machine", help="kind of file")
     scheme.add_argument("-o", "--output", metavar="FILE", default="-", help="file to write (default: standard output)")
+    for action in (init, scheme):
+        action.add_argument("-q", "--quiet", action="store_true", help="only the answer, warnings and errors")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -131,7 +126,8 @@ def _init(args: argparse.Namespace) -> int:
         return 0
     write_new(args, text)
     print(f"wrote {args.output}, the values of {args.name}: inherited or assumed, until you put in your own")
-    print(f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
+    if not args.quiet:
+        print(f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
     return 0
 
 
@@ -169,8 +165,8 @@ def _sorted(files: list[str]) -> tuple[str, list[str]]:
     tables = [file for file in files if is_table(read_file(file))]
     dumps = [file for file in files if file not in tables]
     if len(dumps) != 1:
-        said = f"more than one: {', '.join(dumps)}" if dumps else "none: tables of offsets do not make a machine"
-        raise ArgumentError(f"one parameter dump (CNC-PARA.TXT) is needed, and there is {said}")
+        note = f"more than one: {', '.join(dumps)}" if dumps else "none: tables of offsets do not make a machine"
+        raise ArgumentError(f"one parameter dump (CNC-PARA.TXT) is needed, and there is {note}")
     return dumps[0], tables
 
 
@@ -192,7 +188,7 @@ def _write_origins(name: str) -> None:
 
     from shapegcode.identification.update import check_updatable
     from shapegcode.machine import Machine
-    from shapegcode.settings.remarks import with_origin_table
+    from shapegcode.settings.edit import with_origin_table
 
     check_updatable(name)
     text = Path(name).read_bytes().decode("utf-8")
@@ -206,22 +202,22 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
     """With the values that were not measured, by what they do to a program."""
 
     from shapegcode.conversion.convert import convert
-    from shapegcode.conversion.open_axes import open_axes
+    from shapegcode.conversion.sensitivity import rank_unknown_axes
     from shapegcode.machine import Machine
     from shapegcode.machine.description_result import OpenValue
-    from shapegcode.machine.output import ANY_PRICE
+    from shapegcode.machine.programs import ANY_PRICE
 
-    machine, said = Machine.load(args.machine), ""
+    machine, note = Machine.load(args.machine), ""
     with runner.progress(f"converting {args.input}", args):
         if any(axis.modes for axis in machine.axes.as_tuple()):
             # What matters is asked of a shaped program, whether or not shaping it is worth its price.
             conversion = convert(args.input, machine.with_values(ANY_PRICE), shape_all=True, tolerance_curve=False)
             rows = conversion.rests_on
             if conversion.worst_case is None:
-                said = f"{args.input}: nothing in it was shaped, so nothing is ranked"
+                note = f"{args.input}: nothing in it was shaped, so nothing is ranked"
         else:
-            rows = open_axes(args.input, machine)
-            said = (
+            rows = rank_unknown_axes(args.input, machine)
+            note = (
                 "no axis has a vibration mode, so there is nothing to shape for: each that may have one was given a "
                 "usual one, and simulated the program as it is"
                 if rows
@@ -234,7 +230,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
         )
         for row in rows
     )  # fmt: skip
-    warnings = (*found.warnings, said) if said else found.warnings
+    warnings = (*found.warnings, note) if note else found.warnings
     return replace(found, program=args.input, matters=matters, warnings=warnings)
 
 
@@ -266,5 +262,7 @@ def _schema(args: argparse.Namespace) -> int:
         sys.stdout.write(file_schema(args.kind))
     else:
         write_text(args.output, file_schema(args.kind))
-        print(f"wrote {args.output}\nnext: put `#:schema {args.output}` into the first line of a {args.kind} file")
+        print(f"wrote {args.output}")
+        if not args.quiet:
+            print(f"next: put `#:schema {args.output}` into the first line of a {args.kind} file")
     return 0

@@ -6,7 +6,7 @@ import argparse
 from functools import partial
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import add_alias, line_range, micrometres
+from shapegcode.cli.arguments import NEEDED, add_alias, add_options, line_range, micrometres
 from shapegcode.cli.options import (
     add_machine_argument,
     add_plots_argument,
@@ -28,28 +28,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("inputs", metavar="PROGRAM", nargs="+", help="CNC program; several stand side by side")
     add_machine_argument(parser)
     add_program_argument(parser)
-    parser.add_argument(
-        "--tool-diameter", metavar="LENGTH", type=micrometres, required=True, help="of the tool, for example 3mm"
-    )
-    parser.add_argument(
-        "--plant",
-        choices=("modal", "feed-drive"),
-        default="modal",
-        help="modal: vibration modes behind an ideal servo; feed-drive: [axes.x.drive] (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--against",
-        metavar="ORIGINAL",
-        help="measure against the path of this program (default: the first one if shapegcode wrote the others, else "
-        "each program's own path)",
-    )
-    parser.add_argument(
-        "--lines",
-        metavar="A-B",
-        type=line_range,
-        action="append",
-        help="measure the cut of these lines as one section; may be repeated (default: every line and arc)",
-    )
+    add_options(parser, (
+        ("--tool-diameter", "LENGTH", micrometres, "of the tool, for example 3mm", NEEDED),
+        ("--plant", None, ("modal", "feed-drive"),
+         "modal: vibration modes behind an ideal servo; feed-drive: [axes.x.drive] (default: %(default)s)", "modal"),
+        ("--against", "ORIGINAL", None,
+         "measure against the path of this program (default: the first one if shapegcode wrote the others, else each "
+         "program's own path)"),
+        ("--lines", "A-B", [line_range],
+         "measure the cut of these lines as one section; may be repeated (default: every line and arc)"),
+    ))  # fmt: skip
     length = partial(parser.add_argument, metavar="LENGTH", type=micrometres)
     length("--settling-band", default=1.0, help="settled is what stays within it (default: 1um)")
     length("--station", default=50.0, help="distance of the places at which walls are measured (default: 0.05mm)")

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
-from shapegcode.cli.arguments import axes, micrometres, number, one_of, program_choice, seconds
+from shapegcode.cli.arguments import add_options, axes, micrometres, number, one_of, program_choice, seconds, share
 from shapegcode.io.atomic import write_text
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def add_amount_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_cluster_arguments(parser: argparse.ArgumentParser, what: str) -> None:
-    """Declare ``--scheduler`` and its certificates; `what` is done there."""
+    """Declare ``--scheduler`` and its certificates; `what` names the work that runs there."""
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
@@ -172,7 +172,7 @@ def file_exists(name: str) -> Exception:
 
 
 def write_new(args: argparse.Namespace, text: str) -> None:
-    """Write the file of ``-o``, which may stand there with ``--force`` alone."""
+    """Write the file of ``-o``; an existing file is replaced only with ``--force``."""
     try:
         write_text(args.output, text, overwrite=args.force)
     except FileExistsError:
@@ -206,21 +206,21 @@ def add_override_arguments(parser: argparse.ArgumentParser, keys: Mapping[str, s
     """Declare an option for each key, without a default: what is not typed is the machine's own."""
     for option, key in keys.items():
         meaning, unit, kind = _facts(key)
-        said: dict[str, Any] = {"default": None}
+        settings: dict[str, Any] = {"default": None}
         if kind is bool:
-            said["action"] = argparse.BooleanOptionalAction
+            settings["action"] = argparse.BooleanOptionalAction
         elif get_origin(kind) is Literal:
-            said["choices"] = get_args(kind)
-            if len(said["choices"]) > _MAX_CHOICES_SHOWN:
-                said["metavar"] = key.rpartition(".")[2].upper()
-                meaning += f". One of {', '.join(said['choices'])}"
+            settings["choices"] = get_args(kind)
+            if len(settings["choices"]) > _MAX_CHOICES_SHOWN:
+                settings["metavar"] = key.rpartition(".")[2].upper()
+                meaning += f". One of {', '.join(settings['choices'])}"
         elif unit in _TYPED:
-            said["metavar"], said["type"], example = _TYPED[unit]
+            settings["metavar"], settings["type"], example = _TYPED[unit]
             meaning += f"; for example {example}"
         else:
-            said["metavar"], said["type"] = unit.upper() or "N", number
+            settings["metavar"], settings["type"] = unit.upper() or "N", number
         text = f"{meaning} (default: {key} of the machine file)".replace("%", "%%")
-        parser.add_argument(option, help=text, **said)
+        parser.add_argument(option, help=text, **settings)
 
 
 def overridden(machine: Machine, args: argparse.Namespace, keys: Mapping[str, str]) -> Machine:
@@ -262,7 +262,7 @@ def add_modes_arguments(parser: argparse.ArgumentParser, keep: str) -> None:
     )
 
 
-def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], said: str) -> tuple[str, str]:
+def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], settings: str) -> tuple[str, str]:
     """What the options say, and at a terminal the answers to a question for each axis that they leave open."""
     keep, rigid = args.keep_modes or "", args.rigid or ""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
@@ -270,9 +270,46 @@ def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], said:
     for axis, modes in open_modes.items():
         if axis in keep or axis in rigid:
             continue
-        question = f"{said} {axis.upper()} has {modes}: [k]eep, [r]igid, or leave [o]pen? "
+        question = f"{settings} {axis.upper()} has {modes}: [k]eep, [r]igid, or leave [o]pen? "
         print(question, end="", file=sys.stderr, flush=True)
         answer = sys.stdin.readline().strip().lower()[:1]
         keep += axis if answer == "k" else ""
         rigid += axis if answer == "r" else ""
     return keep, rigid
+
+
+def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    """Declare what a feed schedule needs beside program and machine: tool, stock, margin, resolution."""
+    parser.add_argument(
+        "--tool",
+        metavar="T.toml",
+        action="append",
+        required=required,
+        help="tool file: end mill, cutting force, limits (docs/reference/tool_files.md); repeated, each file needs "
+        "its T number",
+    )
+    parser.add_argument(
+        "--stock",
+        metavar="S.toml",
+        required=required,
+        help="stock file: what is there before the first block (docs/reference/tool_files.md)",
+    )
+    add_options(parser, (
+        ("--margin", "RATIO", share, "share of each limit that is left free, for example 3%% (default: 1.5%%)"),
+        ("--resolution", "LENGTH", micrometres,
+         "grid of the material, for example 50um (default: a hundredth of the tool's diameter)"),
+    ))  # fmt: skip
+
+
+def read_cutting_arguments(args: argparse.Namespace) -> dict[str, Any]:
+    """What `add_cutting_arguments` declared, as `schedule_feed` and `convert_scheduled` take it."""
+    from shapegcode.cutting.stock import Stock
+    from shapegcode.cutting.tool import Tool
+    from shapegcode.feed.schedule import MARGIN
+
+    return {
+        "tools": [Tool.load(name) for name in args.tool],
+        "stock": Stock.load(args.stock),
+        "margin": MARGIN if args.margin is None else args.margin,
+        "resolution_mm": None if args.resolution is None else args.resolution * 1e-3,
+    }

@@ -16,7 +16,7 @@ from shapegcode.cli import COMMANDS, parser_of
 from shapegcode.cli.options import load_machine, overridden
 from shapegcode.cli.runner import MACHINES
 from shapegcode.machine import Machine
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.program.compensation import read_for_conversion
 from shapegcode.results.json import Made, MadeFile, file_hash

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from shapegcode.cli import runner
+from shapegcode.cli.arguments import add_options
 from shapegcode.cli.options import add_result_arguments, file_exists, write_new
 
 
@@ -20,15 +21,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "modes are never taken."
     )
     parser.epilog = "example: shapegcode setup -o mine.toml"
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", default="machine.toml", help="machine file to write (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--answers",
-        metavar="FILE",
-        help="answers from a file (TOML, or JSON) in place of questions; the keys are in docs/howto/setup.md",
-    )
-    parser.add_argument("--force", action="store_true", help="overwrite an existing file")
+    add_options(parser, (
+        ("-o --output", "FILE", None, "machine file to write (default: %(default)s)", "machine.toml"),
+        ("--answers", "FILE", None,
+         "answers from a file (TOML, or JSON) in place of questions; the keys are in docs/howto/setup.md"),
+        ("--force", None, bool, "overwrite an existing file"),
+    ))  # fmt: skip
     add_result_arguments(parser)
 
 

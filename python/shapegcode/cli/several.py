@@ -114,8 +114,8 @@ def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left:
     if called:
         console.print(f"called by others and done there: {several.names(called)}", markup=False, soft_wrap=True)
     if left:
-        said = "subprograms that nothing calls any more, as the shaped programs hold their moves"
-        console.print(f"{said}: {several.names(left)}", markup=False, soft_wrap=True)
+        reason = "subprograms that nothing calls any more, as the shaped programs hold their moves"
+        console.print(f"{reason}: {several.names(left)}", markup=False, soft_wrap=True)
     if output is not None:
         console.print(f"wrote {output}", markup=False, soft_wrap=True)
 

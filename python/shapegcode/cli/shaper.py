@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import add_alias, positive, ratio, seconds, share
+from shapegcode.cli.arguments import add_alias, add_options, positive, ratio, seconds, share
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 
 # The registry's, whose solvers take too long to load for a help text.
@@ -24,60 +24,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the vibration if the frequencies are off, contour cost, negative impulses; and recommends one. "
         "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input."
     )
-    add = parser.add_argument
-    add(
+    parser.add_argument(
         "--mode", metavar="HZ[:DAMPING][±BAND]", action="append", default=[],
         help="a mode to cancel, such as 46:0.02±5%%, 46:0.02+-2Hz or 46:0.02-5%%+8%%, from 0.1 to 10000 Hz; once for "
         "each mode",
     )  # fmt: skip
     add_machine_argument(parser, required=False)
-    add(
-        "--uncertainty", metavar="RATIO", type=share, default=0.0,
-        help="how far the frequency of a mode that states no band may be off, for example 5%% (default: 0)",
-    )  # fmt: skip
-    add(
-        "--block-period", metavar="TIME", type=seconds, action="append", default=[],
-        help="block period on which the taps must lie, for example 5ms; may be repeated (default: the machine's, or "
-        "the best few)",
-    )  # fmt: skip
-    add(
-        "--continuous", action="store_true",
-        help="designs at continuous times, with --block-period beside those on its grid (default: without a machine)",
-    )  # fmt: skip
+    add_options(parser, (
+        ("--uncertainty", "RATIO", share,
+         "how far the frequency of a mode that states no band may be off, for example 5%% (default: 0)", 0.0),
+        ("--block-period", "TIME", [seconds],
+         "block period on which the impulses must lie, such as 5ms; may be repeated (default: the machine's, or the "
+         "best few)", []),
+        ("--continuous", None, bool,
+         "designs at continuous times, with --block-period beside those on its grid (default: without a machine)"),
+    ))  # fmt: skip
     families = f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"
-    add("--family", metavar="NAME", action="extend", nargs="+", help=families)
-    add(
-        "--list-families", action="store_true", help="say what each family is and where it comes from, and nothing else"
-    )
-    add(
-        "--max-duration", metavar="TIME", type=seconds,
-        help="longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if "
-        "that is not enough)",
-    )  # fmt: skip
-    add(
-        "--max-abs-sum", metavar="N", type=positive, default=10.0,
-        help="largest sum of the taps' magnitudes (default: %(default)g)",
-    )  # fmt: skip
-    add(
-        "--vibration-limit", metavar="RATIO", type=ratio,
-        help="largest share of the vibration that may be left anywhere in the bands (default: the machine's "
-        "shaping.vibration_limit, else 5%%)",
-    )  # fmt: skip
-    add(
-        "--objective", choices=("shortest", "contour", "robust"), default="shortest",
-        help="what is least in the design to take, within the limit: duration, contour cost, or what is left of the "
-        "vibration (default: %(default)s)",
-    )  # fmt: skip
-    add("--negative", action="store_true", help="a design with negative impulses may be recommended")
-    add("--taps", metavar="TIME:A,...", help='compare a shaper of your own: "0:.5,10.9ms:.5"')
-    add(
-        "--speed", metavar="MM/S", type=positive, default=200.0,
-        help="speed at which the contour cost is shown (default: %(default)g)",
-    )  # fmt: skip
-    add(
-        "--radius", metavar="MM", type=positive, default=20.0,
-        help="radius of the arc on which it is shown (default: %(default)g)",
-    )  # fmt: skip
+    parser.add_argument("--family", metavar="NAME", action="extend", nargs="+", help=families)
+    add_options(parser, (
+        ("--list-families", None, bool, "say what each family is and where it comes from, and nothing else"),
+        ("--max-duration", "TIME", seconds,
+         "longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if that is "
+         "not enough)"),
+        ("--max-abs-sum", "N", positive, "largest sum of the impulses' magnitudes (default: %(default)g)", 10.0),
+        ("--vibration-limit", "RATIO", ratio,
+         "largest share of the vibration that may be left anywhere in the bands (default: the machine's "
+         "shaping.vibration_limit, else 5%%)"),
+        ("--objective", None, ("shortest", "contour", "robust"),
+         "what is least in the design to take, within the limit: duration, contour cost, or what is left of the "
+         "vibration (default: %(default)s)", "shortest"),
+        ("--negative", None, bool, "a design with negative impulses may be recommended"),
+        ("--taps", "TIME:A,...", None, 'compare a shaper of your own: "0:.5,10.9ms:.5"'),
+        ("--speed", "MM/S", positive, "speed at which the contour cost is shown (default: %(default)g)", 200.0),
+        ("--radius", "MM", positive, "radius of the arc on which it is shown (default: %(default)g)", 20.0),
+    ))  # fmt: skip
     add_plots_argument(parser, "write pictures of the comparison (PNG and SVG) into this folder")
     add_result_arguments(parser)
     add_alias(parser, "--all", "--verbose")

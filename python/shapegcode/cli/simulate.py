@@ -1,4 +1,4 @@
-"""``shapegcode simulate``: play a program on the machine's model."""
+"""``shapegcode simulate``: simulate a program on the machine's model."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import count, line_range
+from shapegcode.cli.arguments import add_options, count, line_range
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
 
 # Of the progress bar, for the regions; the rest is the motion in time, which takes most of it.
@@ -21,39 +21,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "its rapids, dwells and waits: the motion of the axes in time, as table, files and pictures."
     )
     add_input_arguments(parser)
-    parser.add_argument(
-        "--shaped",
-        action="store_true",
-        help="simulate every cut as shaped blocks: at their feed, without look-ahead; needed only where the header of "
-        "a shaped program is missing, which says which of them are",
-    )
-    parser.add_argument(
-        "--against",
-        metavar="ORIGINAL",
-        help="measure the contour error against the path of this program, such as the original of a shaped one; "
-        "without it against IN's own path",
-    )
-    parser.add_argument(
-        "--plant",
-        choices=("modal", "feed-drive"),
-        default="modal",
-        help="modal: vibration modes behind an ideal servo; feed-drive: motor, ball screw, table, friction and servo "
-        "loops of [axes.x.drive] (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--csv", metavar="FILE", help="write the motion in time, one line per period; - for standard output"
-    )
-    parser.add_argument("--npz", metavar="FILE", help="write the same columns as a NumPy archive")
-    parser.add_argument(
-        "--every", metavar="N", type=count, default=1, help="write every N-th sample only (default: %(default)d)"
-    )
-    parser.add_argument(
-        "--lines",
-        metavar="A-B",
-        type=line_range,
-        help="motion in time of these lines alone, as `shapegcode expand` numbers them; the program is simulated from "
-        "its start in any case",
-    )
+    add_options(parser, (
+        ("--shaped", None, bool,
+         "simulate every cut as shaped blocks: at their feed, without look-ahead; needed only where the header of a "
+         "shaped program is missing, which says which of them are"),
+        ("--against", "ORIGINAL", None,
+         "measure the contour error against the path of this program, such as the original of a shaped one; without it "
+         "against IN's own path"),
+        ("--plant", None, ("modal", "feed-drive"),
+         "modal: vibration modes behind an ideal servo; feed-drive: motor, ball screw, table, friction and servo loops "
+         "of [axes.x.drive] (default: %(default)s)", "modal"),
+        ("--csv", "FILE", None, "write the motion in time, one line per period; - for standard output"),
+        ("--npz", "FILE", None, "write the same columns as a NumPy archive"),
+        ("--every", "N", count, "write every N-th sample only (default: %(default)d)", 1),
+        ("--lines", "A-B", line_range,
+         "motion in time of these lines alone, as `shapegcode expand` numbers them; the program is simulated from its "
+         "start in any case"),
+    ))  # fmt: skip
     add_plots_argument(
         parser,
         "write pictures (PNG and SVG) into this folder: the motion in time, and path, feed and vibration of the region "
@@ -65,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulate one program."""
 
-    from shapegcode.model.shaped_program import shaped_note
+    from shapegcode.model.programs import shaped_note
     from shapegcode.program import Program
     from shapegcode.simulation.simulate import play_motion, simulate
 
@@ -95,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
             every=args.every,
             on_progress=lambda done: bar.update(_REGIONS_SHARE + (1.0 - _REGIONS_SHARE) * done),
         )
-    said = shaped_note(program)
-    notes = [said] if said and shaped is None else []
+    note = shaped_note(program)
+    notes = [note] if note and shaped is None else []
     wrote = [name for name in (args.csv, args.npz) if name not in (None, "-")]
     return runner.finish(replace(simulation, motion=motion), args, notes=notes, wrote=wrote)

@@ -68,11 +68,11 @@ def run(args: argparse.Namespace) -> int:
     options: dict[str, Any] = file.options()
     with runner.progress(f"{args.input}: converting", args) as bar:
 
-        def tell(stage: str, share: float) -> None:
+        def show(stage: str, share: float) -> None:
             bar.update(share)
             bar.say(f"{args.input}: {stage}")
 
-        result = study(file.program, machine, **options, scheduler=cluster_of(args), on_progress=tell)
+        result = study(file.program, machine, **options, scheduler=cluster_of(args), on_progress=show)
     if args.csv is not None:
         write_lines(args.csv, result.csv_lines())
     return runner.finish(result, args)

@@ -1,4 +1,4 @@
-"""``shapegcode testcut``: test cuts as programs, and what their measured forces tell."""
+"""``shapegcode testcut``: test cuts as programs, and cutting-force parameters from their measured forces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import positive, program_number
+from shapegcode.cli.arguments import NEEDED, add_options, positive, program_number
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 
 
@@ -25,30 +25,29 @@ def _pair(text: str) -> tuple[float, float]:
     return pair
 
 
-# Options of the actions: names, metavar, type, meaning, default; no default: it must be given.
-_NEEDED = object()
+# Options of the actions, as `add_options` takes them.
 _CUT = (
-    ("--tool", "T.toml", None, "tool file", _NEEDED),
-    ("-o --output", "OUT.NC", None, "program; the side file is OUT.json", _NEEDED),
-    ("-S --spindle", "REV", positive, "rev/min (default: feed.spindle_rev_per_min of the tool file)", None),
-    ("-a --axial-depth", "MM", positive, "axial depth", _NEEDED),
+    ("--tool", "T.toml", None, "tool file", NEEDED),
+    ("-o --output", "OUT.NC", None, "program; the side file is OUT.json", NEEDED),
+    ("-S --spindle", "REV", positive, "rev/min (default: feed.spindle_rev_per_min of the tool file)"),
+    ("-a --axial-depth", "MM", positive, "axial depth", NEEDED),
     ("--program", "O1234", program_number, "number of the program (default: O7101)", 7101),
 )
 _SHAPE = (
-    ("-F --feed", "F", positive, "feed in mm/min", _NEEDED),
-    ("--allowance", "MM", positive, "radial depth on the walls (default: 0.1 D)", None),
-    ("--rough-radius", "MM", positive, "of the rough corner (default: D)", None),
-    ("--finish-radius", "MM", positive, "of the finished corner (default: D)", None),
+    ("-F --feed", "F", positive, "feed in mm/min", NEEDED),
+    ("--allowance", "MM", positive, "radial depth on the walls (default: 0.1 D)"),
+    ("--rough-radius", "MM", positive, "of the rough corner (default: D)"),
+    ("--finish-radius", "MM", positive, "of the finished corner (default: D)"),
 )
 _TAPER = (
-    ("-F --feeds", "F,F,...", _list, "in mm/min; one is passed at its half, once and double", _NEEDED),
-    ("--radial-depth", "MM:MM", _pair, "at begin and end of the stock (default: 0.05 to 0.35 of the diameter)", None),
+    ("-F --feeds", "F,F,...", _list, "in mm/min; one is passed at its half, once and double", NEEDED),
+    ("--radial-depth", "MM:MM", _pair, "at begin and end of the stock (default: 0.05 to 0.35 of the diameter)"),
     ("--length", "MM", positive, "of the stock along X (default: %(default)s)", 60.0),
 )
 _CORNER = (("--interval", "MM", positive, "of a block (default: feed_control.interval_mm of the machine)", None),)
 _INTERVAL = (
     ("--intervals", "MM,MM,...", _list, "lengths of the blocks, one pass each (default: 0.2,0.4,0.6)", (0.2, 0.4, 0.6)),
-    ("--feeds", "F,F,...", _list, "of the blocks, the same for every pass (default: the corner's by equation 7)", None),
+    ("--feeds", "F,F,...", _list, "of the blocks, the same for every pass (default: the corner's by equation 7)"),
 )
 
 
@@ -79,9 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):  # fmt: skip
         cut = actions.add_parser(name, help=meaning, description=description)
         add_machine_argument(cut)
-        for names, metavar, kind, said, default in (*_CUT, *options):
-            needed: dict[str, Any] = {"required": True} if default is _NEEDED else {"default": default}
-            cut.add_argument(*names.split(), metavar=metavar, type=kind, help=said, **needed)
+        add_options(cut, (*_CUT, *options))
         cut.add_argument("--up", action="store_true", help="up milling, material on the left (default: down milling)")
         add_result_arguments(cut)
     _add_fit(actions)
@@ -99,18 +96,16 @@ def _add_fit(actions: Any) -> None:
         "files", metavar="CSV", nargs="+",
         help="record of a pass with a header, time_s or position_mm, fx_n, fy_n; 2=FILE names the pass",
     )  # fmt: skip
-    fit.add_argument("--cut", metavar="OUT.json", required=True, help="side file of the test cut")
-    fit.add_argument(
-        "--forces-on", choices=("workpiece", "tool"), default="workpiece",
-        help="on what the measured forces act; a dynamometer below the work piece measures those on it "
-        "(default: %(default)s)",
-    )  # fmt: skip
-    fit.add_argument(
-        "--chip-thickness", choices=("mean", "local"), default="mean",
-        help="taper: to which chip thickness the power laws belong (default: %(default)s)",
-    )  # fmt: skip
-    fit.add_argument("--edge-forces", action="store_true", help="taper: fit the forces of the edge, K_te and K_re, too")
-    fit.add_argument("-o", "--output", metavar="FILE", help="taper: write the table [cutting] (TOML)")
+    add_options(fit, (
+        ("--cut", "OUT.json", None, "side file of the test cut", NEEDED),
+        ("--forces-on", None, ("workpiece", "tool"),
+         "on what the measured forces act; a dynamometer below the work piece measures those on it (default: "
+         "%(default)s)", "workpiece"),
+        ("--chip-thickness", None, ("mean", "local"),
+         "taper: to which chip thickness the power laws belong (default: %(default)s)", "mean"),
+        ("--edge-forces", None, bool, "taper: fit the forces of the edge, K_te and K_re, too"),
+        ("-o --output", "FILE", None, "taper: write the table [cutting] (TOML)"),
+    ))  # fmt: skip
     add_plots_argument(fit, "write pictures (PNG and SVG) of measured and expected forces into this folder")
     add_result_arguments(fit)
 

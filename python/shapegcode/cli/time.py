@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import override, ratio
+from shapegcode.cli.arguments import add_options, override, ratio
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.io.atomic import write_lines
 
@@ -21,29 +21,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Exit code 1 if closed form and full interpolation differ by more than 0.5 %."
     )
     add_input_arguments(parser, metavar="PROGRAM")
-    parser.add_argument(
-        "--override",
-        type=override,
-        metavar="RATIO",
-        help="feed override, for example 80%% (at most 254%%; default: times.feed_override_percent)",
-    )
-    parser.add_argument(
-        "--rapid-override",
-        type=ratio,
-        metavar="RATIO",
-        help="rapid override, for example 25%% (at most 100%%; default: times.rapid_override_percent); the "
-        "acceleration of rapids stays what it is",
-    )
-    parser.add_argument("--no-full", action="store_true", help="closed form only, no full interpolation")
-    parser.add_argument("--blocks", action="store_true", help="put every block into the JSON")
-    parser.add_argument("--csv", metavar="FILE", help="write one line per block; - for standard output")
+    add_options(parser, (
+        ("--override", "RATIO", override,
+         "feed override, for example 80%% (at most 254%%; default: times.feed_override_percent)"),
+        ("--rapid-override", "RATIO", ratio,
+         "rapid override, for example 25%% (at most 100%%; default: times.rapid_override_percent); the acceleration of "
+         "rapids stays what it is"),
+        ("--no-full", None, bool, "closed form only, no full interpolation"),
+        ("--blocks", None, bool, "put every block into the JSON"),
+        ("--csv", "FILE", None, "write one line per block; - for standard output"),
+    ))  # fmt: skip
     add_plots_argument(parser, "write the picture of where the time goes (PNG and SVG) into this folder")
     add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Time one program."""
-    from shapegcode.model.shaped_program import shaped_note
+    from shapegcode.model.programs import shaped_note
     from shapegcode.program import Program
     from shapegcode.timing.cycle_time import cycle_time
 
@@ -72,5 +66,5 @@ def run(args: argparse.Namespace) -> int:
         )
         if given is None and percent != 100.0
     ]
-    notes = [*usual, *([said] if (said := shaped_note(program)) else []), *([note] if free else [])]
+    notes = [*usual, *([shaped] if (shaped := shaped_note(program)) else []), *([note] if free else [])]
     return runner.finish(time if args.blocks else time.without_blocks(), args, tables=time.tables(), notes=notes)

@@ -7,13 +7,15 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from shapegcode._core import ArgumentError
 from shapegcode.io.units import find_unit
-from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
+
+if TYPE_CHECKING:
+    from shapegcode.results.page.model import Figure
 
 KINDS = {
     "cuts": "cuts that one program has and the other has not, or that are not the same length",
@@ -213,16 +215,16 @@ class Comparison(Result):
     @property
     def answer(self) -> str:
         """What is unchanged, and how near the paths are; the first difference that was not allowed."""
-        told = [self.count(kind) for kind in _ALWAYS]
-        told += [each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission")]
-        counts = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in told)
-        said = f"{counts} unchanged; path within {self.path_um:.1f} µm"
+        shown_counts = [self.count(kind) for kind in _ALWAYS]
+        shown_counts += [each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission")]
+        counts = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in shown_counts)
+        sentence = f"{counts} unchanged; path within {self.path_um:.1f} µm"
         refused = list(self.refused)
         if not refused:
-            return said
+            return sentence
         first = next((each for each in refused if each.kind == "end"), refused[0])
         many = f"{len(refused)} differences, one" if len(refused) > 1 else "1 difference,"
-        return f"{said}; {many} at {first.place}: {first.kind}"
+        return f"{sentence}; {many} at {first.place}: {first.kind}"
 
     @property
     def next_step(self) -> str:
@@ -246,6 +248,8 @@ class Comparison(Result):
 
     def key_figures(self) -> tuple[Figure, ...]:
         """The distance of the paths, and how many differences there are."""
+        from shapegcode.results.page.model import Figure
+
         return (
             Figure("path within", "µm", None, self.path_um, 1, key_after="path_um"),
             Figure("differences not allowed", "", None, len(list(self.refused)), 0),

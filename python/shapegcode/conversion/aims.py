@@ -38,14 +38,7 @@ class _Attempt:
 
 
 class Aims:
-    """Tolerance, feed and price of every cut of one conversion.
-
-    Args:
-        program: the original.
-        machine: its tolerances and prices.
-        reasons: why a cut is left unchanged, per cut; empty: it is shaped. Changed here.
-        curve_of: time of a cut over its tolerance, by its index.
-    """
+    """Tolerance, feed and price of every cut of one conversion."""
 
     def __init__(
         self, program: Program, machine: Machine, reasons: list[str], curve_of: Callable[[int], CutCurve]
@@ -53,7 +46,7 @@ class Aims:
         count = len(program.regions)
         self._machine, self._curve_of = machine, curve_of
         self._places = {id(region): index for index, region in enumerate(program.regions)}
-        self.reasons = reasons
+        self.reasons = reasons  # why a cut is left unchanged; empty: it is shaped; changed here
         self._asked_um = machine.tolerance.contour_um
         self.room_um = [machine.tolerance.contour_um * MARGIN] * count
         """Deviation that its feed is planned for."""
@@ -270,15 +263,10 @@ _FLAT = 0.002  # of the time: a curve that falls by less has no knee
 
 @dataclass(frozen=True)
 class CutCurve:
-    """Time of one shaped cut over the deviation that it is planned for.
+    """Time of one shaped cut over the deviation that it is planned for."""
 
-    Attributes:
-        planned_um: ascending; the last is what it reaches without slowing.
-        times_s: of the shaped command at each, descending.
-    """
-
-    planned_um: tuple[float, ...]
-    times_s: tuple[float, ...]
+    planned_um: tuple[float, ...]  # ascending; the last is what it reaches without slowing
+    times_s: tuple[float, ...]  # of the shaped command at each, descending
 
     @property
     def loosest_um(self) -> float:
@@ -359,50 +347,39 @@ def plan_curve(
 
 
 class CutCurves:
-    """The curve of each cut of a conversion, planned when it is asked for.
-
-    Args:
-        writer: gives the writer on the grid that is used.
-        program: the original.
-        machine: its tolerance is what was asked for.
-        originals: simulations of the original cuts under way.
-    """
+    """The curve of each cut of a conversion on one grid, planned when it is asked for."""
 
     def __init__(
         self,
-        writer: Callable[[], TextWriter],
+        writer: TextWriter,
         program: Program,
         machine: Machine,
         originals: Sequence[Future[_core.PlaybackFigures]],
     ) -> None:
         self._writer, self._program, self._machine, self._originals = writer, program, machine, originals
-        self._known: dict[int, tuple[object, CutCurve]] = {}  # on one grid
-        self._feed_ratio: dict[int, float] = {}
+        self._known: dict[int, CutCurve] = {}
+
+    def use(self, writer: TextWriter) -> None:
+        """Plan on another grid from now on."""
+        self._writer, self._known = writer, {}
 
     def note(self, written: Written) -> None:
         """Remember cuts that the tolerance does not slow: nothing needs to be planned for them."""
-        grid = self._writer().grid
-        for index in written.unslowed:
-            known = self._known.get(index)
-            if known is None or known[0] is not grid:
-                self._known[index] = (
-                    grid,
-                    CutCurve((max(written.planned_um.get(index, 0.0), 1e-3),), (written.durations_s[index],)),
-                )
+        for index in written.unslowed - self._known.keys():
+            planned_um = max(written.planned_um.get(index, 0.0), 1e-3)
+            self._known[index] = CutCurve((planned_um,), (written.durations_s[index],))
 
     def of(self, index: int) -> CutCurve:
         """The curve of a cut."""
-        writer = self._writer()
-        known = self._known.get(index)
-        if known is not None and known[0] is writer.grid:
-            return known[1]
+        if index in self._known:
+            return self._known[index]
         asked_um = self._machine.tolerance.contour_um * MARGIN
         target = "command" if self._machine.shaping.contour != "response" else "response"
         original_um = getattr(self._originals[index].result(), target).max_abs_mm * 1e3
         path = self._program.regions[index].path
-        curve = plan_curve(path, writer.grid.fir, writer.options(index, 1.0), asked_um, original_um)
-        self._known[index] = writer.grid, curve
-        return curve
+        options = self._writer.options(index)
+        self._known[index] = plan_curve(path, self._writer.grid.fir, options, asked_um, original_um)
+        return self._known[index]
 
 
 def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | None:
@@ -430,5 +407,5 @@ def curve_table(curve: ToleranceCurve) -> Table:
 
 
 def _remark(point: TolerancePoint) -> str:
-    said = (["knee"] if point.is_knee else []) + ([] if point.is_within_price else ["above the price"])
-    return ", ".join(said)
+    remarks = (["knee"] if point.is_knee else []) + ([] if point.is_within_price else ["above the price"])
+    return ", ".join(remarks)

@@ -13,10 +13,11 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.conversion.write import EmittedRegion
 from shapegcode.machine import Machine
-from shapegcode.program import Program, least_increment_mm
+from shapegcode.program import Program
 from shapegcode.results.result import Xyz
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.figures import RegionVerdict
+from shapegcode.verdict.judge import residual_floor_um
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -86,17 +87,11 @@ class Budget:
 
 @dataclass(frozen=True)
 class TransferLoad:
-    """What a shaped region asks of memory, line and control.
+    """What a shaped region asks of memory, line and control."""
 
-    Attributes:
-        extra_bytes: size of its text less that of the original's.
-        baud: what its section with the most blocks per second needs of the line, bit/s.
-        blocks_per_second: blocks in its busiest stretch.
-    """
-
-    extra_bytes: int
-    baud: float
-    blocks_per_second: float
+    extra_bytes: int  # size of its text less that of the original's
+    baud: float  # what its section with the most blocks per second needs of the line, bit/s
+    blocks_per_second: float  # blocks in its busiest stretch
 
 
 @dataclass(frozen=True)
@@ -158,14 +153,14 @@ def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_p
     durations = np.empty(shaped.blocks)
     np.concatenate(shaped.block_periods, out=durations, casting="same_kind")
     durations *= grid.block_period_s
-    stretch = max(grid.duration_s, grid.block_period_s)
+    window_s = max(grid.duration_s, grid.block_period_s)
     sizes = np.empty(shaped.blocks)
     np.concatenate(shaped.block_bytes, out=sizes, casting="same_kind")
-    characters = _core.busiest_per_s(durations, sizes, stretch)
+    characters = _core.busiest_per_s(durations, sizes, window_s)
     return TransferLoad(
         shaped.text.size - (region.text_end - region.text_begin),
         characters * bits_per_character,
-        _core.busiest_per_s(durations, None, stretch),
+        _core.busiest_per_s(durations, None, window_s),
     )
 
 
@@ -177,13 +172,6 @@ _LINES_NAMED = 5  # lines of regions in the one sentence
 def keepable(region: _core.Region, machine: Machine) -> bool:
     """Whether a region's text can stand in an emitted program: absolute arc centres cannot."""
     return machine.input.arc_centre != "absolute" or region.path.largest_sweep_rad <= 0.0
-
-
-def _residual_unit_um(region: _core.Region, machine: Machine) -> float:
-    """What residual vibration is measured by: the tolerance that does not depend on the original, µm."""
-    tolerance = machine.tolerance
-    increment_um = least_increment_mm(machine, region.exit.units) * 1e3
-    return max(tolerance.residual_floor_um, tolerance.residual_floor_increments * increment_um) or 1.0
 
 
 class WrittenText(Protocol):
@@ -199,13 +187,7 @@ class WrittenText(Protocol):
 
 
 class Spending:
-    """The choice under a budget, and the record of what was given up.
-
-    Args:
-        budget: the limits.
-        program: what is converted.
-        machine: controller and tolerances.
-    """
+    """The choice under a budget, and the record of what was given up."""
 
     def __init__(self, budget: Budget, program: Program, machine: Machine) -> None:
         self.budget = budget
@@ -216,7 +198,7 @@ class Spending:
         self._most_ticks = math.floor(machine.shaping.max_duration_s / self._tick_s + _ROUNDING)
         self._fixed_period = machine.emission.block_period_s is not None
         self._keepable = [keepable(region, machine) for region in program.regions]
-        self._unit_um = [_residual_unit_um(region, machine) for region in program.regions]
+        self._unit_um = [residual_floor_um(region, machine) or 1.0 for region in program.regions]
         self._longer = False  # the block period is longer than it would be without the budget
         self._before: TextNeeds | None = None
 
@@ -286,23 +268,23 @@ class Spending:
 
     def warning(self, grid: Grid) -> str:
         """One sentence on what was given up; empty if nothing was."""
-        said = []
+        parts = []
         if self._longer and self._before is not None:
             was, now = self._before.block_period_s * 1e3, grid.block_period_s * 1e3
-            said.append(f"the block period is {now:g} ms instead of {was:g} ms")
+            parts.append(f"the block period is {now:g} ms instead of {was:g} ms")
         if self.given_up:
             entries = [self.given_up[index] for index in sorted(self.given_up)]
             lines = ", ".join("{} to {}".format(*entry.lines) for entry in entries[:_LINES_NAMED])
             lines += f" and {len(entries) - _LINES_NAMED} more" if len(entries) > _LINES_NAMED else ""
             stays = max(max(entry.residual_um) for entry in entries)
-            said.append(
+            parts.append(
                 f"{len(entries)} of {len(self._program.regions)} cuts are left unchanged (lines {lines}) "
                 f"and up to {stays:.1f} um of residual vibration"
             )
-        return f"{self._program.source}: given up for the budget: {'; '.join(said)}" if said else ""
+        return f"{self._program.source}: given up for the budget: {'; '.join(parts)}" if parts else ""
 
     def _factors(self, loads: Mapping[int, TransferLoad]) -> list[float]:
-        """How many times too fast the regions are that are."""
+        """By what factor each region exceeds its limit; regions within it are left out."""
         factors = (self.budget.excess(load) for load in loads.values())
         return [factor for factor in factors if factor > 1.0 + _ROUNDING]
 

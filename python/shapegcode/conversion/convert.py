@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import compress
 from pathlib import Path
@@ -15,16 +15,16 @@ from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.outcome import judge, result_of
 from shapegcode.conversion.plan import ConversionPlan, CutChoice, Progress, Shaped
 from shapegcode.conversion.recommendation import gain_um
-from shapegcode.conversion.rests import Begun, begin_rests
 from shapegcode.conversion.result import Conversion
+from shapegcode.conversion.sensitivity import StartedTrials, start_trials
 from shapegcode.conversion.tables import chosen_cuts
-from shapegcode.conversion.whole_text import TextWriter, Written
+from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
+from shapegcode.program.computer import cores
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
 from shapegcode.shaping.grid import Grid
-from shapegcode.verdict.ahead import cores
 
 if TYPE_CHECKING:
     from shapegcode.conversion.rapids.shape import ShapedRapids
@@ -123,10 +123,7 @@ def read(
     if given := {key: value for key, value in stated.items() if value is not None}:
         machine = machine.with_values(given, source="options of convert")
     program = program_for_conversion(program, machine)
-    if program.stamp is not None:
-        raise _core.ProgramError(
-            f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
-        )
+    program.refuse_shaped("convert the original")
     # A comment of an original that the emitted program would say of its own blocks.
     for mark in (REGION_MARK.encode(), RAPID_MARK.encode(), STAMP_BEGIN):
         if (at := program.core.find(mark)) >= 0:
@@ -142,7 +139,7 @@ def choose_block_period(plan: ConversionPlan) -> None:
     """Another grid where a budget limits the rate of the line."""
     spending = plan.spending
     if spending is not None and spending.budget.limits_rate and not plan.fixed_period:
-        weights = [float(play.result().residual_mm.max()) for play in plan.originals]
+        weights = [float(original.result().residual_mm.max()) for original in plan.originals]
         plan.grid = spending.choose_period(plan.grid, weights, plan.grid_for, partial(write, plan))
 
 
@@ -150,7 +147,7 @@ def settle(plan: ConversionPlan) -> Shaped:
     """Write, read back and simulate; again where a cut left its tolerance, ran too fast or took too long."""
     for attempt in range(_ATTEMPTS):
         written = write(plan, plan.grid, "shaping" if attempt == 0 else "shaping again, slower")
-        shaped = simulate(plan, read_back(plan, written), ahead=attempt == 0)
+        shaped = simulate(plan, written, read_back(plan, written), prefetch=attempt == 0)
         figures, aims = shaped.figures, plan.aims
         aims.note(written, figures)
         changed = aims.slow_down(written, figures)
@@ -160,33 +157,28 @@ def settle(plan: ConversionPlan) -> Shaped:
         if not changed:
             return shaped
         shaped.trackers.clear()  # nobody asks for them any more: they take room beside the next text
-        for run in shaped.begun.values():
+        for run in shaped.started.values():
             run.cancel()
-    return simulate(plan, read_back(plan, write(plan, plan.grid)))
+    written = write(plan, plan.grid)
+    return simulate(plan, written, read_back(plan, written))
 
 
 def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     """Shape the chosen cuts on a grid, and write the whole text."""
-    if plan.writer.grid is not grid:
-        plan.writer = TextWriter(plan.program, plan.model, grid, plan.pool)
+    plan.use_grid(grid)
     # Of what was given up for a budget, or is left unchanged by choice, the table of cuts speaks.
     given_up = {} if plan.spending is None else plan.spending.given_up
-    untold = {*given_up, *plan.left, *plan.aims.emitted_s}
+    unreported = {*given_up, *plan.left, *plan.aims.emitted_s}
     on_progress = partial(plan.on_progress, stage) if stage else lambda _done, _total: None
-    written = plan.writer.write(plan.reasons, plan.aims.room_um, plan.aims.feed_ratio, untold, on_progress)
+    written = plan.writer.write(plan.reasons, plan.aims.room_um, plan.aims.feed_ratio, unreported, on_progress)
     for index, reason in written.no_room.items():
         plan.reasons[index] = reason
     plan.curves.note(written)
     return written
 
 
-@dataclass(frozen=True)
-class ReadBack:
-    """A text read back and held against the original; trackers of the cuts that were not in the text before."""
-
-    written: Written
-    emitted: Program
-    trackers: dict[int, _core.ContourTracker]  # by the rank of the cut
+ReadBack = tuple[Program, dict[int, _core.ContourTracker]]
+"""The text read, and trackers of the cuts that were not in the text before, by the rank of the cut."""
 
 
 def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
@@ -197,28 +189,28 @@ def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
         if (known := plan.simulated.get(plan.aims.index(place.region))) is None or known[0] is not text
     }
     emitted = written.read_back(plan.machine)
-    return ReadBack(written, emitted, {rank: each.result() for rank, each in following.items()})
+    return emitted, {rank: each.result() for rank, each in following.items()}
 
 
-def simulate(plan: ConversionPlan, text: ReadBack, *, ahead: bool = False) -> Shaped:
+def simulate(plan: ConversionPlan, written: Written, text: ReadBack, *, prefetch: bool = False) -> Shaped:
     """Simulate every shaped cut under the operating conditions; one whose text is as before is not simulated again.
 
-    `ahead`: its sensitivity to unverified parameters too, where which cut decides is known already.
+    `prefetch`: its sensitivity to unverified parameters too, where which cut decides is known already.
     """
-    placed, trackers = text.written.placed, text.trackers
+    placed, (emitted, trackers) = written.placed, text
     indices = [plan.aims.index(place.region) for place in placed]
     places = [placed[rank] for rank in trackers]
-    playing = plan.judge.begin(text.emitted, places, list(trackers.values()), plan.pool)
-    begun: Begun = {}
-    if ahead and cores() > 1 and len(placed) == len(trackers) == 1:
-        begun = begin_rests(plan.judge, plan.machine, places[0], text.emitted, trackers[0], plan.pool)
+    running = plan.judge.begin(emitted, places, list(trackers.values()), plan.pool)
+    started: StartedTrials = {}
+    if prefetch and cores() > 1 and len(placed) == len(trackers) == 1:
+        started = start_trials(plan.judge, plan.machine, places[0], emitted, trackers[0], plan.pool)
     originals = [plan.originals[indices[rank]] for rank in trackers]
-    found = plan.judge.figures(playing, originals, partial(plan.on_progress, "round trip"))
+    found = plan.judge.figures(running, originals, partial(plan.on_progress, "round trip"))
     for rank, figures in zip(trackers, found, strict=True):
-        plan.simulated[indices[rank]] = text.written.texts[rank][0], figures
+        plan.simulated[indices[rank]] = written.texts[rank][0], figures
     return Shaped(
-        text.written, text.emitted, [plan.simulated[index][1] for index in indices],
-        [trackers.get(rank) for rank in range(len(placed))], begun,
+        written, emitted, [plan.simulated[index][1] for index in indices],
+        [trackers.get(rank) for rank in range(len(placed))], started,
     )  # fmt: skip
 
 
@@ -283,7 +275,7 @@ def shape_rapids(plan: ConversionPlan, shaped: Shaped) -> Shaped:
 
 
 def _within_price(plan: ConversionPlan, shaped: Shaped, rapids: ShapedRapids) -> ShapedRapids:
-    """The shaped rapids, or none where with them the program would take more time than its price."""
+    """The shaped rapids; none if the program would then take more time than its price allows."""
     price_s = plan.price_s()
     if plan.machine.emission.header:
         added_s = plan.model.cycle_time_s(rapids.emitted.core) - plan.original_s.result()

@@ -13,7 +13,6 @@ from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.plan import ConversionPlan, Shaped
 from shapegcode.conversion.recommendation import (
     Grade,
-    Situation,
     filter_advice,
     most_to_gain_um,
     open_axes,
@@ -22,12 +21,12 @@ from shapegcode.conversion.recommendation import (
     text_warnings,
 )
 from shapegcode.conversion.restart import restart_points
-from shapegcode.conversion.rests import RestsOn, rests_on
 from shapegcode.conversion.result import ChangeProof, Conversion
+from shapegcode.conversion.sensitivity import Sensitivity, parameter_sensitivity
 from shapegcode.conversion.tables import CutOutcome, outcome_of, tools_of_cuts
 from shapegcode.machine import Machine
 from shapegcode.model.modes import machine_warnings, region_range_warnings
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
@@ -44,7 +43,7 @@ from shapegcode.verdict.judge import RegionFigures, rapid_vibration_um, simulate
 
 
 @dataclass(frozen=True)
-class JudgedProgram:
+class ProgramVerdict:
     """The whole emitted program beside its limits, its price and its original."""
 
     figures: ProgramFigures
@@ -55,7 +54,7 @@ class JudgedProgram:
     reason: str
 
 
-def judge(plan: ConversionPlan, shaped: Shaped) -> JudgedProgram:
+def judge(plan: ConversionPlan, shaped: Shaped) -> ProgramVerdict:
     """Judge every cut, shaped or left unchanged, and what lies between them; prove that nothing else changed."""
     machine, rapids = plan.machine, shaped.rapids
     emitted_s = plan.pool.submit(plan.model.cycle_time_s, shaped.emitted.core)
@@ -79,41 +78,39 @@ def judge(plan: ConversionPlan, shaped: Shaped) -> JudgedProgram:
     times = _cycle_time_s(plan, shaped, emitted_s.result(), figures.region_time_s())
     proof = None if proving is None else proving.result()
     grade, reason = recommend(
-        Situation(
-            figures.all_cuts, len(shaped.written.placed), original_within=plan.original_within,
-            could_gain=any(cut.gain_um >= machine.shaping.least_gain_um for cut in cuts),
-            benefit=plan.is_benefit(shaped), other_changes=proof.refused if proof is not None else (),
-        )
+        figures.all_cuts, original_within=plan.original_within,
+        could_gain=any(cut.gain_um >= machine.shaping.least_gain_um for cut in cuts),
+        benefit=plan.is_benefit(shaped), other_changes=proof.refused if proof is not None else (),
     )  # fmt: skip
-    return JudgedProgram(figures, cuts, times, proof, grade, reason)
+    return ProgramVerdict(figures, cuts, times, proof, grade, reason)
 
 
-def result_of(plan: ConversionPlan, shaped: Shaped, judged: JudgedProgram) -> Conversion:
+def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> Conversion:
     """The result: figures, warnings, what they rest on, and what the control will make of the text."""
     program, machine = plan.program, plan.machine
-    core = program.core
+    core, tools = program.core, tools_of_cuts(program)
     # For a core that waits while the last simulations run.
     mark = plan.pool.submit(lambda: shaped.emitted.mark)
-    warnings = _warnings(plan, shaped, judged.figures)
-    rests, tried = _rests_on(plan, shaped)
+    warnings = _warnings(plan, shaped, verdict.figures)
+    sensitivity, tried = _sensitivity(plan, shaped)
     mark.result()
     emitted = shaped.emitted.with_verdict(
-        good=judged.grade != "do not run", better=judged.grade == "better, tolerance not met"
+        good=verdict.grade != "do not run", better=verdict.grade == "better, tolerance not met"
     )
     return Conversion(
-        **vars(judged.figures),
+        **vars(verdict.figures),
         program=program.source,
         machine=machine.name,
-        recommendation=judged.grade,
-        reason=judged.reason,
-        cuts=judged.cuts,
-        tolerance_curve=_curve(plan, judged.cycle_time_s) if plan.choice.tolerance_curve else None,
-        proof=judged.proof,
+        recommendation=verdict.grade,
+        reason=verdict.reason,
+        cuts=verdict.cuts,
+        tolerance_curve=_curve(plan, verdict.cycle_time_s) if plan.choice.tolerance_curve else None,
+        proof=verdict.proof,
         advice=filter_advice(
             program, machine, plan.model, plan.judge, [original.result() for original in plan.originals]
         ),
-        cycle_time_s=judged.cycle_time_s,
-        cutting_time_s=judged.figures.region_time_s(),
+        cycle_time_s=verdict.cycle_time_s,
+        cutting_time_s=verdict.figures.region_time_s(),
         block_period_s=plan.grid.block_period_s,
         shaper=_used_shaper(plan.grid),
         blocks=BlockCount(core.block_count, shaped.written.blocks),
@@ -136,18 +133,21 @@ def result_of(plan: ConversionPlan, shaped: Shaped, judged: JudgedProgram) -> Co
         budget=plan.spending.outcome(plan.grid, shaped.written) if plan.spending is not None else None,
         rapids=shaped.rapids.outcome if shaped.rapids is not None else None,
         least_gain_um=machine.shaping.least_gain_um,
-        rests_on=rests,
+        rests_on=sensitivity,
         unmeasured_tried=tried,
         at_the_control=at_the_control(
             shaped.emitted,
             shaped.written.placed,
             shaped.written.loads,
-            judged.figures,
+            verdict.figures,
             plan.model,
             plan.grid.block_period_s,
             shaped.written.restarts,
         ),
-        restart_points=restart_points(program, zip(shaped.written.placed, shaped.written.restarts, strict=True)),
+        restart_points=restart_points(
+            (place, restarts, tools.get(plan.aims.index(place.region)))
+            for place, restarts in zip(shaped.written.placed, shaped.written.restarts, strict=True)
+        ),
         emitted=emitted,
         placed=tuple(shaped.written.placed),
         simulated=SimulatedPrograms(program, machine, emitted, plant=machine.verdict.plant),
@@ -162,7 +162,7 @@ def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, Regio
     spans = [(place.first_line, place.last_line) for place in shaped.written.placed]
     spans += [move.emitted_lines for move in shaped.rapids.outcome.moves] if shaped.rapids is not None else []
     regions = unshaped_regions(shaped.emitted, spans, [plan.program.regions[index] for index in left])
-    begun = [
+    running = [
         None if region.path.moves_as(plan.program.regions[index].path) and index in plan.originals_judged
         else plan.pool.submit(
             simulate_unchanged, plan.judge, plan.model, region, plan.program.regions[index],
@@ -175,7 +175,7 @@ def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, Regio
             Placed(plan.program.regions[index], region.first_line, region.last_line),
             plan.originals_judged[index] if run is None else run.result(),
         )
-        for index, region, run in zip(left, regions, begun, strict=True)
+        for index, region, run in zip(left, regions, running, strict=True)
     ]
 
 
@@ -210,15 +210,15 @@ def _curve(plan: ConversionPlan, times: Pair[float]) -> ToleranceCurve | None:
     return plan.aims.tolerance_curve(times.original, original_um * 1e3)
 
 
-def _rests_on(plan: ConversionPlan, shaped: Shaped) -> tuple[tuple[RestsOn, ...], int]:
+def _sensitivity(plan: ConversionPlan, shaped: Shaped) -> tuple[tuple[Sensitivity, ...], int]:
     """Sensitivity of the shaped cut that comes nearest to a limit."""
     deciding = plan.judge.deciding(shaped.figures, shaped.written.placed)
     if deciding is None:
         return (), 0
     simulated = zip(shaped.written.placed, shaped.figures, shaped.trackers, strict=True)
-    return rests_on(
+    return parameter_sensitivity(
         plan.judge, plan.machine, list(simulated), shaped.emitted, deciding, plan.pool,
-        shaped.begun, partial(plan.on_progress, "sensitivity to unverified parameters"),
+        shaped.started, partial(plan.on_progress, "sensitivity to unverified parameters"),
     )  # fmt: skip
 
 

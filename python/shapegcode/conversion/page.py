@@ -12,7 +12,7 @@ from shapegcode.conversion.aims import curve_table
 from shapegcode.conversion.operating import restart_table
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled import ScheduledConversion
-from shapegcode.conversion.tables import CutOutcome, before_after_table, rests_table
+from shapegcode.conversion.tables import CutOutcome, before_after_table, sensitivity_table
 from shapegcode.machine import Machine
 from shapegcode.results.json import Made
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
@@ -55,8 +55,8 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
     turning = [row.key for row in conversion.rests_on if row.moved_um > row.limit_um]
     if turning:
         return "amber", f"an unverified parameter of this machine could change the verdict: {turning[0]}"
-    if said := len(conversion.warnings):
-        return "amber", f"{said} warning{'s' if said > 1 else ''} to settle first"
+    if count := len(conversion.warnings):
+        return "amber", f"{count} warning{'s' if count > 1 else ''} to resolve first"
     return "green", f"every tolerance is kept in all {sum(case.counts for case in conversion.cases)} cases that count"
 
 
@@ -76,7 +76,7 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     if conversion.cases:
         yield _cases(conversion)
     if conversion.rests_on:
-        table = rests_table(conversion.rests_on, conversion.unmeasured_tried)
+        table = sensitivity_table(conversion.rests_on, conversion.unmeasured_tried)
         how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
         yield Section("rests", "Sensitivity to unverified parameters", (table,), how=how)
     yield from _price(conversion, made)
@@ -197,12 +197,12 @@ def _cases(conversion: Conversion) -> Section:
 def _case(rank: int, case: CaseVerdict, axes: list[str], conversion: Conversion) -> HeatRow:
     errors = (case.contour_error_um.command, case.contour_error_um.response)
     share = None if case.share_of_limit is None else case.share_of_limit * 100.0
-    judged = ("command", "response").index(conversion.limits.contour_target)
+    target_rank = ("command", "response").index(conversion.limits.contour_target)
     limit = conversion.limits.contour_um
     shares: list[float | None] = [None, None]
-    error = errors[judged]
+    error = errors[target_rank]
     if error is not None and limit > 0.0:
-        shares[judged] = error / limit
+        shares[target_rank] = error / limit
     residuals: list[float | None] = []
     for axis in axes:
         bound = conversion.residual_limit_um(axis)

@@ -13,12 +13,12 @@ from shapegcode import _core
 from shapegcode.conversion.aims import Aims, CutCurves
 from shapegcode.conversion.budget import Budget, Spending, keepable
 from shapegcode.conversion.recommendation import benefits, most_to_gain_um
-from shapegcode.conversion.rests import Begun
+from shapegcode.conversion.sensitivity import StartedTrials
 from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
-from shapegcode.shaping.grid import choose_grid
+from shapegcode.shaping.grid import Grid, choose_grid
 from shapegcode.verdict.figures import Placed, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures, rapid_vibration_um, simulate_unchanged
 
@@ -32,17 +32,11 @@ Progress = Callable[[str, float, int], None]
 
 @dataclass(frozen=True)
 class CutChoice:
-    """What the caller chose.
+    """What the caller chose."""
 
-    Attributes:
-        not_shaped: why a cut is not to be shaped, by its index.
-        shape_all: shape whatever can be shaped.
-        tolerance_curve: work out what other tolerances would cost.
-    """
-
-    not_shaped: dict[int, str]
-    shape_all: bool
-    tolerance_curve: bool
+    not_shaped: dict[int, str]  # why a cut is not to be shaped, by its index
+    shape_all: bool  # shape whatever can be shaped
+    tolerance_curve: bool  # work out what other tolerances would cost
 
 
 @dataclass(frozen=True)
@@ -53,7 +47,7 @@ class Shaped:
     emitted: Program
     figures: list[RegionFigures]
     trackers: list[_core.ContourTracker | None]  # of its cuts; None: as in the text before
-    begun: Begun  # sensitivity that is simulated ahead of need
+    started: StartedTrials  # sensitivity that is simulated ahead of need
     rapids: ShapedRapids | None = None  # what became of its rapids; None: they were not to be shaped
 
 
@@ -84,7 +78,7 @@ class ConversionPlan:
         self.grid = self.grid_for(block_period_s)
         self.writer = TextWriter(program, self.model, self.grid, pool)
         self.judge = Judge(self.model)
-        self.curves = CutCurves(self.writer_of, program, machine, self.originals)
+        self.curves = CutCurves(self.writer, program, machine, self.originals)
         self.aims = Aims(
             program, machine,
             [
@@ -105,9 +99,11 @@ class ConversionPlan:
         self.original_s = pool.submit(self.model.cycle_time_s, program.core)
         self.rapid_vibration = pool.submit(rapid_vibration_um, program, self.model)
 
-    def writer_of(self) -> TextWriter:
-        """The writer on the grid that is used now."""
-        return self.writer
+    def use_grid(self, grid: Grid) -> None:
+        """Write on this grid from now on."""
+        if self.writer.grid is not grid:
+            self.writer = TextWriter(self.program, self.model, grid, self.pool)
+            self.curves.use(self.writer)
 
     def excess_s(self, shaped: Shaped) -> float:
         """Time above what the price of the program allows."""
@@ -165,9 +161,9 @@ class ConversionPlan:
     def _leave_what_has_nothing_to_gain(self) -> None:
         """Where the original vibrates and errs by less than the least gain, shaping is not even tried."""
         least = self.machine.shaping.least_gain_um
-        for index, (reason, play) in enumerate(zip(self.reasons, self.originals, strict=True)):
+        for index, (reason, original) in enumerate(zip(self.reasons, self.originals, strict=True)):
             if not reason and keepable(self.program.regions[index], self.machine):
-                most = most_to_gain_um(play.result())
+                most = most_to_gain_um(original.result())
                 if most < least:
                     self.leave(index, f"nothing there to gain: {most:.1f} µm", most)
 

@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from shapegcode import _core
 from shapegcode.comparison.result import ProgramDifference
+from shapegcode.conversion.sensitivity import unknown_axes
 from shapegcode.machine import Machine
 from shapegcode.machine.controller import Controller
-from shapegcode.machine.output import Tolerance
+from shapegcode.machine.programs import Tolerance
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
-from shapegcode.program.operating import no_room
+from shapegcode.program.stamp import no_room
 from shapegcode.verdict.figures import Placed, ProgramFigures, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures
 
@@ -44,56 +45,38 @@ Grade = Literal[
     "no benefit: run the original",
     "do not run",
 ]
-GRADES: tuple[Grade, ...] = (
-    "worth running",
-    "better, tolerance not met",
-    "already within tolerance: shaping is optional",
-    "no benefit: run the original",
-    "do not run",
-)
+GRADES: tuple[Grade, ...] = get_args(Grade)
 """From the best down; the first that applies from the end is the answer."""
 
 LEAST_BETTER = 0.3
 """Share by which a figure must fall to count as a benefit."""
 
 
-@dataclass(frozen=True)
-class Situation:
-    """What the grade is decided by.
+def recommend(
+    cuts: Sequence[RegionVerdict],
+    *,
+    original_within: bool,
+    could_gain: bool,
+    benefit: bool,
+    other_changes: Sequence[ProgramDifference] = (),
+) -> tuple[Grade, str]:
+    """The grade of a program and its reason: the first that applies, from "do not run" upwards.
 
-    Attributes:
-        cuts: all of the program, shaped or left unchanged.
-        shaped: how many of them are shaped.
-        original_within: every cut of the original keeps its limits.
-        could_gain: there is a cut in which shaping gains, or as far as is known would gain, the least gain.
-        benefit: a shaped cut gains enough, see `benefits`.
-        other_changes: what else differs from the original; none, unless shapegcode has a defect.
+    `original_within`: every cut of the original keeps its limits. `could_gain`: shaping gains enough in some cut, or
+    would as far as is known. `benefit`: of a shaped cut, see `benefits`. `other_changes`: a defect of shapegcode.
     """
-
-    cuts: Sequence[RegionVerdict]
-    shaped: int
-    original_within: bool
-    could_gain: bool
-    benefit: bool
-    other_changes: Sequence[ProgramDifference] = ()
-
-
-def recommend(situation: Situation) -> tuple[Grade, str]:
-    """The grade and its reason: the first that applies, from "do not run" upwards."""
-    worse = next((_at(cut, why) for cut in situation.cuts for why in cut.worse), "")
-    if worse:
+    if worse := next((_at(cut, why) for cut in cuts for why in cut.worse), ""):
         return "do not run", worse
-    for change in situation.other_changes:
+    for change in other_changes:
         had, has = change.original or "nothing", change.emitted or "nothing"
         return "do not run", f"{change.place}: {change.kind} changed: {had} became {has}: please report this defect"
-    if not situation.cuts:
+    if not cuts:
         return "no benefit: run the original", "there is nothing to shape"
-    if not situation.could_gain or (not situation.benefit and not situation.original_within):
+    if not could_gain or (not benefit and not original_within):
         return "no benefit: run the original", "nothing that misses its limit gets noticeably better"
-    if situation.original_within:
+    if original_within:
         return "already within tolerance: shaping is optional", "every cut of the original keeps its limits"
-    missed = next((_at(cut, why) for cut in situation.cuts for why in cut.misses), "")
-    if missed:
+    if missed := next((_at(cut, why) for cut in cuts for why in cut.misses), ""):
         return "better, tolerance not met", missed
     return "worth running", "every cut is within its limits, and within the price"
 
@@ -202,16 +185,12 @@ _WORSE_RATIO, _WORSE_UM = 1.2, 5.0
 
 
 def open_axes(program: Program, machine: Machine) -> list[str]:
-    """Axes that move in the regions of a program, have no mode and are not said to be rigid."""
-    reach = [np.ptp(np.asarray(region.path.polyline()), axis=0) for region in program.regions]
-    stated = {value.key for value in machine.values() if not value.unmeasured}
+    """Axes that move in the regions of a program, and of which it is not known whether they have a mode."""
     return [
         f"{letter.upper()} moves, and whether it has a vibration mode is not known: assumed rigid; "
         f"tap it (shapegcode identify), or state axes.{letter}.rigid = true"
-        for rank, (letter, axis) in enumerate(zip("xyz", machine.axes.as_tuple(), strict=True))
-        if not axis.modes
-        and not (axis.rigid and f"axes.{letter}.rigid" in stated)
-        and any(ways[rank] > 0.0 for ways in reach)
+        for letter in unknown_axes(machine)
+        if any(region.path.extent_mm["xyz".index(letter)] > 0.0 for region in program.regions)
     ]
 
 

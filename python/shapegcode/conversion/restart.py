@@ -20,6 +20,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.modes import slowest_mode
 from shapegcode.program import Program, between_increments
+from shapegcode.program.stamp import whole_lines
 from shapegcode.verdict.figures import Placed
 
 EXTRA_SYSTEM = 541
@@ -30,52 +31,31 @@ PLACEHOLDER = "N00000"
 
 _FIRST_NUMBER, _END_NUMBER = 10_000, 100_000  # five digits, as `PLACEHOLDER`
 _ROUND = 1000
-_CHUNK = 1 << 20  # bytes
 _N_WORD = re.compile(rb"N *0*([0-9]{1,8})")
-_COMMENT = re.compile(rb"\([^()\r\n]*\)")
-_TOOL, _CHANGE = re.compile(rb"T *([0-9]+)"), re.compile(rb"M *0*6(?![0-9])")
 
 
 @dataclass(frozen=True)
 class RestartMark:
-    """A restart point in the text of a region.
+    """A restart point in the text of a region."""
 
-    Attributes:
-        byte: of its N word, from the begin of the text.
-        line: of it, 0 for the first one of the text.
-        time_s: from the begin of the shaped blocks.
-        position_mm: where its block begins.
-        speed_mm_per_s: of the shaped command there.
-        vibration_um: amplitude that a start from rest leaves there, in the slowest mode of each axis.
-        number: N; 0 before the program is put together.
-    """
-
-    byte: int
-    line: int
-    time_s: float
-    position_mm: tuple[float, float, float]
-    speed_mm_per_s: float
-    vibration_um: float
-    number: int = 0
+    byte: int  # of its N word, from the begin of the text
+    line: int  # of it, 0 for the first one of the text
+    time_s: float  # from the begin of the shaped blocks
+    position_mm: tuple[float, float, float]  # where its block begins
+    speed_mm_per_s: float  # of the shaped command there
+    vibration_um: float  # amplitude that a start from rest leaves there, in the slowest mode of each axis
+    number: int = 0  # N; 0 before the program is put together
 
 
 @dataclass(frozen=True)
 class CutRestarts:
-    """Restart points of a region, and what there is to say about them.
+    """Restart points of a region, and what there is to say about them."""
 
-    Attributes:
-        marks: in their order.
-        longest_s: longest time without one.
-        reason: why there can be none; empty: there can.
-        stops: how many of them are stops that were put in for them.
-        stops_s: what these add to the cutting time.
-    """
-
-    marks: tuple[RestartMark, ...] = ()
-    longest_s: float = 0.0
-    reason: str = ""
-    stops: int = 0
-    stops_s: float = 0.0
+    marks: tuple[RestartMark, ...] = ()  # in their order
+    longest_s: float = 0.0  # longest time without one
+    reason: str = ""  # why there can be none; empty: there can
+    stops: int = 0  # how many of them are stops that were put in for them
+    stops_s: float = 0.0  # what these add to the cutting time
 
 
 @dataclass(frozen=True)
@@ -91,7 +71,7 @@ class RestartPoint:
         speed_mm_per_s: of the shaped command there.
         vibration_um: amplitude that a start from rest leaves there.
         coordinate_system: such as "G54" or "G54.1P3".
-        tool: T number in the spindle; null: no tool change before the cut.
+        tool: T number in the spindle; null: the program names none before it.
         length_offset: H number in force; null: none.
         spindle_rev_per_min: in force; null: none programmed.
     """
@@ -110,11 +90,7 @@ class RestartPoint:
 
 
 class FreeNumbers:
-    """N numbers for restart points that a program does not use itself.
-
-    Args:
-        program: the original; its N words are looked for when the first number is asked for.
-    """
+    """N numbers for restart points that a program does not use itself."""
 
     def __init__(self, program: Program) -> None:
         self._program = program
@@ -133,11 +109,8 @@ class FreeNumbers:
 
     def _found(self) -> list[int]:
         used = np.zeros(_END_NUMBER, dtype=bool)
-        core = self._program.core
-        end = 0
-        while end < core.size:
-            begin, end = end, 1 + core.find(b"\n", end + _CHUNK) or core.size
-            numbers = np.array(_N_WORD.findall(core.slice(begin, end).upper()), dtype="S8").astype(np.int64)
+        for lines in whole_lines(self._program.core):
+            numbers = np.array(_N_WORD.findall(lines.upper()), dtype="S8").astype(np.int64)
             used[numbers[numbers < _END_NUMBER]] = True
         last = int(np.flatnonzero(used)[-1]) if used.any() else 0
         begin = max(_FIRST_NUMBER, math.ceil((last + 1) / _ROUND) * _ROUND)
@@ -151,9 +124,8 @@ def system_of(state: _core.ModalState) -> str:
     return f"G54.1P{state.coordinate_number}" if extra else f"G{state.coordinate_system}"
 
 
-def restart_points(program: Program, places: Iterable[tuple[Placed, CutRestarts]]) -> tuple[RestartPoint, ...]:
-    """The restart points of a program, with what is in force at each."""
-    tools = _Tools(program)
+def restart_points(cuts: Iterable[tuple[Placed, CutRestarts, int | None]]) -> tuple[RestartPoint, ...]:
+    """The restart points of a program, with what is in force at each; the third of a cut is its tool."""
     return tuple(
         RestartPoint(
             number=mark.number,
@@ -164,33 +136,13 @@ def restart_points(program: Program, places: Iterable[tuple[Placed, CutRestarts]
             speed_mm_per_s=mark.speed_mm_per_s,
             vibration_um=mark.vibration_um,
             coordinate_system=system_of(place.region.entry),
-            tool=tools.before(place.region),
+            tool=tool,
             length_offset=place.region.entry.length_number if place.region.entry.length_offset != 49 else None,
             spindle_rev_per_min=place.region.entry.spindle_rev_per_min or None,
         )
-        for place, restarts in places
+        for place, restarts, tool in cuts
         for mark in restarts.marks
     )
-
-
-class _Tools:
-    """The tool in the spindle, region by region; only regions with restart points ask."""
-
-    def __init__(self, program: Program) -> None:
-        self._core, self._at = program.core, 0
-        self._staged: int | None = None
-        self._tool: int | None = None
-
-    def before(self, region: _core.Region) -> int | None:
-        """T number of the last tool change before a region; regions are asked for in their order."""
-        text = _COMMENT.sub(b"", self._core.slice(self._at, region.text_begin)).upper()
-        self._at = max(self._at, region.text_begin)
-        for line in text.splitlines() if b"T" in text or b"M" in text else ():
-            if word := _TOOL.search(line):
-                self._staged = int(word[1])
-            if _CHANGE.search(line):
-                self._tool = self._staged
-        return self._tool
 
 
 FloatArray = npt.NDArray[np.float64]
@@ -206,13 +158,7 @@ _MOTION, _PLANE, _FEED = (
 
 
 class RestartPlaces:
-    """Chooses restart points of one region while its shaped command is given out.
-
-    Args:
-        region: of the original.
-        machine: whose `emission` says how far apart they may be, and whose slowest modes are looked at.
-        period_s: block period.
-    """
+    """Chooses restart points of one region while its shaped command is given out."""
 
     def __init__(self, region: _core.Region, machine: Machine, period_s: float) -> None:
         self._period_s = period_s
@@ -231,7 +177,7 @@ class RestartPlaces:
         """Why there can be none; empty: there can."""
 
     def low(self, piece: _core.ShapedCommand, at: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Where the command of a piece is slow, and a start from rest leaves the contour within its tolerance."""
+        """Where the commanded speed of a piece is low and a start from rest keeps the contour tolerance."""
         grid = np.asarray(piece.grid_mm)
         at = at[(at > 0) & (at < len(grid) - 1)]
         before, behind = (grid[at] - grid[at - 1]) / self._period_s, (grid[at + 1] - grid[at]) / self._period_s
@@ -307,7 +253,7 @@ def _why_none(region: _core.Region) -> str:
 
 
 def block_lines(text: bytes, blocks: int) -> tuple[IntArray, IntArray]:
-    """Where the lines of blocks stand in a text; comment lines between them are none."""
+    """Lines of the blocks in a text, without comment lines."""
     letters = np.frombuffer(text + b"(", dtype=np.uint8)  # so that there is one behind the last line end
     ends = np.flatnonzero(letters == ord("\n")) + 1
     begins = np.concatenate([[0], ends[:-1]]).astype(np.int64)[: len(ends)]
@@ -318,15 +264,7 @@ def block_lines(text: bytes, blocks: int) -> tuple[IntArray, IntArray]:
 
 
 class RegionRestarts:
-    """Writes blocks of a region as restart points while it is written, piece by piece.
-
-    Args:
-        places: where they may be.
-        region: of the original.
-        machine: whose `emission` says how long a line may be.
-        fit: how its motion became blocks.
-        decimals: behind the point of a position.
-    """
+    """Writes blocks of a region as restart points while it is written, piece by piece."""
 
     def __init__(
         self, places: RestartPlaces, region: _core.Region, machine: Machine, fit: _core.FitOptions, decimals: int
@@ -380,7 +318,7 @@ class RegionRestarts:
         return written
 
     def result(self, head: bytes, stops: int, stops_s: float) -> CutRestarts:
-        """What the region has of them."""
+        """The restart points of the region."""
         lines = head.count(b"\n")
         marks = tuple(replace(each, byte=each.byte + len(head), line=each.line + lines) for each in self._marks)
         longest_s = self._places.longest * self._fit.block_period_s

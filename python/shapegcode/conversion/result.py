@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from shapegcode.comparison.result import KindCount, ProgramDifference
 from shapegcode.conversion.aims import ToleranceCurve, curve_table
@@ -12,7 +12,7 @@ from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.operating import ControlNote, control_table, restart_table
 from shapegcode.conversion.recommendation import FilterAdvice, Grade
 from shapegcode.conversion.restart import RestartPoint
-from shapegcode.conversion.rests import RestsOn
+from shapegcode.conversion.sensitivity import Sensitivity
 from shapegcode.conversion.tables import (
     BeforeAfter,
     CutOutcome,
@@ -21,17 +21,19 @@ from shapegcode.conversion.tables import (
     change_percent,
     cut_table,
     percent,
-    rests_table,
+    sensitivity_table,
 )
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.figures import CONTOURS, ContourError
 from shapegcode.results.json import Made, exact, hidden, sparse
-from shapegcode.results.page.model import Light, Page, Section
 from shapegcode.results.result import Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table
 from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, ProgramFigures, UsedShaper
+
+if TYPE_CHECKING:
+    from shapegcode.results.page.model import Light, Page, Section
 
 _VIBRATIONS = {"residual_vibration_um": "residual vibration", "peak_vibration_um": "peak vibration"}
 _LEAST_SHOWN_UM = 0.05
@@ -115,7 +117,7 @@ class Conversion(ProgramFigures, Result):
     budget: BudgetOutcome | None = field(default=None, metadata=sparse())
     rapids: RapidsOutcome | None = field(default=None, metadata=sparse())
     least_gain_um: float = 0.0
-    rests_on: tuple[RestsOn, ...] = ()
+    rests_on: tuple[Sensitivity, ...] = ()
     unmeasured_tried: int = 0
     at_the_control: tuple[ControlNote, ...] = ()
     restart_points: tuple[RestartPoint, ...] = ()
@@ -215,14 +217,14 @@ class Conversion(ProgramFigures, Result):
         """What is not within its limits: cuts left unchanged first, with their lines and what would cure it."""
         out = [cut for cut in self.cuts if cut.misses]
         out.sort(key=lambda cut: cut.is_shaped)
-        said = []
+        sentences = []
         for cut in out:
             where = "lines {} to {}".format(*cut.lines)
             how = f"left unchanged ({cut.reason})" if not cut.is_shaped else self._cost_of(cut)
-            said.append(f"{where}: {cut.misses[0]}; {how}{': ' + cut.cure if cut.cure else ''}")
-        if len(said) > 1:
-            said[0] += f" (and {len(said) - 1} further cuts out of their limits)"
-        return said
+            sentences.append(f"{where}: {cut.misses[0]}; {how}{': ' + cut.cure if cut.cure else ''}")
+        if len(sentences) > 1:
+            sentences[0] += f" (and {len(sentences) - 1} further cuts out of their limits)"
+        return sentences
 
     def _cost_of(self, cut: CutOutcome) -> str:
         """Why a shaped cut does not keep its tolerance, as far as its price is the reason."""
@@ -274,14 +276,21 @@ class Conversion(ProgramFigures, Result):
             for miss in cut.misses:
                 yield "lines {} to {}: {}".format(*cut.lines, miss)
 
-    def tables(self) -> list[Table]:
-        """Original against emitted; cut by cut; tolerance against time; operating conditions; sensitivity."""
-        cuts = [cut_table(self.cuts)] if len(self.cuts) > 1 else []
+    def tables(self, *, every_cut: bool = False) -> list[Table]:
+        """Original against emitted; cut by cut; tolerance against time; operating conditions; sensitivity.
+
+        Args:
+            every_cut: list all of them; else those that miss a limit or gain most.
+
+        Returns:
+            The tables.
+        """
+        cuts = [cut_table(self.cuts, every=every_cut)] if len(self.cuts) > 1 else []
         curve = [curve_table(self.tolerance_curve)] if self.tolerance_curve is not None else []
         if self.nothing_shaped:
             return [*cuts, *curve] if any(cut.misses for cut in self.cuts) else cuts
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
-        rests = [rests_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []
+        rests = [sensitivity_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []
         points = [restart_table(self.restart_points)] if self.restart_points else []
         before_after = before_after_table(self.before_after())
         return [before_after, *cuts, *curve, *cases, *rests, control_table(self.at_the_control), *points]
@@ -334,8 +343,8 @@ class Conversion(ProgramFigures, Result):
             for statistic, suffix in _DEVIATIONS.items():
                 original, emitted = getattr(both.original, statistic), getattr(both.emitted, statistic)
                 if original is not None and emitted is not None:
-                    judged = (track, statistic) == (self.limits.contour_target, "max")
-                    limit = self.limits.contour_um if judged else None
+                    is_judged = (track, statistic) == (self.limits.contour_target, "max")
+                    limit = self.limits.contour_um if is_judged else None
                     rows.append(BeforeAfter(f"{name}, {suffix}", "µm", original, emitted, limit=limit))
             yield rows
 
@@ -398,8 +407,8 @@ class Conversion(ProgramFigures, Result):
             return page
         # It was read back before it had one.
         *others, last = page.scene.variants
-        told = replace(last, text=self.text.decode("utf-8", "replace"))
-        return replace(page, scene=replace(page.scene, variants=(*others, told)))
+        with_verdict = replace(last, text=self.text.decode("utf-8", "replace"))
+        return replace(page, scene=replace(page.scene, variants=(*others, with_verdict)))
 
     def page_sections(self, made: Made | None = None) -> tuple[Section, ...]:
         """What it gains, what that rests on, where the time goes, and the operator's run sheet.

@@ -93,9 +93,16 @@ class ScheduledConversion(Conversion):
             return f"do not run it: {self.feed_schedule.next_step}"
         return super().next_step
 
-    def tables(self) -> list[Table]:
-        """Those of the schedule, then those of the conversion."""
-        return [*self.feed_schedule.tables(), *super().tables()]
+    def tables(self, *, every_cut: bool = False) -> list[Table]:
+        """Those of the schedule, then those of the conversion.
+
+        Args:
+            every_cut: see `Conversion.tables`.
+
+        Returns:
+            The tables.
+        """
+        return [*self.feed_schedule.tables(), *super().tables(every_cut=every_cut)]
 
     def plots(self) -> Mapping[str, Plot]:
         """Those of the conversion and those of the schedule."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from shapegcode import _core
-from shapegcode.conversion.rests import RestsOn
+from shapegcode.conversion.sensitivity import Sensitivity
 from shapegcode.program import Program
 from shapegcode.results.result import Pair, Xyz
 from shapegcode.results.table import NO_BREAK, Column, Table
@@ -30,23 +30,14 @@ def percent(change: float) -> str:
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """One line of the table: a figure of both programs, or of the emitted one alone.
+    """One line of the table: a figure of both programs, or of the emitted one alone."""
 
-    Attributes:
-        figure: what it is.
-        unit: its unit.
-        original: figure of the original program; None where there is none.
-        emitted: figure of the emitted program.
-        digits: behind the point.
-        limit: what the emitted figure is judged by; None where it is not judged.
-    """
-
-    figure: str
-    unit: str
-    original: float | None
-    emitted: float
-    digits: int = 1
-    limit: float | None = None
+    figure: str  # what it is
+    unit: str  # its unit
+    original: float | None  # figure of the original program; None where there is none
+    emitted: float  # figure of the emitted program
+    digits: int = 1  # behind the point
+    limit: float | None = None  # what the emitted figure is judged by; None where it is not judged
 
     @property
     def change(self) -> str:
@@ -78,7 +69,7 @@ def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
     return Table("", _BEFORE_AFTER, [row for group in filled for row in group], sections=sections)
 
 
-def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
+def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
     """The sensitivity to unverified parameters as a table."""
     columns = (
         Column("key", left=True),
@@ -95,12 +86,12 @@ def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
     )
 
 
-def _moved(row: RestsOn) -> str:
+def _moved(row: Sensitivity) -> str:
     """What stands in the file, and what was tried instead: four columns of their own do not fit 80 characters."""
     return unbroken(f"{row.value} {row.origin} → {row.moved}")
 
 
-def _figure(row: RestsOn) -> str:
+def _figure(row: Sensitivity) -> str:
     """A short name of the figure, and how far it moves."""
     name = row.figure.replace("residual vibration", "residual").replace("contour error", "contour")
     return f"{name.partition(' of ')[0]} " + f"{row.figure_um:.1f} → {row.moved_um:.1f}".replace(" ", NO_BREAK)
@@ -195,7 +186,7 @@ def _cure(reason: str) -> str:
     return "a lower programmed feed there, or --shape-all to see what shaping it does"
 
 
-def cut_table(cuts: Sequence[CutOutcome], *, every: bool = False) -> Table:
+def cut_table(cuts: Sequence[CutOutcome], *, every: bool) -> Table:
     """The cuts: those first that miss a limit, then those with the largest gain."""
     ranked = sorted(cuts, key=lambda cut: (not cut.misses, -cut.gain_um))
     shown = list(cuts) if every else sorted(ranked[:_SHOWN], key=lambda cut: cut.lines)

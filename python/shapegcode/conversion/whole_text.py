@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
+from functools import partial
+from queue import SimpleQueue
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -16,13 +19,19 @@ from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionText, 
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.shaped_program import stamp_of_machine
+from shapegcode.model.programs import stamp_of_machine
 from shapegcode.program import Program, end_off_grid_mm, least_increment_mm
 from shapegcode.program.compensation import guard_lines, header_lines
+from shapegcode.program.computer import cores
 from shapegcode.shaping.grid import Grid
-from shapegcode.verdict.ahead import Ahead, OnShare, cores
 from shapegcode.verdict.figures import Placed
 
+T = TypeVar("T")
+
+OnShare = Callable[[float], None]
+"""Called with how much of a part is done, 0 to 1."""
+
+_WAITING = 2  # parts per core that are under way or done and not yet taken: what bounds the memory
 _MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
 
 Step = Callable[[float, int], None]
@@ -64,36 +73,23 @@ def why_off_grid(program: Program, region: _core.Region, machine: Machine) -> st
 
 @dataclass(frozen=True)
 class Written:
-    """The emitted text before it is judged.
+    """The emitted text before it is judged."""
 
-    Attributes:
-        parts: of the whole text; empty once it was read back.
-        texts: those of its shaped regions, and the byte at which each begins.
-        size: bytes of the whole text.
-        placed: its shaped regions.
-        blocks: shaped blocks in it.
-        kept_warnings: a sentence for every region that is left unchanged.
-        planned_um: per index of a shaped region the deviation that its feed was planned for, µm, where the contour is
-            kept by a target.
-        loads: per index of a shaped region what it asks of memory, line and control.
-        no_room: per index of a region that was to be shaped and is left unchanged why there is no room for it.
-        unslowed: indices of shaped cuts that their contour tolerance does not slow.
-        durations_s: per index of a shaped cut the time of its blocks.
-        restarts: of each shaped region, as in `placed`.
-    """
-
-    parts: list[bytes]
-    texts: list[tuple[RegionText, int]]
-    size: int
-    placed: list[Placed]
-    blocks: int
-    kept_warnings: list[str]
+    parts: list[bytes]  # of the whole text; empty once it was read back
+    texts: list[tuple[RegionText, int]]  # those of its shaped regions, and the byte at which each begins
+    size: int  # bytes of the whole text
+    placed: list[Placed]  # its shaped regions
+    blocks: int  # shaped blocks in it
+    kept_warnings: list[str]  # a sentence for every region that is left unchanged
+    # per index of a shaped region the deviation that its feed was planned for, µm, where the contour is kept by a
+    # target
     planned_um: dict[int, float]
-    loads: dict[int, TransferLoad]
+    loads: dict[int, TransferLoad]  # per index of a shaped region what it asks of memory, line and control
+    # per index of a region that was to be shaped and is left unchanged why there is no room for it
     no_room: dict[int, str]
-    unslowed: set[int]
-    durations_s: dict[int, float]
-    restarts: list[CutRestarts]
+    unslowed: set[int]  # indices of shaped cuts that their contour tolerance does not slow
+    durations_s: dict[int, float]  # per index of a shaped cut the time of its blocks
+    restarts: list[CutRestarts]  # of each shaped region, as in `placed`
 
     def read_back(self, machine: Machine) -> Program:
         """Read the text and hold it against the original; from then on it stands in the program that is given."""
@@ -105,15 +101,63 @@ class Written:
         return emitted
 
 
-class TextWriter:
-    """Writes a program with its regions shaped on one grid.
+class Prefetch(Generic[T]):
+    """Runs tasks in a pool some steps before their results are asked for, in their order.
 
-    Args:
-        program: the original.
-        model: of the machine; its file says how text is written.
-        grid: block period and shapers.
-        pool: shapes regions that do not touch each other; the text does not depend on its threads.
+    `tasks` by number, each calls its argument with the share that is done. `on_progress` is called with the sum of the
+    weights done, those without a task included, by the thread that asks for results; it may be replaced.
     """
+
+    def __init__(
+        self,
+        pool: Executor,
+        tasks: Mapping[int, Callable[[OnShare], T]],
+        weights: Mapping[int, float],
+        on_progress: Callable[[float], None],
+    ) -> None:
+        self._pool, self._weights, self.on_progress = pool, weights, on_progress
+        self._waiting = list(tasks.items())[::-1]
+        self._running: dict[int, Future[T]] = {}
+        # Number of a part and its share; None: a part has ended.
+        self._news: SimpleQueue[tuple[int, float] | None] = SimpleQueue()
+        self._shares = dict.fromkeys(weights, 0.0)
+        self._done = 0.0
+
+    def start(self) -> None:
+        """Start the first tasks before a result is asked for."""
+        while self._waiting and len(self._running) < _WAITING * cores():
+            number, task = self._waiting.pop()
+            future = self._pool.submit(task, partial(self._put, number))
+            future.add_done_callback(lambda _future: self._news.put(None))
+            self._running[number] = future
+
+    def result(self, number: int) -> T:
+        """The result of the next task."""
+        self.start()
+        future = self._running.pop(number)
+        while not future.done():
+            self._report(self._news.get())
+        self.skip(number)
+        return future.result()
+
+    def skip(self, number: int) -> None:
+        """Count a part as done."""
+        self._report((number, 1.0))
+
+    def _put(self, number: int, share: float) -> None:
+        self._news.put((number, share))
+
+    def _report(self, news: tuple[int, float] | None) -> None:
+        if news is not None:
+            number, share = news
+            if share > self._shares[number]:
+                self._done += (share - self._shares[number]) * self._weights[number]
+                self._shares[number] = share
+            self.on_progress(self._done)
+
+
+class TextWriter:
+    """Writes a program with its regions shaped on one grid."""
 
     def __init__(self, program: Program, model: MachineModel, grid: Grid, pool: Executor) -> None:
         self._program = program
@@ -126,19 +170,18 @@ class TextWriter:
         # By region: tolerance and feed for which it was shaped, and what it came to.
         self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
         self._loads: dict[int, TransferLoad] = {}
-        self._begun: tuple[dict[int, Aim], Ahead[EmittedRegion]] | None = None
+        self._started: tuple[dict[int, Aim], Prefetch[EmittedRegion]] | None = None
 
     def begin(self, reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> None:
         """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain."""
         aims = _aims(reasons, room_um, feed_share)
         if len(aims) < cores():
-            self._begun = aims, self._ahead(aims, lambda _done: None)
-            self._begun[1].begin()
+            self._started = aims, self._ahead(aims, lambda _done: None)
+            self._started[1].start()
 
-    def options(self, index: int, feed_ratio: float) -> _core.ShapingOptions:
-        """How a cut is shaped, but for its tolerance."""
+    def options(self, index: int) -> _core.ShapingOptions:
+        """How a cut is shaped, but for its tolerance and a lowered feed."""
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
-        limits.feed_override = feed_ratio
         offset = self._model.offset(self._program.regions[index])
         return self._regions.options(limits, self._regions.tolerance(), offset)
 
@@ -147,7 +190,7 @@ class TextWriter:
         reasons: Sequence[str],
         room_um: Sequence[float],
         feed_share: Sequence[float],
-        untold: Collection[int] = (),
+        unreported: Collection[int] = (),
         on_progress: Step = lambda _done, _total: None,
     ) -> Written:
         """The whole text."""
@@ -178,7 +221,7 @@ class TextWriter:
                     shaped = None
                     written.no_room[index] = str(error)
             if shaped is None:
-                if index not in untold:
+                if index not in unreported:
                     written.kept_warnings.append(self._keep(region, written.no_room.get(index, reason)))
                 texts: Sequence[bytes] = [core.slice(region.text_begin, region.text_end)]
                 if index in written.no_room:
@@ -227,13 +270,13 @@ class TextWriter:
         controller = self._machine.controller
         return Room(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
 
-    def _ahead(self, aims: Mapping[int, Aim], on_moves: Callable[[float], None]) -> Ahead[EmittedRegion]:
+    def _ahead(self, aims: Mapping[int, Aim], on_moves: Callable[[float], None]) -> Prefetch[EmittedRegion]:
         """Regions under way in the pool; one whose tolerance and feed are as in the text before is not shaped again."""
-        if self._begun is not None and aims.items() <= self._begun[0].items():
-            begun = self._begun[1]
-            begun.on_progress = on_moves
-            self._begun = None
-            return begun
+        if self._started is not None and aims.items() <= self._started[0].items():
+            prefetch = self._started[1]
+            prefetch.on_progress = on_moves
+            self._started = None
+            return prefetch
         regions = self._program.regions
         # None may have more than the whole program; beside the others it may turn out to be too much nevertheless.
         room = self._room(0, 0)
@@ -243,12 +286,12 @@ class TextWriter:
 
         tasks = {index: shaping(index, regions[index], aim) for index, aim in aims.items() if self._is_new(index, aim)}
         weights = {index: float(len(regions[index].path)) for index in aims}
-        return Ahead(self._pool, tasks, weights, on_moves)
+        return Prefetch(self._pool, tasks, weights, on_moves)
 
     def _is_new(self, index: int, aim: Aim) -> bool:
         return index not in self._shaped or self._shaped[index][0] != aim
 
-    def _shaped_region(self, index: int, aim: Aim, ahead: Ahead[EmittedRegion]) -> EmittedRegion:
+    def _shaped_region(self, index: int, aim: Aim, ahead: Prefetch[EmittedRegion]) -> EmittedRegion:
         if self._is_new(index, aim):
             self._shaped[index] = aim, ahead.result(index)
             self._loads.pop(index, None)

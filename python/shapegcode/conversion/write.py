@@ -33,9 +33,6 @@ class RegionText:
     """The lines of a region: in parts as they were written, then in the program that was made of them.
 
     So a text of a million lines stands in memory once.
-
-    Args:
-        parts: whole lines each.
     """
 
     def __init__(self, parts: Sequence[bytes]) -> None:
@@ -72,7 +69,7 @@ class RegionText:
         self._parts = self._inside = None
 
     def stands_in(self, program: Program, begin: int) -> None:
-        """The text is part of that of a program."""
+        """Whether the text is part of a program's text."""
         self._parts, self._inside = None, (program, begin)
 
     def joined(self) -> bytes:
@@ -82,27 +79,17 @@ class RegionText:
 
 @dataclass(frozen=True)
 class EmittedRegion:
-    """The text that replaces a region.
+    """The text that replaces a region."""
 
-    Attributes:
-        text: whole lines.
-        blocks: shaped blocks in it, without the lines around them.
-        block_periods: whole block periods that each of them lasts, of each part that holds blocks.
-        block_bytes: likewise the characters of each of them.
-        planned_um: deviation of what shall follow the path for which the feed was planned, µm; 0 without a target.
-        restarts: blocks of it at which the control can begin.
-        is_slowed: it is slower than without a contour tolerance.
-        duration_s: of its blocks.
-    """
-
-    text: RegionText
-    blocks: int
+    text: RegionText  # whole lines
+    blocks: int  # shaped blocks in it, without the lines around them
+    # whole block periods that each of them lasts, of each part that holds blocks
     block_periods: list[npt.NDArray[np.uint32]]
-    block_bytes: list[npt.NDArray[np.uint32]]
-    planned_um: float
-    restarts: CutRestarts
-    is_slowed: bool = True
-    duration_s: float = 0.0
+    block_bytes: list[npt.NDArray[np.uint32]]  # likewise the characters of each of them
+    planned_um: float  # deviation of what shall follow the path for which the feed was planned, µm; 0 without a target
+    restarts: CutRestarts  # blocks of it at which the control can begin
+    is_slowed: bool = True  # it is slower than without a contour tolerance
+    duration_s: float = 0.0  # of its blocks
 
 
 class NoRoomError(Exception):
@@ -111,17 +98,11 @@ class NoRoomError(Exception):
 
 @dataclass(frozen=True)
 class Room:
-    """What the text of a region may have at most.
+    """What the text of a region may have at most."""
 
-    Attributes:
-        bytes: of text.
-        blocks: shaped ones.
-        machine: whose keys say so.
-    """
-
-    bytes: int
-    blocks: int
-    machine: Machine
+    bytes: int  # of text
+    blocks: int  # shaped ones
+    machine: Machine  # whose keys say so
 
     def require(self, text_bytes: int, blocks: int) -> None:
         """Refuse what is more; called piece by piece, so that no more than a piece is written in vain."""
@@ -161,7 +142,7 @@ def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = m
 
 
 class _WithdrawnError(Exception):
-    """What was written of a region rests on a feed that does not keep its tolerance."""
+    """What was written of a region is void: its feed does not keep the tolerance."""
 
 
 class _Marks:
@@ -217,13 +198,7 @@ class _BlockBytes:
 
 
 class RegionWriter:
-    """Shapes regions on one grid and writes them.
-
-    Args:
-        model: of the machine; its file says how motion is shaped and text is written.
-        grid: block period and shapers.
-        mark: comment before each region, where the machine file asks for comments.
-    """
+    """Shapes regions on one grid and writes them."""
 
     def __init__(self, model: MachineModel, grid: Grid, mark: str = REGION_MARK) -> None:
         self._machine = model.machine

@@ -446,25 +446,24 @@ def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
     """The moves of the roughing program in order, each run of cutting moves as one path."""
     program = Program.read(stock.beside(rough.file), machine)
 
-    def refuse(line: int, reason: str) -> StockError:
-        return stock.error("program.file", toml(rough.file), f"{program.place(line)}: {reason}")
+    def refusal(reason: str, line: int = 0) -> StockError:
+        where = f"{program.place(line)}: " if line else ""
+        return stock.error("program.file", toml(rough.file), f"{where}{reason}")
 
     tools = sorted({tool for _, tool, _ in program.core.functions if tool > 0})
     if len(tools) > 1:
         names = ", ".join(f"T{tool}" for tool in tools)
-        raise stock.error(
-            "program.file", toml(rough.file), f"uses the tools {names}: must use one, as program.tool says"
-        )
+        raise refusal(f"uses the tools {names}: must use one, as program.tool says")
     systems = {(region.exit.coordinate_system, region.exit.coordinate_number) for region in program.regions}
     if len(systems) > 1:
         names = ", ".join(f"G{system}" for system, _ in sorted(systems))
-        raise stock.error("program.file", toml(rough.file), f"cuts in the work coordinates {names}: must cut in one")
+        raise refusal(f"cuts in the work coordinates {names}: must cut in one")
     paths, moves = [], program.core.other_moves
     for kind, index, line in program.core.steps:
         if kind == _core.StepKind.region:
             region = program.regions[index]
             if region.incremental:
-                raise refuse(line, "the place of these moves is not known")
+                raise refusal("the position of these moves is not known", line)
             paths.append(region.path)
         elif kind == _core.StepKind.move:
             segment, dwell_s = moves[index]
@@ -473,7 +472,7 @@ def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
     for path in paths:
         for index in range(len(path)):
             if path[index].kind == _core.SegmentKind.arc and path[index].normal != 2:
-                raise refuse(path[index].line_number, "an arc that is not in the XY plane (G17)")
+                raise refusal("an arc that is not in the XY plane (G17)", path[index].line_number)
     if not program.regions:
-        raise stock.error("program.file", toml(rough.file), "holds no cutting moves")
+        raise refusal("holds no cutting moves")
     return paths

@@ -76,11 +76,7 @@ def materials() -> dict[str, WorkMaterial]:
 
 
 class Cutting(TomlTable):
-    """The cutting force: a material of the library, values of your own, or a material with some of them changed.
-
-    With the chip thickness t in mm: tangential force per length of edge k1 t + tangential_edge, radial force
-    k2 k1 t + radial_edge, where k1 = specific * t^specific_exponent and k2 = ratio * t^ratio_exponent.
-    """
+    """The cutting force: a material of the library, values of your own, or a material with some of them changed."""
 
     material: Text | None = key(
         "name in the library of materials; keys given beside it take the place of its values. Left out: "

@@ -15,7 +15,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.conversion.convert import convert
 from shapegcode.machine import Machine
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.model.machine_model import MachineModel, motion_limits
 from shapegcode.program import Program
 from shapegcode.results.figures import largest_xyz_um
@@ -36,11 +36,10 @@ _REMARK = (
     "50 us shifts the arc, and a path shifted so gives .1050 and .3544. Nothing here is tuned to the paper."
 )
 
-Agreement = Literal["agrees", "differs", "explained", "open"]
-"""Of a statement: it holds here; it does not; it does not, and why is known (a slip of the paper, other conditions);
-or the paper leaves open what it depends on."""
+Agreement = Literal["agrees", "differs", "explained"]
+"""Of a statement: it holds here; it does not; it does not, and why is known (a slip of the paper, other conditions)."""
 
-_SAID: dict[Agreement, str] = {"agrees": "yes", "differs": "NO", "explained": "explained", "open": ""}
+_AGREEMENT: dict[Agreement, str] = {"agrees": "yes", "differs": "NO", "explained": "explained"}
 
 
 @dataclass(frozen=True)
@@ -52,8 +51,7 @@ class Statement:
         what: is stated.
         published: as the paper has it, with its unit.
         ours: as it comes out here, with its unit.
-        agreement: whether both say the same: agrees, differs, explained (differs for a known reason) or open (the paper
-            leaves open what it depends on).
+        agreement: whether both are the same: agrees, differs, or explained (differs for a known reason).
         difference_percent: ours over the published figure, in % of the latter; null where it is no figure.
         note: why they differ, or under which conditions ours holds; empty: nothing to add.
     """
@@ -141,10 +139,10 @@ class PathDemo(Result):
     def answer(self) -> str:
         """How many statements of the paper agree."""
         agreements = [row.agreement for row in self.rows]
-        said = f"{self.title}: {agreements.count('agrees')} of {len(self.rows)} statements of {self.paper} agree"
-        others = {"differs": "DIFFER", "explained": "differ for a known reason", "open": "cannot be compared"}
+        first = f"{self.title}: {agreements.count('agrees')} of {len(self.rows)} statements of {self.paper} agree"
+        others = {"differs": "DIFFER", "explained": "differ for a known reason"}
         counts = [f"{agreements.count(kind)} {words}" for kind, words in others.items() if kind in agreements]
-        return ", ".join([said, *counts])
+        return ", ".join([first, *counts])
 
     @property
     def next_step(self) -> str:
@@ -159,7 +157,7 @@ class PathDemo(Result):
             Column("paper", value="published", text=True),
             Column("here", value="ours", text=True),
             Column("differs", "%", "difference_percent", digits=2),
-            Column("agrees", value=lambda row: _SAID[row.agreement], text=True),
+            Column("agrees", value=lambda row: _AGREEMENT[row.agreement], text=True),
             Column("note", text=True),
         )
         rows = [
@@ -260,7 +258,7 @@ def _condition(feed: int, reduction: int, machine: Machine) -> PathCondition:
 
 
 def statements(each: PathCondition) -> list[Statement]:
-    """What the paper says of a condition, beside the ideal command."""
+    """What the paper states of a condition, beside the ideal command."""
     name = f"{each.feed_mm_per_s} mm/s, arc −{each.reduction_percent} %"
     published, ours = each.published_orbit_error_percent, each.ideal.orbit_error_percent
     agrees = abs(ours - published) <= _ORBIT_WITHIN_PERCENT
@@ -269,7 +267,7 @@ def statements(each: PathCondition) -> list[Statement]:
         "explained" if each.reduction_percent == 1 else "agrees" if agrees else "differs",
         (ours / published - 1.0) * 100.0, _SHIFTED if each.reduction_percent == 1 else "",
     )  # fmt: skip
-    said, max_percent = _PAPER_TIME[each.reduction_percent]
+    claim, max_percent = _PAPER_TIME[each.reduction_percent]
     longer_percent = each.ideal.time_increase_percent
     longer: Agreement = "agrees" if longer_percent <= max_percent else "differs"
-    return [orbit, Statement("text", f"time: {name}", said, f"+{longer_percent:.1f} %", longer)]
+    return [orbit, Statement("text", f"time: {name}", claim, f"+{longer_percent:.1f} %", longer)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 
@@ -17,14 +16,13 @@ from shapegcode.machine import Machine
 from shapegcode.results.result import Pair
 
 _SLACK = 1e-3  # of a limit: what its own search and the rounding of a figure may be off by
-_IN_WORDS = {  # column of Load, which is the name of its limit in the core: name and unit for people
-    "peak_resultant_n": ("peak resultant", "N"),
-    "mean_resultant_n": ("mean resultant", "N"),
-    "peak_deflection_um": ("deflection", "µm"),
-    "peak_torque_nm": ("torque", "N m"),
-    "mean_power_w": ("power", "W"),
+LOADS = {  # columns of Load, named as their limits in the core: name, unit and decimals for people
+    "peak_resultant_n": ("peak resultant", "N", 1),
+    "mean_resultant_n": ("mean resultant", "N", 1),
+    "peak_deflection_um": ("deflection", "µm", 1),
+    "peak_torque_nm": ("torque", "N m", 3),
+    "mean_power_w": ("power", "W", 1),
 }
-LOADS = tuple(_IN_WORDS)  # Names of what is limited: columns of `Load`
 _COLUMNS = 400
 _ROWS = 31
 
@@ -56,7 +54,7 @@ class PathLoad(Pair[Load]):
 
 
 def region_load(
-    part: SurveyedRegion, plan: FeedPlan | None, written: _core.Path, machine: Machine, *, before: Mover, after: Mover
+    part: SurveyedRegion, plan: FeedPlan | None, written: _core.Path, *, before: Mover, after: Mover
 ) -> PathLoad | None:
     """Load along a region as programmed and as written; None where engagement or spindle speed are not known."""
     if part.track is None or part.tool is None or not part.spindle_rev_per_min > 0.0 or len(part.track) == 0:
@@ -94,7 +92,7 @@ def load_of(part: SurveyedRegion | SurveyedMove, travelled: Travelled) -> Load:
 def exceeded(tool: Tool, load: Load, machine: Machine) -> Iterator[tuple[str, str, str, float]]:
     """Column, name, unit and limit of what a load exceeds."""
     limits = limits_of(tool, machine, 0.0)
-    for column, (words, unit) in _IN_WORDS.items():
+    for column, (words, unit, _) in LOADS.items():
         limit = getattr(limits, column)
         if np.isfinite(limit) and (getattr(load, column) > limit * (1.0 + _SLACK)).any():
             yield column, words, unit, limit
@@ -113,7 +111,7 @@ class FeedTraces:
     programmed_mm_per_min: Vector  # F words of the original, (n,)
     written_mm_per_min: Vector  # the new ones, (n,)
     load: Pair[Load]  # with the original feeds and with the new ones, as the machine runs them
-    limit: Mapping[str, Vector]  # of the tool file by the name of the load (`LOADS`), (n,); inf where there is none
+    limit: Mapping[str, Vector]  # of tool and machine by the name of the load (`LOADS`), (n,); inf where there is none
 
     def __len__(self) -> int:
         """Stations."""
@@ -121,20 +119,20 @@ class FeedTraces:
 
 
 def feed_traces(
-    survey: Survey, plans: Sequence[FeedPlan | None], loads: Sequence[PathLoad | None]
+    survey: Survey, plans: Sequence[FeedPlan | None], loads: Sequence[PathLoad | None], machine: Machine
 ) -> FeedTraces | None:
     """The curves of all regions whose load is known; None: there is none."""
     parts = [
         (part, part.track, plan, load)
         for part, plan, load in zip(survey.regions, plans, loads, strict=True)
-        if part.track is not None and load is not None
+        if part.track is not None and part.tool is not None and load is not None
     ]
     if not parts:
         return None
     lengths = [np.diff(load.s_mm, prepend=0.0) for *_, load in parts]
     length = np.concatenate(lengths)
     counts = np.array([len(each) for each in lengths])
-    limits = [_limits(part) for part, *_ in parts]
+    limits = [limits_of(part.tool, machine, 0.0) for part, *_ in parts if part.tool is not None]
     programmed = [
         np.asarray(part.region.path.segment_feeds_mm_per_s * 60.0)[np.asarray(track.segment)]
         for part, track, *_ in parts
@@ -154,7 +152,7 @@ def feed_traces(
         load=Pair(
             Load.in_a_row([load.original for *_, load in parts]), Load.in_a_row([load.emitted for *_, load in parts])
         ),
-        limit={name: np.repeat([each[name] for each in limits], counts) for name in LOADS},
+        limit={name: np.repeat([getattr(each, name) for each in limits], counts) for name in LOADS},
     )
 
 
@@ -164,20 +162,6 @@ def _written(plan: FeedPlan, load: PathLoad) -> Vector:
     middles = load.s_mm - 0.5 * np.diff(load.s_mm, prepend=0.0)
     inside = np.minimum(np.searchsorted(ends, middles), len(ends) - 1)
     return np.array([stretch.feed_mm_per_min for stretch in plan.stretches])[inside]
-
-
-def _limits(part: SurveyedRegion) -> dict[str, float]:
-    assert part.tool is not None
-    limits = part.tool.limits
-    peak = limits.resultant == "peak"
-    values = {
-        "peak_resultant_n": limits.resultant_n if peak else None,
-        "mean_resultant_n": None if peak else limits.resultant_n,
-        "peak_deflection_um": limits.deflection_um,
-        "peak_torque_nm": limits.torque_nm,
-        "mean_power_w": limits.power_w,
-    }
-    return {name: math.inf if value is None else value for name, value in values.items()}
 
 
 def groups(distance_mm: Vector, most: int) -> npt.NDArray[np.intp]:

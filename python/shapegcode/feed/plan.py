@@ -25,7 +25,7 @@ _TOO_FAST = 1e-4  # relative: rounding of the travel, far below the margin
 _DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
 _AIR_MM2 = 1e-9
 _STEEPEST_AIR = 0.7  # share of the travel in XY from which on a move in air is no plunge
-_MIN_PROGRAMMED = 0.1  # of the programmed feed, where the tool file says no least chip
+_MIN_PROGRAMMED = 0.1  # of the programmed feed, where the tool file states no least chip
 _STEP = 0.005  # feeds that differ by less are one: a border for less gains nothing
 _LIMIT_NAMES = np.array(
     [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
@@ -154,7 +154,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
 
 @dataclass(frozen=True)
 class _Task:
-    """What the stretches of a region are chosen for."""
+    """Conditions under which the feed sections of a region are chosen."""
 
     path: _core.Path
     stations_mm: Vector
@@ -196,12 +196,12 @@ def _limits_along(
             f"controller.minimum_feed_mm_per_min = {least:g}"
         )
     fastest = min(axes.x.max_feed_mm_per_min, axes.y.max_feed_mm_per_min, most or math.inf)
-    # Without a largest chip nobody said that more than the programmed feed is wanted in material.
+    # Without a largest chip no more than the programmed feed is wanted in material.
     raised = tool.limits.feed_per_tooth_max_mm is not None or most is not None
     ceiling = np.full(len(programmed), fastest) if raised else np.minimum(programmed, fastest)
     force = tool.force(surveyed.spindle_rev_per_min, surveyed.sense)
     highest = max(fastest, float(ceiling.max()))
-    # Searched to far below the least feed: what needs less than that is told apart from what just reaches it.
+    # Searched to far below the least feed: what needs less than that is distinguished from what just reaches it.
     bound, limit, _ = _core.largest_feeds(
         force, track, limits_of(tool, machine, margin), 1e-3 * float(lowest.min()), highest
     )
@@ -222,7 +222,7 @@ def _limits_along(
     feeds[1:], holds[1:] = feeds[before], holds[before]
     load[1:] = np.where(passed, np.minimum(load[1:], load[:-1]), load[1:])
     if tool.feed.air_feed_mm_per_min is not None:
-        level = np.asarray(track.horizontal) > _STEEPEST_AIR  # nobody wants a tool to come down faster than he said
+        level = np.asarray(track.horizontal) > _STEEPEST_AIR  # a tool must not come down faster than programmed
         certain = air if surveyed.clear is None else air & surveyed.clear
         near = _near_material(np.asarray(track.s_mm), certain, tool.feed.approach_mm)
         clear = certain & (holds == AIR) & level & ~near

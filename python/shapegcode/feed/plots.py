@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode._core import Region
-from shapegcode.feed.load import FeedTraces, envelope, groups
+from shapegcode.feed.load import LOADS, FeedTraces, envelope, groups
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.results import plot
 from shapegcode.results.page.scene import Scene, Variant
@@ -35,13 +35,6 @@ _AIR_MM2 = 1e-9
 _STACKED = 1.9  # width over height of the part from which on the two paths stand below each other
 _MARGIN = 0.03  # around the part, of its longer side
 _GROUND = 300  # cells of the ground along the longer side
-_LOADS = (
-    ("peak_resultant_n", "resultant, peak\nin N", "N"),
-    ("mean_resultant_n", "resultant, mean of\na revolution, in N", "N"),
-    ("peak_deflection_um", "deflection of\nthe tip in µm", "µm"),
-    ("peak_torque_nm", "torque, peak\nin N m", "N m"),
-    ("mean_power_w", "power in W", "W"),
-)
 _ALWAYS = ("peak_resultant_n", "mean_resultant_n")
 _NO_WALL = "#c9c9c9"
 
@@ -88,12 +81,11 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
         ArgumentError: no cutting force is known.
     """
     traces = _traces(schedule)
-    loads = [row for row in _LOADS if row[0] in _ALWAYS or np.isfinite(traces.limit[row[0]]).any()]
-    rows = plot.grid(
-        ax, 3 + len(loads), 1, size_inch=(11.0, 1.2 + 1.55 * (3 + len(loads))), sharex=True,
+    loads = [name for name in LOADS if name in _ALWAYS or np.isfinite(traces.limit[name]).any()]
+    panels = plot.column(
+        ax, 3 + len(loads), size_inch=(11.0, 1.2 + 1.55 * (3 + len(loads))),
         title="Feed and force along the cutting path", part=_summary(schedule),
     )  # fmt: skip
-    panels = [row[0] for row in rows]
     along = _Along(traces, groups(traces.distance_mm, _BANDS))
     along.draw(panels[0], traces.radial_depth_mm, plot.COLOURS[2], "radial depth", filled=True)
     along.draw(panels[1], traces.section_mm2, plot.COLOURS[2], "section of the cut", filled=True)
@@ -104,15 +96,16 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
     along.draw(panels[2], traces.written_mm_per_min, plot.COLOURS[4], "written")
     _feed_axis(panels[2], np.concatenate([traces.programmed_mm_per_min, traces.written_mm_per_min]))
     plot.legend_above(panels[2])
-    for panel, (name, label, unit) in zip(panels[3:], loads, strict=True):
+    for panel, name in zip(panels[3:], loads, strict=True):
+        words, unit, _ = LOADS[name]
         along.draw(panel, getattr(traces.load.original, name), _BEFORE, "before")
         along.draw(panel, getattr(traces.load.emitted, name), _AFTER, "after")
         limit = traces.limit[name]
         if len(values := np.unique(limit[np.isfinite(limit)])):
-            said = f"limit {plot.number(values[0], 4)} {unit}" if len(values) == 1 else "limit"
-            along.draw(panel, np.where(np.isfinite(limit), limit, np.nan), _LIMIT, said, dashed=True)
+            label = f"limit {plot.number(values[0], 4)} {unit}" if len(values) == 1 else "limit"
+            along.draw(panel, np.where(np.isfinite(limit), limit, np.nan), _LIMIT, label, dashed=True)
         panel.set_ylim(bottom=0.0)
-        panel.set_ylabel(label)
+        panel.set_ylabel(f"{words}\nin {unit}")
         plot.legend_above(panel)
     panels[-1].set_xlabel("distance along the cutting path in mm")
     for panel in panels:
@@ -268,34 +261,23 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     walls = schedule.walls
     if walls is None:
         raise _core.ArgumentError("no wall is made whose cutting force is known: there is nothing to draw")
-    return draw_walls(
-        ax, walls.edges_mm, walls.height_mm, {"before": walls.error_um.original, "after": walls.error_um.emitted},
-        (_BEFORE, _AFTER), along="distance along the cutting path in mm",
-        title="Form error of the wall; +: material is left standing", part=_summary(schedule),
-    )  # fmt: skip
-
-
-def draw_walls(
-    ax: Axes | None, edges_mm: Vector, height_mm: Vector, maps: Mapping[str, Vector], colours: Sequence[str], *,
-    along: str, title: str, part: str,
-) -> Axes:  # fmt: skip
-    """Maps of the wall's error below each other in one scale, and in the last panel the largest of each column."""
+    maps = {"before": walls.error_um.original, "after": walls.error_um.emitted}
     everything = np.concatenate([each[np.isfinite(each)] for each in maps.values()])
     low, high = min(float(everything.min()), 0.0), max(float(everything.max()), 0.0)
     high = high if high > low else low + 1e-3
     both = _both_sides(low, high)
-    rows = plot.grid(
-        ax, len(maps) + 1, 1, size_inch=(11.0, 1.3 + 1.9 * (len(maps) + 1)), sharex=True, title=title, part=part,
+    panels = plot.column(
+        ax, 3, size_inch=(11.0, 7.0), part=_summary(schedule),
+        title="Form error of the wall; +: material is left standing",
     )  # fmt: skip
-    panels = [row[0] for row in rows]
-    step = height_mm[1] - height_mm[0]
-    levels = np.concatenate([height_mm - 0.5 * step, height_mm[-1:] + 0.5 * step])
+    step = walls.height_mm[1] - walls.height_mm[0]
+    levels = np.append(walls.height_mm - 0.5 * step, walls.height_mm[-1] + 0.5 * step)
     for panel, (name, values) in zip(panels, maps.items(), strict=False):
         panel.grid(False)
         panel.spines[["top", "right"]].set_visible(True)
         panel.set_facecolor(_NO_WALL)
         mesh = panel.pcolormesh(
-            edges_mm, levels, np.ma.masked_invalid(values.T), cmap=both, vmin=low, vmax=high, rasterized=True,
+            walls.edges_mm, levels, np.ma.masked_invalid(values.T), cmap=both, vmin=low, vmax=high, rasterized=True,
         )  # fmt: skip
         panel.set_ylim(levels[0], levels[-1])
         panel.set_ylabel("height above\nthe tip in mm")
@@ -306,15 +288,13 @@ def draw_walls(
         mesh, ax=panels[:-1], pad=0.01, label="error of the wall in µm\nred: left standing, blue: cut too far"
     )
     last = panels[-1]
-    for (name, values), colour in zip(maps.items(), colours, strict=True):
-        made = np.isfinite(values).any(axis=1)
-        largest = np.full(len(values), np.nan)
-        largest[made] = np.nanmax(np.abs(values[made]), axis=1)
-        last.stairs(largest, edges_mm, baseline=None, color=colour, linewidth=1.1, label=name)
+    for (name, values), colour in zip(maps.items(), (_BEFORE, _AFTER), strict=True):
+        largest = np.fmax.reduce(np.abs(values), axis=1)
+        last.stairs(largest, walls.edges_mm, baseline=None, color=colour, linewidth=1.1, label=name)
     last.set_ylim(bottom=0.0)
     last.margins(x=0.0)
     last.set_ylabel("largest over\nthe height in µm")
-    last.set_xlabel(along)
+    last.set_xlabel("distance along the cutting path in mm")
     plot.legend_above(last)
     return plot.aligned(panels)
 
@@ -346,14 +326,14 @@ def with_forces(scene: Scene, schedule: FeedSchedule) -> Scene:
 
 
 def _along(variant: Variant, known: Sequence[tuple[Region, Vector, Vector]]) -> Vector:
-    """Force at each kept sample: by its share of the way through its region."""
+    """Force at each kept sample, by the distance through its region."""
     force = np.zeros(len(variant.sample))
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(variant.command_mm, axis=0), axis=1))])
+    travel = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(variant.command_mm, axis=0), axis=1))])
     for region, stations_mm, values_n in known:
         rows = np.flatnonzero((variant.line >= region.first_line) & (variant.line <= region.last_line))
-        if len(rows) < 2 or not len(stations_mm) or way[rows[-1]] <= way[rows[0]]:
+        if len(rows) < 2 or not len(stations_mm) or travel[rows[-1]] <= travel[rows[0]]:
             continue
-        # The thinned way is a little shorter than the path: both are taken from their beginning to their end.
-        share = (way[rows] - way[rows[0]]) / (way[rows[-1]] - way[rows[0]])
-        force[rows] = np.interp(share * stations_mm[-1], stations_mm, values_n)
+        # The thinned travel is a little shorter than the path: both are taken from their beginning to their end.
+        ratio = (travel[rows] - travel[rows[0]]) / (travel[rows[-1]] - travel[rows[0]])
+        force[rows] = np.interp(ratio * stations_mm[-1], stations_mm, values_n)
     return force

@@ -8,10 +8,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from shapegcode.feed.load import FeedTraces, PathLoad, WallMaps, feed_traces, wall_maps
+from shapegcode.feed.load import LOADS, FeedTraces, PathLoad, WallMaps, feed_traces, wall_maps
 from shapegcode.feed.plan import FeedPlan
 from shapegcode.feed.survey import Survey
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.json import hidden
 from shapegcode.results.page.model import Figure, Page
@@ -19,13 +19,6 @@ from shapegcode.results.page.scene import Scene
 from shapegcode.results.result import Pair, Plot, Result
 from shapegcode.results.table import Column, Table
 
-_PEAKS = (
-    ("peak_resultant_n", "resultant, peak", "N", 1),
-    ("mean_resultant_n", "resultant, mean of a revolution", "N", 1),
-    ("peak_deflection_um", "deflection of the tip, peak", "µm", 1),
-    ("peak_torque_nm", "torque, peak", "N m", 3),
-    ("mean_power_w", "power, mean of a revolution", "W", 1),
-)
 _SHOWN_RANGES = 24
 _SHOWN_MISSES = 3
 _LIMIT_WORDS = {
@@ -250,7 +243,8 @@ class FeedSchedule(Result):
     @cached_property
     def traces(self) -> FeedTraces | None:
         """The curves along the cutting path; None where no force is known."""
-        return feed_traces(self.survey, self.plans, self.loads)
+        assert self.simulated is not None
+        return feed_traces(self.survey, self.plans, self.loads, self.simulated.machine)
 
     @cached_property
     def walls(self) -> WallMaps | None:
@@ -300,10 +294,10 @@ class FeedSchedule(Result):
             place = pair.place.rpartition(":")[2] if isinstance(pair, PeakLoad) else ""
             rows.append((name, f"{pair.original:.{digits}f}", f"{pair.emitted:.{digits}f}", unit, place))
 
-        for key, name, unit, digits in _PEAKS:
+        for key, (name, unit, digits) in LOADS.items():
             row(name, getattr(self.peak, key), digits, unit)
         force = self.resultant_force_n
-        row("resultant, mean of the time in material", Pair(force.original.mean, force.emitted.mean), 1, "N")
+        row("mean resultant over the time in material", Pair(force.original.mean, force.emitted.mean), 1, "N")
         row("cycle time", self.cycle_time_s, 2, "s")
         row("of it cutting moves in air", self.air_time_s, 2, "s")
         row("cutting blocks", self.blocks, 0, "")
@@ -315,7 +309,7 @@ class FeedSchedule(Result):
             Column("line", value=lambda row: row[4]),
         )
         title = f"{self.program} on {self.machine}, tool {', '.join(self.tools) or '-'}"
-        return Table(title, columns, rows, sections=(len(_PEAKS) + 1,))
+        return Table(title, columns, rows, sections=(len(LOADS) + 1,))
 
     def _limit_table(self) -> Table:
         """The ranges of lines with the lowest feeds, in order."""

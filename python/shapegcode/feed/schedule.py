@@ -32,7 +32,7 @@ from shapegcode.feed.result import (
 from shapegcode.feed.survey import COMMENT, Survey, SurveyedMove, SurveyedRegion, survey
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.program.compensation import program_for_conversion
 from shapegcode.results.result import Pair
@@ -83,11 +83,7 @@ def schedule_feed(
     """
     machine = Machine.of(machine)
     program = program_for_conversion(program, machine)
-    if program.stamp is not None:
-        raise _core.ProgramError(
-            f"{program.source}:1:1: shaped by shapegcode already (its header says so), and other feeds would undo it: "
-            "take the original; convert --feed-schedule does both"
-        )
+    program.refuse_shaped("other feeds would undo that; take the original, convert --feed-schedule does both")
 
     def swept(done: int, total: int) -> None:
         on_progress(_SWEEPING * done / max(total, 1))
@@ -115,12 +111,12 @@ def schedule_survey(
     own = motion or ordinary
     total = max(len(surveyed.regions), 1)
     plans = _plan_all(surveyed, machine, own, margin, lambda done: on_progress(_PLANNING * done / total))
-    text, places, blocks = _write(program, plans, machine)
-    written = _read_back(text, program, places, machine)
+    text, first_lines, blocks = _write(program, plans, machine)
+    written = _read_back(text, program, first_lines, machine)
     loads: list[PathLoad | None] = []
     for index, (plan, part) in enumerate(zip(plans, surveyed.regions, strict=True)):
         path = written.regions[index].path
-        loads.append(region_load(part, plan, path, machine, before=ordinary, after=own))
+        loads.append(region_load(part, plan, path, before=ordinary, after=own))
         on_progress(_PLANNING + (1.0 - _PLANNING) * (index + 1) / total)
     return feed_figures(
         surveyed, plans, loads, machine, margin=margin, text=text, written=written,
@@ -177,13 +173,13 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
     """The text, per region its first line there, and the number of cutting blocks."""
     core = program.core
     parts: list[bytes] = []
-    places: list[int] = []
+    first_lines: list[int] = []
     line, position, blocks = 1, 0, 0
     modal_feed = 0.0  # where it is not that of the original
     for index, (region, plan) in enumerate(zip(program.regions, plans, strict=True)):
         between = core.slice(position, region.text_begin)
         line += between.count(b"\n")
-        places.append(line)
+        first_lines.append(line)
         text = core.slice(region.text_begin, region.text_end)
         if plan is None:
             blocks += region.blocks
@@ -199,7 +195,7 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
         line += text.count(b"\n")
         position = region.text_end
     parts.append(core.slice(position, core.size))
-    return b"".join(parts), places, blocks
+    return b"".join(parts), first_lines, blocks
 
 
 def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index: int) -> bool:
@@ -211,7 +207,7 @@ def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index
     return here.exit.units == following.entry.units and not _NEEDS_FEED.search(between.upper())
 
 
-def _read_back(text: bytes, program: Program, places: Sequence[int], machine: Machine) -> Program:
+def _read_back(text: bytes, program: Program, first_lines: Sequence[int], machine: Machine) -> Program:
     """The written text as a program; its regions must be those of the original, by place, length and end."""
     try:
         emitted = Program.from_text(text, machine, source="the written program", emitted=True)
@@ -219,7 +215,7 @@ def _read_back(text: bytes, program: Program, places: Sequence[int], machine: Ma
         raise RoundTripError(f"the written program cannot be read: {error}") from error
     if len(emitted.regions) != len(program.regions):
         raise RoundTripError(f"{len(program.regions)} regions were read, {len(emitted.regions)} were written")
-    for before, after, line in zip(program.regions, emitted.regions, places, strict=True):
+    for before, after, line in zip(program.regions, emitted.regions, first_lines, strict=True):
         increment = least_increment_mm(machine, before.exit.units)
         off = max(abs(float(d)) for d in before.path[-1].end_mm - after.path[-1].end_mm)
         longer = abs(before.path.length_mm - after.path.length_mm)
@@ -292,7 +288,7 @@ def _region(part: SurveyedRegion, plan: FeedPlan | None, load: PathLoad | None, 
     track = part.track
     misses = [words for words, _ in _misses(part, plan, load, machine)]
     if load is None and track is not None and track.section_mm2.any():
-        misses = [f"its force is not known: {part.kept or 'nothing is said of it'}"]
+        misses = [f"its force is not known: {part.kept or 'no reason is known'}"]
     removed = None
     if track is not None and len(track) > 0:
         removed = float((np.diff(np.concatenate(([0.0], track.s_mm))) * track.section_mm2).sum())
@@ -326,8 +322,8 @@ def _misses(
             cause = ", where the feed stays as it was: lower it yourself"
         elif plan.holds[worst] == MINIMUM:
             cause = ", at the least feed"
-        said = f"{words} {float(values[worst]):.4g} {unit} in line {line}, limit {limit:.4g} {unit}{cause}"
-        yield said, float(values[helped].max(initial=0.0)) / limit - 1.0
+        message = f"{words} {float(values[worst]):.4g} {unit} in line {line}, limit {limit:.4g} {unit}{cause}"
+        yield message, float(values[helped].max(initial=0.0)) / limit - 1.0
 
 
 # --- loads ------------------------------------------------------------------------------------------------------------
@@ -419,7 +415,7 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[HeldLines]:
 
 
 def _feeds_of_segments(plan: FeedPlan, path: _core.Path) -> list[list[float]]:
-    """The feeds that stand in each segment."""
+    """The programmed feeds of each segment."""
     ends = np.array([stretch.end_mm for stretch in plan.stretches])
     feeds = [stretch.feed_mm_per_min for stretch in plan.stretches]
     borders = np.concatenate(([0.0], path.segment_ends_mm))
@@ -469,15 +465,15 @@ def _kept_blocks(place: Callable[[int], str], part: SurveyedRegion, plan: FeedPl
 
 
 def _shortened(warnings: Iterable[str], source: str) -> list[str]:
-    """Each warning once; of many that say the same of different lines the first few, and how many more there are."""
+    """Each warning once; of many of one reason in different lines the first few, and how many more there are."""
     shown: list[str] = []
     seen: Counter[str] = Counter()
     for warning in dict.fromkeys(warnings):
-        said = warning.rpartition(": ")[2]
-        seen[said] += 1
-        if seen[said] <= _SHOWN_ALIKE:
+        reason = warning.rpartition(": ")[2]
+        seen[reason] += 1
+        if seen[reason] <= _SHOWN_ALIKE:
             shown.append(warning)
     shown += [
-        f"{source}: {number - _SHOWN_ALIKE} more: {said}" for said, number in seen.items() if number > _SHOWN_ALIKE
+        f"{source}: {number - _SHOWN_ALIKE} more: {reason}" for reason, number in seen.items() if number > _SHOWN_ALIKE
     ]
     return shown

@@ -1,4 +1,4 @@
-"""What the tool meets on its way through a program: the stock is swept move by move, in the order of the program."""
+"""What the tool meets along a program: the stock is swept move by move, in the order of the program."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Survey:
         regions: its regions in order.
         moves: cutting moves outside of them that meet material.
         material: what is left.
-        warnings: what was noticed on the way, each with its place.
+        warnings: what was noticed, each with its place.
     """
 
     program: Program
@@ -59,7 +59,7 @@ def survey(
     resolution_mm: float | None = None,
     on_progress: Progress = lambda _done, _total: None,
 ) -> Survey:
-    """What the tool meets on its way through a program.
+    """Compute the tool engagement along a program.
 
     Args:
         program: what to sweep, or its file.
@@ -74,7 +74,7 @@ def survey(
 
     Raises:
         ProgramError: the program cannot be read.
-        ArgumentError: no tool, tools that cannot be told apart, no cutting move, or a grid that does not fit into
+        ArgumentError: no tool, tools that cannot be distinguished, no cutting move, or a grid that does not fit into
             memory.
         StockError: the stock does not suit the program.
     """
@@ -98,7 +98,7 @@ def survey(
         else:
             regions.append(walk.sweep_region(material, index))
         on_progress(done + 1, total)
-    walk.tell_collisions()  # first of all, as nothing else is right if they are
+    walk.warn_of_collisions()  # first of all, as nothing else is right if they are
     known = [region.track for region in regions if region.track is not None]
     if known and not any(track.section_mm2.any() for track in known):
         walk.warnings.append(
@@ -161,7 +161,7 @@ class SurveyedMove:
 
 
 def why_not_swept(region: _core.Region, zero: ZeroPoints) -> str:
-    """Why what the tool meets on a region cannot be told; empty if it can."""
+    """Why what the tool meets on a region is not known; empty if it is."""
     if elsewhere := zero.why_elsewhere(region.first_line):
         return elsewhere
     if region.incremental:
@@ -265,8 +265,8 @@ class Walk:
         if not cutters or any(cutter is not None for cutter in cutters):
             return ""
         used = sorted({tool for _, tool, _ in self._functions if tool > 0})
-        said = f"the program uses {', '.join(f'T{n}' for n in used)}" if used else "the program names no tool"
-        return f": {said}, the tool files describe {', '.join(f'T{n}' for n in sorted(self._tools))}"
+        used_tools = f"the program uses {', '.join(f'T{n}' for n in used)}" if used else "the program names no tool"
+        return f": {used_tools}, the tool files describe {', '.join(f'T{n}' for n in sorted(self._tools))}"
 
     def cuts_elsewhere(self) -> list[_core.Path]:
         """Cutting moves outside of the regions, each as a path."""
@@ -300,14 +300,14 @@ class Walk:
             place = self._program.place(line)
             self.moves.append(SurveyedMove(place, tool, track, feed, speed, tool.sense(self._sense)))
 
-    def tell_collisions(self) -> None:
+    def warn_of_collisions(self) -> None:
         """A warning for each place at which a rapid runs into material; of many the first ones."""
         places = list(dict.fromkeys(self._collisions))
         why = "rapid into material: is Z 0 of the stock file that of the program?"
-        told = [f"{place}: {why}" for place in places[:_SHOWN_COLLISIONS]]
+        messages = [f"{place}: {why}" for place in places[:_SHOWN_COLLISIONS]]
         if len(places) > _SHOWN_COLLISIONS:
-            told.append(f"{self._program.source}: {len(places) - _SHOWN_COLLISIONS} more rapids into material")
-        self.warnings[:0] = told
+            messages.append(f"{self._program.source}: {len(places) - _SHOWN_COLLISIONS} more rapids into material")
+        self.warnings[:0] = messages
 
     def _look_at_depth(self, region: _core.Region, tool: Tool, track: _core.EngagementTrack) -> None:
         """Say where the tool cuts above its flutes."""

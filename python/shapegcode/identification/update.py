@@ -28,10 +28,12 @@ from shapegcode.settings.edit import (
     own_end,
     parse_exactly,
     take_tail,
+    with_origin_table,
+    with_remarks,
 )
 from shapegcode.settings.keys import toml
 from shapegcode.settings.load import read_text
-from shapegcode.settings.remarks import remarks_of, with_origin_table, with_remarks
+from shapegcode.settings.remarks import remarks_of
 
 
 @dataclass(frozen=True)

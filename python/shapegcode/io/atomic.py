@@ -18,7 +18,7 @@ _LONGEST_NAME = 200  # of a file, so that more has room behind it
 
 
 def write_in_passing() -> None:
-    """From now on, what this process writes need not outlast a power cut: somebody reads it at once and keeps it."""
+    """Do without fsync in this process from now on: its files are read at once and kept by another process."""
     global _passing  # noqa: PLW0603 - of the whole process, which has no other use
     _passing = True
 

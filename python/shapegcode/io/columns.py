@@ -1,4 +1,4 @@
-"""What the label of a column or channel says: its unit, and by the names of the kind of file, what it measures.
+"""Read the label of a column or channel: its unit and, by the names of the kind of file, what it measures.
 
 `read_label` divides every label in the same way: ``Acc_X [m/s^2]``, ``time_ms``, ``Kraft / N``, or a name with its unit
 in the row below. What the names mean differs: ``x`` is an acceleration along X in a tap file, a position in a record of
@@ -99,7 +99,7 @@ def _split_unit(text: str, names: Names) -> tuple[str, Unit | None, str]:
 
 
 def _is_in(text: str) -> bool:
-    """Whether it is "in": inches behind a way, else a word."""
+    """Whether it is "in": inches behind a length, else a word."""
     return text.strip().lower() == "in"
 
 

@@ -25,8 +25,8 @@ class EdgeAxis:
 
     Attributes:
         number: behind the bar of its signals: 3 of "DES_POS|3".
-        name: as the header labels it, such as "X1"; the number where it has no label. A label is what the recorder was
-            told, not what the control calls the axis.
+        name: as the header labels it, such as "X1"; the number where it has no label. A label is set in the
+            recorder: it is not what the control calls the axis.
         signals: what was recorded of it, such as "DES_POS".
     """
 
@@ -231,9 +231,9 @@ class EdgeCapture:
             steps = np.diff(reference[stretch], prepend=reference[stretch][:1])
             turns = np.where(np.abs(steps) > TURN_DEG / 2.0, np.round(steps / TURN_DEG), 0.0)
             # Without the turns the axis goes on as before: else the coordinates were changed.
-            rest = steps - TURN_DEG * turns
-            before = np.concatenate([rest[:1], rest[:-1]])
-            turns[~(np.abs(rest - before) < _EVEN_DEG)] = 0.0
+            beyond = steps - TURN_DEG * turns
+            before = np.concatenate([beyond[:1], beyond[:-1]])
+            turns[~(np.abs(beyond - before) < _EVEN_DEG)] = 0.0
             out[stretch] -= TURN_DEG * np.cumsum(np.nan_to_num(turns))
         return out
 
@@ -266,9 +266,9 @@ class EdgeCapture:
         Raises:
             RecordError: the file does not have its position.
         """
-        place = self.position(axis, actual=actual)
-        out = np.full(len(place), np.nan)
+        position_of = self.position(axis, actual=actual)
+        out = np.full(len(position_of), np.nan)
         for stretch in self.stretches:
             if stretch.stop - stretch.start > 1:
-                out[stretch] = np.gradient(place[stretch], self.cycle_s)
+                out[stretch] = np.gradient(position_of[stretch], self.cycle_s)
         return out

@@ -42,7 +42,7 @@ class Rows:
 def read_rows(source: str, addresses: tuple[str, ...], files: Iterable[tuple[str, list[Any]]]) -> Rows:
     """Join the rows of all entries "HFData"."""
     pieces: list[FloatArray] = []
-    places: list[str] = []  # of each piece, for messages
+    sources: list[str] = []  # of each piece, for messages
     for name, payload in files:
         for index, entry in enumerate(payload):
             if "HFData" not in entry:
@@ -51,17 +51,17 @@ def read_rows(source: str, addresses: tuple[str, ...], files: Iterable[tuple[str
             piece = _numbers(where, entry["HFData"], addresses)
             if len(piece):
                 pieces.append(piece)
-                places.append(where)
+                sources.append(where)
     if sum(map(len, pieces)) < _MIN_ROWS:
         raise RecordError(f"{source}: the Payload holds {sum(map(len, pieces))} rows of HFData: at least 2 are needed")
     values = np.concatenate(pieces)
     starts = np.cumsum([0, *(len(piece) for piece in pieces)])
-    counter, kept, notes = _counters(values, addresses.index("CYCLE"), places, starts)
+    counter, kept, notes = _counters(values, addresses.index("CYCLE"), sources, starts)
     columns: dict[str, FloatArray] = {}
-    for place, address in enumerate(addresses):
+    for rank, address in enumerate(addresses):
         if address == "CYCLE":
             continue
-        columns[address] = column = np.ascontiguousarray(values[kept, place])
+        columns[address] = column = np.ascontiguousarray(values[kept, rank])
         missing = np.flatnonzero(np.isnan(column))
         if missing.size:
             rest = (
@@ -85,30 +85,30 @@ def _numbers(where: str, rows: Any, addresses: tuple[str, ...]) -> FloatArray:
                 "value of each"
             )
         if not set(map(type, row)) <= _NUMBERS:
-            place = next(at for at, value in enumerate(row) if type(value) not in _NUMBERS)
-            raise RecordError(f"{where}[{index}]: {addresses[place]} = {row[place]!r}: must be a number")
+            rank = next(at for at, value in enumerate(row) if type(value) not in _NUMBERS)
+            raise RecordError(f"{where}[{index}]: {addresses[rank]} = {row[rank]!r}: must be a number")
     try:
         values: FloatArray = np.array(rows, dtype=np.float64).reshape(len(rows), len(addresses))
     except OverflowError as error:
         raise RecordError(f"{where}: a number is too large: {error}") from error
     wild = np.argwhere(np.abs(values) > _MAX_VALUE)
     if len(wild):
-        at, place = wild[0]
+        at, rank = wild[0]
         raise RecordError(
-            f"{where}[{at}]: {addresses[place]} = {values[at, place]:g}: must be finite and at most {_MAX_VALUE:g}"
+            f"{where}[{at}]: {addresses[rank]} = {values[at, rank]:g}: must be finite and at most {_MAX_VALUE:g}"
         )
     return values
 
 
 def _counters(
-    values: FloatArray, place: int, places: list[str], starts: npt.NDArray[np.int64]
+    values: FloatArray, rank: int, sources: list[str], starts: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_], list[str]]:
     """Counter of each row that is kept, which rows these are, and notes."""
-    raw = values[:, place]
+    raw = values[:, rank]
 
     def at(row: int) -> str:
         piece = int(np.searchsorted(starts, row, side="right")) - 1
-        return f"{places[piece]}[{row - starts[piece]}]"
+        return f"{sources[piece]}[{row - starts[piece]}]"
 
     bad = np.flatnonzero(~((raw >= 0) & (raw < COUNTER_RANGE) & (raw == np.floor(raw))))
     if bad.size:
@@ -129,9 +129,9 @@ def _counters(
     back = np.flatnonzero((np.diff(counter) <= 0) & kept[1:])
     if back.size:
         row = int(back[0]) + 1
-        said = "other values under the same counter" if counter[row] == counter[row - 1] else "the counter goes back"
+        fault = "other values under the same counter" if counter[row] == counter[row - 1] else "the counter goes back"
         raise RecordError(
-            f"{at(row)}: CYCLE = {raw[row]:.0f} behind {raw[row - 1]:.0f}: {said}; it must rise from row to row"
+            f"{at(row)}: CYCLE = {raw[row]:.0f} behind {raw[row - 1]:.0f}: {fault}; it must rise from row to row"
         )
     return counter[kept], kept, notes
 
@@ -378,9 +378,9 @@ class _Part:
                     return found
             rows = entry.get("HFData")
             if isinstance(rows, list) and rows and isinstance(rows[0], list) and "CYCLE" in self.addresses:
-                place = self.addresses.index("CYCLE")
-                if place < len(rows[0]) and isinstance(rows[0][place], int | float):
-                    return float(rows[0][place])
+                rank = self.addresses.index("CYCLE")
+                if rank < len(rows[0]) and isinstance(rows[0][rank], int | float):
+                    return float(rows[0][rank])
         return math.inf
 
     def _version(self, header: dict[str, Any]) -> str:
@@ -409,7 +409,7 @@ class _Part:
             if not isinstance(address, str) or not address.strip():
                 raise RecordError(f"{key}[{index}] has no Address: needed is for example 'DES_POS|1'")
             if address in dict(found):
-                raise RecordError(f"{key}[{index}]: {address} is listed twice: which one holds cannot be told")
+                raise RecordError(f"{key}[{index}]: {address} is listed twice: which one holds is not known")
             found.append((address.strip(), str(each.get("Axis") or "")))
         if "CYCLE" not in dict(found):
             raise RecordError(

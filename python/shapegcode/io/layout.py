@@ -59,7 +59,7 @@ def head_of(path: Path) -> bytes:
 
 _TEXT_BYTES = frozenset(range(32, 256)) | {9, 10, 12, 13}
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-#: Behind a point for thousands stand three digits; the comma behind the last of them tells it from a decimal point.
+#: Behind a point for thousands stand three digits; the comma behind them makes it no decimal point.
 _THOUSANDS = r"\d{1,3}(?:\.\d{3})+(?=,\d)"
 _COMMA_NUMBER = re.compile(
     rf"[+-]?({_THOUSANDS},\d+|\d+(,\d+)?|,\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE
@@ -82,8 +82,8 @@ def refuse_binary(path: Path, head: bytes, needed: str) -> None:
     """Refuse a file that is no text."""
     strange = sorted(set(head) - _TEXT_BYTES)
     if strange:
-        place = head.index(bytes([strange[0]]))
-        raise RecordError(f"{path}: a binary file (byte 0x{strange[0]:02x} at {place}); needed is {needed}")
+        position = head.index(bytes([strange[0]]))
+        raise RecordError(f"{path}: a binary file (byte 0x{strange[0]:02x} at {position}); needed is {needed}")
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:

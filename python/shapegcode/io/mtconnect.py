@@ -175,9 +175,9 @@ class _Document:
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         name = tag.rpartition("}")[2]
         if not self._open and name != "MTConnectStreams":
-            said = {"MTConnectDevices": "the answer to `probe`", "MTConnectError": "an error of the agent"}
+            kinds = {"MTConnectDevices": "the answer to `probe`", "MTConnectError": "an error of the agent"}
             raise RecordError(
-                f"{self._path}:{self._here}: <{name}>{', ' + said[name] if name in said else ''}: needed is "
+                f"{self._path}:{self._here}: <{name}>{', ' + kinds[name] if name in kinds else ''}: needed is "
                 "MTConnectStreams, the answer to `sample`"
             )
         depth = len(self._open)

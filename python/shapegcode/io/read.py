@@ -93,7 +93,7 @@ def _channels(path: Path) -> tuple[int, FloatArray, bool]:
     if data.ndim == 1:
         data = data[:, np.newaxis]
     if data.dtype.kind == "f":
-        with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one, and is told of as such
+        with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one, and is reported as such
             return rate, data.astype(np.float64), False
     if data.dtype == np.uint8:
         raise RecordError(

@@ -148,7 +148,7 @@ class Track:
         self.texts.append(text.decode("utf-8", errors="replace").strip())
 
     def drop_until(self, end: float) -> None:
-        """Drop values up to a time; the last of them stays, since it may hold on."""
+        """Drop values up to a time but for the last one, which may still hold."""
         if not self.times:
             return
         self.ever = True
@@ -162,7 +162,7 @@ class Track:
             self.texts = self.texts[keep:]
 
     def forget_times(self) -> None:
-        """The clock was set: only the last value stays, as one of long ago."""
+        """Forget all times but the last value, after the recorder's clock was set."""
         self.drop_until(self.last_time)
         if self.times:
             self.times[0] = -math.inf
@@ -349,7 +349,7 @@ def _program(part: RunPart, tracks: Sequence[Track], notes: FileNotes) -> str | 
         if name is not None:
             for time, text in pairs:
                 if time > _NAME_S and text != name:
-                    said = f"{item.name} is {text} from {time:.2f} s on: a called program, or another one"
-                    notes.add("program", 0, said)
+                    note = f"{item.name} is {text} from {time:.2f} s on: a called program, or another one"
+                    notes.add("program", 0, note)
             return name
     return None

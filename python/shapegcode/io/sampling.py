@@ -14,7 +14,7 @@ from shapegcode.io.record import FloatArray
 _OFF_GRID = 0.49
 #: A step from one instant to the next may differ from the period by this share; a missing sample doubles it.
 _OFF_STEP = 0.9
-#: Off the grid by more than this share of a period, the user is told.
+#: Off the grid by more than this share of a period, the user gets a warning.
 _TELL = 0.1
 #: A stated rate and the instants may differ by this share: clocks are better by far, wrong units are worse by far.
 STATED_RATE_TOLERANCE = 0.01
@@ -71,7 +71,7 @@ def even_period(
                 row + 1,
                 f"{steps[row]:.6g} s between {times_s[row]:.9g} s and {times_s[row + 1]:.9g} s, usually {usual:.6g} s: "
                 f"{_GRID_ONLY}; samples are missing",
-                # An even clock whose samples got lost is no uneven one: nothing tells what was in the gap.
+                # An even clock whose samples got lost is no uneven one: nothing shows what was in the gap.
                 ascending=bool(np.median(np.abs(steps - usual)) > _UNEVEN * usual),
             )
     grid = times_s[0] + period * np.arange(count)
@@ -112,7 +112,7 @@ def _digit_of(times_s: FloatArray) -> float:
     return 0.0
 
 
-#: The grid has this share of the samples: the rest of them is what noise and gaps are told by.
+#: The grid has this share of the samples: the others show noise and gaps.
 _DENSITY = 0.8
 #: The longest step may be so many mean ones: a longer one leaves less than a third of the band.
 _LONGEST_STEP = 3.0
@@ -164,10 +164,10 @@ def even_grid(times_s: FloatArray) -> EvenGrid:
 def resample(values: FloatArray, times_s: FloatArray, grid: EvenGrid) -> FloatArray:
     """The band-limited signal that goes through the samples best, on a grid: least squares over sinc functions."""
     offset = float(np.mean(values))
-    place = (times_s - grid.times_s[0]) / grid.period_s
-    first = np.floor(place).astype(int) - _REACH + 1
+    at = (times_s - grid.times_s[0]) / grid.period_s
+    first = np.floor(at).astype(int) - _REACH + 1
     columns = first[:, None] + np.arange(2 * _REACH)
-    away = place[:, None] - columns
+    away = at[:, None] - columns
     inside = np.sqrt(np.maximum(1.0 - (away / _REACH) ** 2, 0.0))
     weights = np.sinc(away) * np.i0(_BETA * inside) / np.i0(_BETA)
     # Grid points beyond the ends belong to the signal, too.

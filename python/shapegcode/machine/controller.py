@@ -34,7 +34,7 @@ class Controller(TomlTable):
         assumed=True,
     )
     block_end: Literal["ceil", "carry"] = key(
-        '"ceil": each block starts on a tick of the interpolation; "carry": the remainder of a period is '
+        '"ceil": each block starts with an interpolation period; "carry": the remainder of a period is '
         "carried into the next block. The round trip is judged under both",
         default="ceil",
         assumed=True,
@@ -368,7 +368,7 @@ class Times(TomlTable):
         assumed=True,
     )
     feed_override_percent: Annotated[Positive, Field(le=200)] = key(
-        "override of the feed at which this shop usually runs; `time` counts with it unless it is told another",
+        "override of the feed at which this shop usually runs; `time` counts with it unless another is given",
         default=100.0,
         assumed=True,
     )
@@ -389,7 +389,7 @@ class Times(TomlTable):
         default=None,
     )
     unknown_move_s: AxisTimes = key(
-        "a rapid of an axis on a way of which the program does not tell start or end: G28, G30, G53, and the first one "
+        "a rapid of an axis of which the program does not give start or end: G28, G30, G53, and the first one "
         "behind them or behind M06. One number, or x, y, z",
         default=0.0,
         assumed=True,

@@ -71,8 +71,8 @@ class MachineDescription(Result):
         if self.program is None:
             if not count:
                 return f"{name}: every value is said"
-            said = f"{count} of {len(self.keys)} values are assumed or inherited"
-            return f"{name}: {said}; --for part.nc ranks them by what they do to your program"
+            sentence = f"{count} of {len(self.keys)} values are assumed or inherited"
+            return f"{name}: {sentence}; --for part.nc ranks them by what they do to your program"
         if not self.matters:
             return f"{name}: none of {count} unverified parameters matters for {Path(self.program).name}"
         first = self.matters[0]

@@ -31,10 +31,10 @@ class Draft:
         self.missing: list[MissingParameter] = []
         self.remarks: dict[str, str] = {}  # per dotted key, where its value comes from
 
-    def problem(self, number: int, said: str) -> None:
-        """Something that makes the dump useless; the line is that of the parameter."""
+    def problem(self, number: int, message: str) -> None:
+        """Report a parameter that makes the dump useless, with its line."""
         line = next((entry.line for (n, _), entry in self.dump.entries.items() if n == number), None)
-        self.values.problems.append(Problem(f"parameter {number}", "", said, line))
+        self.values.problems.append(Problem(f"parameter {number}", "", message, line))
 
     def miss(self, number: int | str, why: str, line: int | None = None) -> None:
         """A parameter that is not there, or that changes nothing."""
@@ -80,6 +80,13 @@ class Draft:
             path = self.dump.get(number)
             for entry in entries or ([path] if path else []):
                 self.read.append(ReadParameter(number, entry.target, entry.letter + entry.text, entry.line, key, shown))
+
+    def choose(self, key: str, number: int, bit: int, on: Value = True, off: Value = False) -> bool | None:
+        """Put one of two values into the machine by a bit of the dump; None, and nothing, where the dump has none."""
+        found = self.values.bit(number, bit)
+        if found is not None:
+            self.set(key, on if found else off, number)
+        return found
 
     def put(self, key: str, value: Any) -> Value:
         """Put a value into the tables, without a word about it; what is shown of it comes back."""

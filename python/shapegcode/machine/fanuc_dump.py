@@ -71,16 +71,22 @@ def read_table(data: bytes, file: str, tables: ControlTables) -> None:
             elif not _HARMLESS.fullmatch(words):
                 tables.left_out.append((file, line, words[:60]))
         except (ValueError, KeyError, SyntaxError, ZeroDivisionError, OverflowError) as bad:
-            said = f'"{words[:60]}": not a line of a table of offsets or variables ({bad})'
-            raise MachineError(file, (Problem("", "", said, line),)) from bad
+            message = f'"{words[:60]}": not a line of a table of offsets or variables ({bad})'
+            raise MachineError(file, (Problem("", "", message, line),)) from bad
+
+
+def _every_line(data: bytes) -> Iterator[tuple[int, str]]:
+    """Lines that are not empty, and their numbers; comments may hold the characters of any country."""
+    text = data.decode("latin-1").removeprefix("ï»¿")
+    lines = text.split("\n" if "\n" in text else "\r")
+    return ((number, words) for number, raw in enumerate(lines, start=1) if (words := raw.strip()))
 
 
 def _lines(data: bytes) -> Iterator[tuple[int, str]]:
     """Lines with words, and their numbers, up to the second %."""
-    text = data.decode("latin-1").removeprefix("ï»¿")
     seen = False
-    for number, raw in enumerate(text.split("\n" if "\n" in text else "\r"), start=1):
-        words = raw.strip().rstrip(";").strip()
+    for number, line in _every_line(data):
+        words = line.rstrip(";").strip()
         if words.startswith("%"):
             if seen:
                 return
@@ -252,13 +258,8 @@ def read_dump(data: bytes, file: str, wanted: Container[int]) -> Dump:
 
     if b"\0" in data:
         raise bad("binary data, not a parameter dump", data[: data.index(b"\0")].count(b"\n") + 1)
-    # Comments may hold the characters of any country; records are plain ASCII.
-    text = data.decode("latin-1").removeprefix("ï»¿")
     dump = Dump(file)
-    for line, raw in enumerate(text.split("\n" if "\n" in text else "\r"), start=1):
-        words = raw.strip()
-        if not words:
-            continue
+    for line, words in _every_line(data):
         if words.startswith("%"):
             if dump.records:
                 dump.complete = True

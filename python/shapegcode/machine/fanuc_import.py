@@ -112,8 +112,8 @@ def _read_tables(files: Sequence[str | Path]) -> ControlTables:
     for path in files:
         data = read_file(path, _MAX_DUMP_BYTES)
         if not is_table(data):
-            said = "no table of offsets or variables (G10L10P1R..., G10L2P1X..., G10L85P500(...), #500=...)"
-            raise MachineError(str(path), (Problem("", "", said),))
+            message = "no table of offsets or variables (G10L10P1R..., G10L2P1X..., G10L85P500(...), #500=...)"
+            raise MachineError(str(path), (Problem("", "", message),))
         read_table(data, Path(path).name, tables)
     return tables
 

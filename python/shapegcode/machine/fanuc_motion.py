@@ -120,38 +120,34 @@ def _after_interpolation(draft: Draft) -> None:
     if found is None:
         draft.miss(1622, "no time constant of cutting feed; the kind of motion cannot be known")
         return
-    time_s, bell_s, shape, note = found
     why = "no acceleration before interpolation in the dump"
     draft.set("controller.motion", "after_interpolation", 1622, note=why)
-    draft.set("controller.time_constant_s", time_s, 1622, 1610, note=note)
-    draft.set("controller.bell_time_s", bell_s, 1622, 1610, note=note)
-    draft.set("controller.after_interpolation_shape", shape, 1610, note=note)
+    _set_filter(draft, found, "time_constant_s", "bell_time_s", "after_interpolation_shape")
     lowest = draft.values.scalar(1623, unit="mm/min")
     if lowest:
         draft.miss(1623, f"lowest feed of exponential acceleration, {lowest:g} mm/min: read, but no key holds it")
 
 
 def _shaped_filter(draft: Draft) -> None:
-    """With the look-ahead off, cutting blocks pass the filter of 1622, whoever wrote them."""
+    """With the look-ahead off, all cutting blocks pass the filter of 1622."""
     found = _after_interpolation_s(draft)
     if found is None:
         if draft.get("controller.shaped_time_constant_s") is None:
             why = "no 1622: whether a filter after interpolation acts on shaped programs is not known"
             draft.assume_key("controller.shaped_time_constant_s", 0.0, why)
         return
-    time_s, bell_s, shape, note = found
-    draft.set("controller.shaped_time_constant_s", time_s, 1622, 1610, note=note)
-    draft.set("controller.shaped_bell_time_s", bell_s, 1622, 1610, note=note)
-    draft.set("controller.shaped_filter_shape", shape, 1610, note=note)
+    _set_filter(draft, found, "shaped_time_constant_s", "shaped_bell_time_s", "shaped_filter_shape")
+
+
+def _set_filter(draft: Draft, found: tuple[float, float, str, str], *names: str) -> None:
+    *values, note = found
+    for name, value in zip(names, values, strict=True):
+        draft.set(f"controller.{name}", value, *((1622, 1610) if isinstance(value, float) else (1610,)), note=note)
 
 
 def _look_ahead_at_start(draft: Draft) -> None:
-    """A control that starts every program with the look-ahead on must be told to leave it, and may not do so."""
-    on = draft.values.bit(1604, 0)
-    if on is None:
-        return
-    draft.set("verdict.look_ahead", on, 1604)
-    if on:
+    """A control that starts every program with the look-ahead on must be made to leave it, and may not do so."""
+    if draft.choose("verdict.look_ahead", 1604, 0):
         draft.set("emission.prologue", _OFF, 1604)
         draft.set("emission.epilogue", _ON, 1604)
 
@@ -197,9 +193,7 @@ def _rapids(draft: Draft, before: bool) -> None:
             note = "bell bit 1603#6 is 0; on this series " + ("1621 alone decides" if draft.dump.with_q else "off")
             bell = bell if draft.dump.with_q else 0.0
         draft.set("controller.rapid_bell_time_s", bell / 1000, number, note=note)
-    linear = values.bit(1401, 1)
-    if linear is not None:
-        draft.set("controller.rapid_path", "linear" if linear else "non_linear", 1401)
+    draft.choose("controller.rapid_path", 1401, 1, "linear", "non_linear")
 
 
 def _multiplier(code: float) -> float | None:
@@ -241,7 +235,7 @@ _KEYS = {10: "tool_length_mm", 11: "tool_length_wear_mm", 12: "tool_radius_mm", 
 
 
 def take_tables(draft: Draft, tables: ControlTables) -> None:
-    """Offsets and variables as they stood when they were punched."""
+    """Read offsets and variables as they were when the dump was punched."""
     _tools(draft, tables)
     _systems(draft, tables)
     _variables(draft, tables)

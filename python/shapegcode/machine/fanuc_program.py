@@ -1,11 +1,9 @@
-"""What a parameter dump says about programs: increments, power-on state, offsets, cycles, calls, serial line.
+"""Program settings of a parameter dump: increments, power-on state, offsets, cycles, calls, serial line.
 
 Sources of the meanings stand in docs/reference/parameters.md, with those that no text confirmed.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 from shapegcode.machine.fanuc_draft import Draft
 from shapegcode.machine.fanuc_dump import MM_PER_INCH
@@ -81,29 +79,18 @@ def _increments(draft: Draft) -> None:
 
 def _words_and_arcs(draft: Draft) -> None:
     values = draft.values
-    point = values.bit(3401, 0)
-    if point is not None:
-        draft.set("controller.calculator_decimal_point", point, 3401)
-    alarm = values.bit(3403, 5)
-    if alarm is not None:
-        draft.set("input.arc_without_centre", "alarm" if alarm else "line", 3403)
+    draft.choose("controller.calculator_decimal_point", 3401, 0)
+    draft.choose("input.arc_without_centre", 3403, 5, "alarm", "line")
     entry = draft.dump.get(3410)
     if entry and (tolerance := _length_mm(draft, 3410)):
         note = "" if "." in entry.text else "whole number: in least increments"
         draft.set("controller.arc_radius_tolerance_mm", tolerance, 3410, note=note)
     elif entry:
         draft.miss(3410, "0: taken by some series as no check; not known", entry.line)
-    choices: tuple[tuple[str, Callable[[], str]], ...] = (
-        ("motion", lambda: "G01" if values.bit(3402, 0) else "G00"),
-        ("plane", lambda: "G19" if values.bit(3402, 2) else "G18" if values.bit(3402, 1) else "G17"),
-        ("distance", lambda: "G91" if values.bit(3402, 3) else "G90"),
-    )
-    if values.bit(3402, 0) is not None:
-        for name, choose in choices:
-            draft.set(f"power_on.{name}", choose(), 3402)
-    inch = values.bit(0, 2)
-    if inch is not None:
-        draft.set("power_on.units", "G20" if inch else "G21", 0)
+    if draft.choose("power_on.motion", 3402, 0, "G01", "G00") is not None:
+        draft.choose("power_on.plane", 3402, 2, "G19", "G18" if values.bit(3402, 1) else "G17")
+        draft.choose("power_on.distance", 3402, 3, "G91", "G90")
+    draft.choose("power_on.units", 0, 2, "G20", "G21")
     codes = {n: values.scalar(n, 99_999_999) for n in range(3411, 3433)}
     given = {n: int(code) for n, code in codes.items() if code}
     if given:
@@ -120,21 +107,17 @@ def _length_mm(draft: Draft, number: int) -> float | None:
 
 
 def _cycles_and_offsets(draft: Draft) -> None:
-    values = draft.values
-    unit = values.bit(5400, 7)
-    if unit is not None:
-        draft.set("input.scale_unit", 0.001 if unit else 0.00001, 5400)
+    draft.choose("input.scale_unit", 5400, 7, 0.001, 0.00001)
     clearances = {n: _length_mm(draft, n) for n in (5114, 5115)}
     given = {n: mm for n, mm in clearances.items() if mm is not None}
     if given:
         largest = max(given.values())
         note = "" if min(given.values()) == largest else "G73 and G83 differ; the larger one counts for both"
         draft.set("input.peck_clearance_mm", largest, *given, note=note)
-    first, second = values.bit(5003, 0), values.bit(5003, 1)
-    if second:
+    if draft.values.bit(5003, 1):
         draft.miss(5003, "start-up of cutter compensation of type C: read, but not expanded so; type A or B is used")
-    elif first is not None:
-        draft.set("input.compensation_start_up", "B" if first else "A", 5003)
+    else:
+        draft.choose("input.compensation_start_up", 5003, 0, "B", "A")
 
 
 def _work_offsets(draft: Draft) -> None:
@@ -170,9 +153,7 @@ def _calls(draft: Draft) -> None:
             draft.miss(n, "a code that calls a macro in every block (negative): read, but not used")
         if any(code is not None for code in codes.values()):
             draft.set(key, {str(code): first + n - numbers[0] for n, code in given.items()}, *(given or codes))
-    call = draft.values.bit(6001, 5)
-    if call is not None:
-        draft.set("input.tool_program", 9000 if call else 0, 6001)
+    draft.choose("input.tool_program", 6001, 5, 9000, 0)
 
 
 def _serial_line(draft: Draft) -> None:

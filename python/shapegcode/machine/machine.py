@@ -2,8 +2,7 @@
 
 A machine file is TOML. :class:`Machine` is its model; it and its tables, one file each, are the only place that holds
 defaults for it: every other module takes the values from here. Each key carries its unit, its meaning and, where the
-number is not known for real machines, the remark *assumed*; :func:`key_documentation` turns that into
-``docs/reference/machine.md``.
+number is not known for real machines, the remark *assumed*, of which ``docs/reference/machine.md`` is made.
 """
 
 from __future__ import annotations
@@ -21,12 +20,18 @@ from shapegcode._core import Mode
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine.axes import Axes
 from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Times
-from shapegcode.machine.input import Input
-from shapegcode.machine.output import Emission, Price, Shaping, Tolerance, Verdict
-from shapegcode.settings import edit
-from shapegcode.settings.describe import documentation, values_of, write_toml
-from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml
-from shapegcode.settings.load import MAX_PROBLEMS, KeyProblem, further_problems, line_of, parsed, read_text, validated
+from shapegcode.machine.programs import Emission, Input, Price, Shaping, Tolerance, Verdict
+from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml, values_of
+from shapegcode.settings.load import (
+    MAX_PROBLEMS,
+    KeyProblem,
+    further_problems,
+    line_of,
+    parsed,
+    read_text,
+    validated,
+    with_values,
+)
 from shapegcode.settings.remarks import (
     DEFAULT,
     ORIGIN_TEXT,
@@ -35,7 +40,6 @@ from shapegcode.settings.remarks import (
     remark_of,
     remarks_in_comments,
     take_origins,
-    with_remarks,
 )
 
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
@@ -170,13 +174,13 @@ class Machine(TomlTable):
 
     @property
     def bears_override(self) -> bool:
-        """Whether shaped text is made for a dial that is turned: asked for, or its positions stated in the verdict."""
+        """Whether emitted blocks are override-tolerant: asked for, or overrides stated in the verdict."""
         stated = self.verdict.override_percent != (100.0, 100.0)
         return self.emission.override == "any" or (self.emission.override == "ask" and stated)
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Feed overrides in steps of a dial for which text is made that bears one: the stated band, or 70 to 120 %."""
+        """Feed overrides, by 10 %, for which override-tolerant blocks are made: the stated band, or 70 to 120 %."""
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT
@@ -308,17 +312,17 @@ class Machine(TomlTable):
         machine = validated(cls, plain, source, text, MachineError)
         if stated is None:
             machine._remarks = remarks_in_comments(text)
-            machine._origins_in_comments = any(origin_of(said) != "file" for said in machine._remarks.values())
+            machine._origins_in_comments = any(origin_of(origin) != "file" for origin in machine._remarks.values())
             return machine
         keys = {value.key: value.value for value in machine.values()}
-        wrong = [(key, said, limit) for key, said in stated.items() if (limit := _wrong_origin(key, said, keys))]
+        wrong = [(key, origin, limit) for key, origin in stated.items() if (limit := _wrong_origin(key, origin, keys))]
         if wrong:
             problems = (
-                Problem(f"origin.{key}", toml(said), limit, line_of(f"origin.{key}", text) or line_of(key, text))
-                for key, said, limit in wrong[:MAX_PROBLEMS]
+                Problem(f"origin.{key}", toml(origin), limit, line_of(f"origin.{key}", text) or line_of(key, text))
+                for key, origin, limit in wrong[:MAX_PROBLEMS]
             )
             raise MachineError(source, (*problems, *further_problems(len(wrong))))
-        machine._remarks = {key: remark_of(said) for key, said in stated.items()}
+        machine._remarks = {key: remark_of(origin) for key, origin in stated.items()}
         return machine
 
     @staticmethod
@@ -361,6 +365,8 @@ class Machine(TomlTable):
         Raises:
             KeyError: a remark for a key that does not exist.
         """
+        from shapegcode.settings.describe import write_toml
+
         if short:
             held = {value.key: value.remark for value in self.values() if value.remark}
             return write_toml(self, held | dict(remarks or {}), short=True)
@@ -388,7 +394,7 @@ class Machine(TomlTable):
             MachineError: no such key, or a value that a machine file could not have; every problem is listed.
         """
         values = {key: value} if isinstance(key, str) else key
-        changed = edit.with_values(self, values, source or self.name, MachineError)
+        changed = with_values(self, values, source or self.name, MachineError)
         below = tuple(f"{name}." for name in values)
         changed._remarks = {
             name: remark for name, remark in self._remarks.items() if name not in values and not name.startswith(below)
@@ -400,13 +406,13 @@ class Machine(TomlTable):
         return list(values_of(self, remarks=self._remarks))
 
 
-def _wrong_origin(key: str, said: object, keys: Mapping[str, str]) -> str:
+def _wrong_origin(key: str, origin: object, keys: Mapping[str, str]) -> str:
     """What an origin must be; empty: it is so."""
     if key not in keys and not any(key.startswith(f"{each}.") and keys[each].startswith("{") for each in keys):
         return "no such key of this machine (modes count from 1): take the line out"
-    if isinstance(said, str) and re.match(ORIGIN_TEXT, said):
+    if isinstance(origin, str) and re.match(ORIGIN_TEXT, origin):
         return ""
-    if isinstance(said, list):
+    if isinstance(origin, list):
         return "must be one: this value has two, in [origin] and beside it, or in two spellings of its key"
     return (
         "must be measured, parameters (of the control), inherited, assumed, choice, default or stated; a note may "
@@ -419,6 +425,8 @@ _OF_A_MACHINE = ("axes.", "controller.", "times.", "power_on.", "feed_control.")
 
 def inherited_text(name: str) -> str:
     """A built-in machine's file as the start of another one: what was measured there is inherited here."""
+    from shapegcode.settings.edit import with_remarks
+
     text = Machine.builtin_text(name)
     whose = Machine.load(name).name
 
@@ -426,11 +434,6 @@ def inherited_text(name: str) -> str:
         return inherited(whose, remark) if remark and key.startswith(_OF_A_MACHINE) else remark
 
     return with_remarks(text, remark)
-
-
-def key_documentation() -> str:
-    """The reference of the machine file's keys as Markdown: what ``docs/reference/machine.md`` holds, word for word."""
-    return documentation(Machine, Machine.builtin_names())
 
 
 def _several(modes: float | Mode | Sequence[float | Mode]) -> Sequence[float | Mode]:

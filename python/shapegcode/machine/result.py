@@ -102,7 +102,7 @@ class ParameterImport(Result):
         assumed: what is an assumption.
         missing: what the dump does not say or what was not understood.
         remarks: text behind the keys of the machine file: where each value comes from.
-        warnings: none; what is to be heeded stands under `assumed` and `missing`.
+        warnings: none; caution stands under `assumed` and `missing`.
     """
 
     dump: str

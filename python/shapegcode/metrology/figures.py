@@ -58,7 +58,7 @@ class SidedError:
 
     @classmethod
     def of(cls, stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> SidedError:
-        """Of one or several runs together, all zero without any; the figures of the core in mm."""
+        """The figures of one or several runs together; all zero without any. The core's are in mm."""
         whole = ContourError.of(stats)
         return cls(
             whole.max,
@@ -110,7 +110,7 @@ class MeasuredArc:
         response: through the table's positions, likewise.
         inside_wall: through the wall towards the centre; None where there is none.
         outside_wall: through the other wall, likewise.
-        orbit_error_percent: area between track and arc over the sector; None where it cannot be said.
+        orbit_error_percent: area between track and arc over the sector; None where it is not known.
     """
 
     nominal_radius_mm: float

@@ -21,8 +21,7 @@ from shapegcode.metrology.figures import MeasuredSection, WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
-from shapegcode.model.playable import SimulatedPrograms
-from shapegcode.model.shaped_program import shaped_warnings
+from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
 
@@ -301,16 +300,15 @@ def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArra
 
 @dataclass(frozen=True)
 class Job:
-    """A region to play, the nominal one, and its sections.
-
-    `joined_mm`: runs shorter than this are one curve, because there were too many of them; 0: as everywhere.
-    """
+    """A region to play, the nominal one, and its sections."""
 
     simulated: _core.Region
     nominal: _core.Region
     path: _core.Path
     sections: list[_core.PathSection]
-    joined_mm: float = 0.0
+    joined_mm: float = (
+        0.0  # runs shorter than this are one curve, because there were too many of them; 0: as everywhere
+    )
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:

@@ -93,8 +93,7 @@ def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int 
     """
     drawn = _drawn(measurement, region)
     title = "Deviation of the walls, positive to the left of the path"
-    rows = plot.grid(ax, 3, 1, size_inch=(9.5, 7.0), title=title, part=_part(drawn[0][1]), sharex="col")
-    left, right, width = column = [panel for (panel,) in rows]
+    left, right, width = column = plot.column(ax, 3, size_inch=(9.5, 7.0), title=title, part=_part(drawn[0][1]))
     for number, (program, each) in enumerate(drawn):
         wall = _joined(each)
         curves = (wall.left_um, wall.right_um, wall.left_um - wall.right_um)

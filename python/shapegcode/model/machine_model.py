@@ -116,19 +116,12 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class OwnFilter:
-    """The control's own filter behind the interpolation, while shaped blocks run.
+    """The control's own filter behind the interpolation, while shaped blocks run."""
 
-    Attributes:
-        shape: "linear" (moving averages) or "exponential".
-        time_constant_s: length of the moving average, or time constant; 0: none.
-        bell_time_s: length of the second moving average; 0: none.
-        duration_s: of the answer to a step.
-    """
-
-    shape: str
-    time_constant_s: float
-    bell_time_s: float
-    duration_s: float
+    shape: str  # "linear" (moving averages) or "exponential"
+    time_constant_s: float  # length of the moving average, or time constant; 0: none
+    bell_time_s: float  # length of the second moving average; 0: none
+    duration_s: float  # of the response to a step
 
     @property
     def variance_s2(self) -> float:
@@ -146,12 +139,7 @@ class OwnFilter:
 
 
 class SimulatedController:
-    """A controller that makes a motion of paths: planned by its look-ahead, or block by block.
-
-    Args:
-        model: the controller; `model.motion` says which of the two.
-        override: feed override, 1 = 100 %.
-    """
+    """A controller that makes a motion of paths: planned by its look-ahead, or block by block."""
 
     def __init__(self, model: _core.FanucModel, override: float = 1.0) -> None:
         self.model = model
@@ -198,11 +186,7 @@ class SimulatedController:
 
 
 class MachineModel:
-    """Controller, limits and plant of a machine for the core.
-
-    Args:
-        machine: what the machine file says.
-    """
+    """Controller, limits and plant of a machine for the core."""
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
@@ -403,7 +387,7 @@ class MachineModel:
         offset: Offset = NO_OFFSET,
         tracker: _core.ContourTracker | None = None,
     ) -> _core.PlaybackFigures:
-        """Emitted blocks as the look-ahead plans them anew if it is left on, against the programmed path."""
+        """Emitted blocks as the look-ahead plans them again if it is left on, against the programmed path."""
         ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
         filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
         options = self.verdict_options(filters=filters, offset=offset)
@@ -414,10 +398,3 @@ class MachineModel:
     def cycle_time_s(self, program: _core.ProgramText) -> float:
         """Time of a whole program in closed form, s; `shapegcode.cycle_time` says where it goes."""
         return float(_core.time_program(program, self.ordinary.model).total_s)
-
-    def other_time_s(self, program: _core.ProgramText) -> float:
-        """Time of everything between the regions, s: rapids, waits for in-position, dwells, kept moves, functions.
-
-        Moves of which an axis' position is not known count with what is known of them.
-        """
-        return _core.time_program(program, self.ordinary.model).outside_regions_s

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import MachineError, Problem
@@ -203,6 +204,10 @@ _UM = 1e-6  # m
 _N_PER_UM = 1e6  # N/m
 _MM = 1e-3  # m
 _GROWING_PER_S = 1e-3  # real part of a pole above which a loop grows
+_LINEAR = {
+    "acceleration_feed_forward_ratio": 0.0, "backlash_um": 0.0, "torque_limit_n_m": None,
+    "friction_model": "viscous", "friction_coulomb_n": None, "friction_static_n": None,
+}  # fmt: skip
 
 
 def drive_parameters(
@@ -243,28 +248,18 @@ def drive_parameters(
     ]
     unstable = [
         problem
-        for name, drive, gain in zip("xyz", parameters, gains, strict=True)
-        for problem in _instability(name, drive, gain)
+        for name, axis, gain in zip("xyz", machine.axes.as_tuple(), gains, strict=True)
+        if axis.drive is not None
+        for problem in _instability(name, axis.drive, gain)
     ]
     if unstable:
         raise MachineError(machine.name, tuple(unstable))
     return parameters
 
 
-def _instability(name: str, drive: _core.FeedDriveParameters, gain_per_s: float) -> list[Problem]:
-    """What says that the loop of an axis grows by itself, dry friction, backlash and force limit left out."""
-    linear = _core.FeedDriveParameters(
-        motor_mass_kg=drive.motor_mass_kg,
-        table_mass_kg=drive.table_mass_kg,
-        stiffness_n_per_m=drive.stiffness_n_per_m,
-        damping_n_s_per_m=drive.damping_n_s_per_m,
-        position_gain_per_s=drive.position_gain_per_s,
-        velocity_gain_n_s_per_m=drive.velocity_gain_n_s_per_m,
-        velocity_integral_time_s=drive.velocity_integral_time_s,
-        position_feedback=drive.position_feedback,
-        table_friction=_core.FrictionParameters(viscous_n_s_per_m=drive.table_friction.viscous_n_s_per_m),
-        motor_friction=drive.motor_friction,
-    )
+def _instability(name: str, drive: Drive, gain_per_s: float) -> list[Problem]:
+    """The problem of a loop of an axis that grows by itself, dry friction, backlash and force limit left out."""
+    linear = _of_axis([], drive.model_copy(update=_LINEAR), gain_per_s, 0.0)
     poles = np.linalg.eigvals(np.array(_core.linear_model(linear)[0]))
     worst = poles[np.argmax(poles.real)]
     if worst.real <= _GROWING_PER_S:
@@ -285,7 +280,6 @@ def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: fl
     motor_mass = drive.motor_inertia_kg_m2 * rad_per_m**2
     reduced_mass = motor_mass * drive.table_mass_kg / (motor_mass + drive.table_mass_kg)
     stiffness = drive.stiffness_n_per_um * _N_PER_UM
-    feedback = _core.PositionFeedback
     return _core.FeedDriveParameters(
         motor_mass_kg=motor_mass,
         table_mass_kg=drive.table_mass_kg,
@@ -296,7 +290,7 @@ def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: fl
         velocity_integral_time_s=drive.velocity_integral_time_s,
         velocity_feed_forward_ratio=ratio,
         acceleration_feed_forward_ratio=drive.acceleration_feed_forward_ratio,
-        position_feedback=feedback.table if drive.position_feedback == "table" else feedback.motor,
+        position_feedback=getattr(_core.PositionFeedback, drive.position_feedback),
         backlash_m=drive.backlash_um * _UM,
         force_limit_n=0.0 if drive.torque_limit_n_m is None else drive.torque_limit_n_m * rad_per_m,
         table_friction=_table_friction(drive),
@@ -308,10 +302,8 @@ def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: fl
 
 
 def _table_friction(drive: Drive) -> _core.FrictionParameters:
-    models = _core.FrictionModel
-    model = {"viscous": models.viscous, "stribeck": models.stribeck, "lugre": models.lugre}[drive.friction_model]
     return _core.FrictionParameters(
-        model,
+        getattr(_core.FrictionModel, drive.friction_model),
         viscous_n_s_per_m=drive.friction_viscous_n_s_per_m,
         coulomb_n=drive.friction_coulomb_n or 0.0,
         static_n=drive.friction_static_n or 0.0,
@@ -320,3 +312,46 @@ def _table_friction(drive: Drive) -> _core.FrictionParameters:
         bristle_stiffness_n_per_m=drive.friction_bristle_stiffness_n_per_um * _N_PER_UM,
         bristle_damping_n_s_per_m=drive.friction_bristle_damping_n_s_per_m,
     )
+
+
+_WANTED = (
+    "must be a machine or a list of modes for each axis of the command, such as [machine.axes.x.modes, "
+    "machine.axes.y.modes] or [[Mode(46.0, 0.02)], []]"
+)
+
+
+def plant_response(
+    command_mm: npt.ArrayLike, modes: Machine | Sequence[Sequence[AxisMode | _core.Mode]], period_s: float
+) -> npt.NDArray[np.float64]:
+    """Response of base-excited modes to a whole record of set-points, exact for set-points linear in between.
+
+    What the real-time plant of the core gives sample by sample, to the last bit, at the speed of a batch. At rest at
+    the first row.
+
+    Args:
+        command_mm: set-points in mm, shape (n_samples, n_axes), one per period.
+        modes: of each axis, those of the core or of a machine file; none: the axis follows its command. A machine
+            stands for the modes of its X, Y, Z, as many as the command has axes. Tables over a position count with
+            their nominal mode.
+        period_s: time between samples in s, above 0.
+
+    Returns:
+        Positions of the table in mm at the same instants, (n_samples, n_axes), in the memory order of the command.
+
+    Raises:
+        ArgumentError: not as many lists of modes as axes, a command that is not finite, an invalid mode or period.
+    """
+    if isinstance(modes, Machine):
+        command_mm = np.asarray(command_mm, dtype=np.float64)
+        axes = axis_modes(modes)
+        return _core.plant_response(command_mm, axes[: command_mm.shape[1]] if command_mm.ndim == 2 else axes, period_s)
+    if not isinstance(modes, Sequence) or isinstance(modes, str):
+        raise _core.ArgumentError(f"modes are {type(modes).__name__}: {_WANTED}")
+    return _core.plant_response(command_mm, [_core_modes(axis) for axis in modes], period_s)
+
+
+def _core_modes(modes: Sequence[AxisMode | _core.Mode]) -> list[_core.Mode]:
+    """The modes of one axis for the core."""
+    if not isinstance(modes, Sequence) or not all(isinstance(mode, AxisMode | _core.Mode) for mode in modes):
+        raise _core.ArgumentError(f"the modes of an axis are {str(modes)[:80]!r}: {_WANTED}")
+    return [still_mode(mode, None) if isinstance(mode, AxisMode) else mode for mode in modes]

@@ -45,29 +45,20 @@ _FLAT = {
 }  # a curve within so little is flat
 
 
-@dataclass(frozen=True)
-class _Nominal:
-    """A cut that is simulated, and the path that it shall follow."""
-
-    first_line: int
-    last_line: int
-    path: _core.Path
-
-
 @dataclass
 class _Followed:
     """Follows the cuts of a program along their paths, one after the other."""
 
-    cuts: list[_Nominal]
+    cuts: list[tuple[_core.Region, _core.Path]]  # each with the path that it shall follow, in the order of its lines
     _at: int = -1
     _follower: _core.PathFollower | None = field(default=None, repr=False)
 
     def deviations_mm(self, chunk: Chunk) -> FloatArray:
         """From path to table, (k, 3); from command to table where no path is known."""
         found = chunk.error_mm.copy()
-        firsts = np.array([cut.first_line for cut in self.cuts])
+        firsts = np.array([cut.first_line for cut, _ in self.cuts])
         cut_of = np.searchsorted(firsts, chunk.line, side="right") - 1
-        lasts = np.array([cut.last_line for cut in self.cuts] or [0])
+        lasts = np.array([cut.last_line for cut, _ in self.cuts] or [0])
         cut_of[(cut_of >= 0) & (chunk.line > lasts[np.maximum(cut_of, 0)])] = -1
         borders = np.flatnonzero(np.diff(cut_of)) + 1
         for begin, end in zip([0, *borders], [*borders, len(chunk)], strict=True):
@@ -75,7 +66,7 @@ class _Followed:
             if rank < 0:
                 continue
             if rank != self._at or self._follower is None:
-                self._at, self._follower = rank, _core.PathFollower(self.cuts[rank].path)
+                self._at, self._follower = rank, _core.PathFollower(self.cuts[rank][1])
             found[begin:end] = self._follower.step(chunk.command_mm[begin:end], chunk.response_mm[begin:end])
         return found
 
@@ -87,30 +78,29 @@ def scene_of(
     *,
     labels: tuple[str, str] = ("original", "emitted"),
     plant: str = "modal",
-    most_points: int = MOST_POINTS,
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Scene:
     """Simulate a program, and the one that was made of it, for a page."""
     programs = [original, *([emitted] if emitted is not None else [])]
     period_s = MachineModel(machine).period_s
-    variants, spectra, said = [], [], []
+    variants, spectra, notes = [], [], []
     for rank, (program, label) in enumerate(zip(programs, labels, strict=False)):
         key = ("original", "emitted")[rank]
 
         def done(share: float, rank: int = rank) -> None:
             on_progress((rank + share) / len(programs))
 
-        variant, lines, kept = _variant(key, label, program, original, machine, plant, most_points, done)
+        variant, lines, kept = _variant(key, label, program, original, machine, plant, done)
         variants.append(variant)
         spectra += lines
-        said.append(
+        notes.append(
             f"{label}: {len(variant.sample)} of {variant.samples} samples, path within {kept.path_pixels:.1f} pixel of "
             f"{PIXELS_WIDE}, curves within {kept.pixels / PIXELS_HIGH * 100.0:.1f} % of their range"
         )
     return Scene(
         period_s=period_s,
         variants=tuple(variants),
-        thinned=f"Thinned for display, extremes kept ({'; '.join(said)}). The figures are not thinned.",
+        thinned=f"Thinned for display, extremes kept ({'; '.join(notes)}). The figures are not thinned.",
         spectra=tuple(spectra),
         modes=tuple(_mode_lines(machine)),
         link_lines=() if emitted is None else tuple(_links(original, emitted)),
@@ -124,14 +114,13 @@ def _variant(
     nominal: Program,
     machine: Machine,
     plant: str,
-    most_points: int,
     on_progress: Callable[[float], None],
 ) -> tuple[Variant, list[SceneSpectrum], Kept]:
     period_s = MachineModel(machine).period_s
     whole_s = _core.time_program(program.core, fanuc_model(machine)).total_s or period_s
-    cuts = [_Nominal(mine.first_line, mine.last_line, other.path) for mine, other in paired_regions(program, nominal)]
-    followed = _Followed(sorted(cuts, key=lambda cut: cut.first_line))
-    thinner, spectrum = Thinner(_scales(nominal), most_points), AccelerationSpectrum(period_s)
+    cuts = [(mine, other.path) for mine, other in paired_regions(program, nominal)]
+    followed = _Followed(sorted(cuts, key=lambda cut: cut[0].first_line))
+    thinner, spectrum = Thinner(_scales(nominal), MOST_POINTS), AccelerationSpectrum(period_s)
     blocks = _Blocks()
     velocity: FloatArray | None = None
     for chunk in stream(program, machine, plant=plant):
@@ -157,7 +146,7 @@ def _variant(
     text = program.expanded_text.decode("utf-8", "replace")
     variant = Variant(
         key, label, program.source, text, kept.sample, line, block, kept.command_mm, kept.deviation_um, channels,
-        thinner.samples, tuple((cut.first_line, cut.last_line) for cut in cuts),
+        thinner.samples, tuple((cut.first_line, cut.last_line) for cut, _ in cuts),
     )  # fmt: skip
     return variant, spectrum.lines(key, most_hz=_most_hz(machine, period_s)), kept
 

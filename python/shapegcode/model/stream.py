@@ -25,6 +25,8 @@ REST_S = 0.25
 """How long the set-points rest behind the end of a program."""
 
 _CHUNK_SAMPLES = 65536
+_OF_EVERY_PLANT = ("line", "kind", "command_mm", "response_mm", "velocity_mm_per_s")
+_OF_DRIVES = ("motor_mm", "motor_force_n", "friction_force_n")
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -69,16 +71,8 @@ class Chunk:
     def columns(self) -> dict[str, npt.NDArray[np.generic]]:
         """What a file of the motion holds, by name with its unit; each of the shape (k,)."""
         named: dict[str, npt.NDArray[np.generic]] = {"time_s": self.time_s, "line": self.line}
-        tables = {
-            "command_mm": self.command_mm,
-            "response_mm": self.response_mm,
-            "error_mm": self.error_mm,
-            "motor_mm": self.motor_mm,
-            "motor_force_n": self.motor_force_n,
-            "friction_force_n": self.friction_force_n,
-        }
-        for name, table in tables.items():
-            if table is not None:
+        for name in ("command_mm", "response_mm", "error_mm", *_OF_DRIVES):
+            if (table := getattr(self, name)) is not None:
                 named |= {f"{axis}_{name}": table[:, number] for number, axis in enumerate("xyz")}
         return named
 
@@ -166,26 +160,14 @@ def _chunks(
     rate_hz = round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-6 else rate_hz
     while len(read := simulated.read(chunk_samples)):
         sample = np.arange(read.first_sample, read.first_sample + len(read), dtype=np.int64)
-        line = read.line
-        driven = len(read.motor_mm) > 0
-        chunk = Chunk(
-            sample=sample,
-            time_s=sample / rate_hz,
-            line=line,
-            kind=read.kind,
-            command_mm=read.command_mm,
-            response_mm=read.response_mm,
-            velocity_mm_per_s=read.velocity_mm_per_s,
-            motor_mm=read.motor_mm if driven else None,
-            motor_force_n=read.motor_force_n if driven else None,
-            friction_force_n=read.friction_force_n if driven else None,
-        )
+        names = [*_OF_EVERY_PLANT, *(_OF_DRIVES if len(read.motor_mm) else ())]
+        chunk = Chunk(sample, sample / rate_hz, **{name: getattr(read, name) for name in names})
         if lines is None:
             yield chunk
             continue
-        inside = (line >= lines[0]) & (line <= lines[1])
+        inside = (chunk.line >= lines[0]) & (chunk.line <= lines[1])
         if inside.any():
             yield chunk.rows(inside)
         # A program is expanded: its lines happen in order.
-        if line[-1] > lines[1]:
+        if chunk.line[-1] > lines[1]:
             return

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program import MM_PER_INCH, Program, located_error
-from shapegcode.program.reading import require_memory
+from shapegcode.program.computer import require_memory
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,8 +39,8 @@ def read_for_conversion(path: str | Path, machine: Machine, *, program_number: i
     period_s = machine.emission.block_period_s or machine.controller.block_time_s
     if period_s > 0.0:
         blocks = round(program.core.least_time_s / period_s)
-        said = f"up to {blocks} blocks are to be written"
-        require_memory(program.source, blocks * _MEMORY_PER_BLOCK, said)
+        sentence = f"up to {blocks} blocks are to be written"
+        require_memory(program.source, blocks * _MEMORY_PER_BLOCK, sentence)
     return program
 
 
@@ -73,8 +73,8 @@ def require_decision(program: Program, machine: Machine) -> None:
         )
     if policy == "refuse" and core.kept_compensated_moves:
         line, file = next(((w[0], w[4]) for w in core.warnings if _KEPT in w[3]), (1, ""))
-        said = "cutter compensation G41/G42: shaped moves do not follow the offset in the control"
-        raise _undecided(program, line, file, said, machine)
+        sentence = "cutter compensation G41/G42: shaped moves do not follow the offset in the control"
+        raise _undecided(program, line, file, sentence, machine)
 
 
 def refuse_zero_radius(program: Program) -> None:
@@ -82,12 +82,15 @@ def refuse_zero_radius(program: Program) -> None:
     for line, _, _, message, file in program.core.warnings:
         if found := _ZERO_RADIUS.match(message):
             number = found[1]
-            what = "write D with the number of the offset behind it" if number == "0" else _radius_of(number)
-            said = f"{message.partition(':')[0]} mm: expanded, the tool's centre would run on the contour\n{what}"
-            raise located_error(file or program.source, line, 1, said)
+            what = (
+                f"give it: --set input.tool_radius_mm.{number}=RADIUS_IN_MM, or G10 L12 P{number} R... in the program"
+            )
+            what = "write D with the number of the offset behind it" if number == "0" else what
+            sentence = f"{message.partition(':')[0]} mm: expanded, the tool's centre would run on the contour\n{what}"
+            raise located_error(file or program.source, line, 1, sentence)
 
 
-def _undecided(program: Program, line: int, file: str, said: str, machine: Machine) -> ProgramError:
+def _undecided(program: Program, line: int, file: str, sentence: str, machine: Machine) -> ProgramError:
     """What is wrong, and in a second line the command that goes on."""
     text = program.text.split(b"\n", line)[line - 1] if not file or file == program.source else b""
     found = re.search(rb"D\s*(\d+)", text)
@@ -96,11 +99,7 @@ def _undecided(program: Program, line: int, file: str, said: str, machine: Machi
     radius = "" if known else f" --set input.tool_radius_mm.{number}=RADIUS_IN_MM"
     command = f"shapegcode convert {shlex.quote(program.source)} -m MACHINE --compensation"
     go_on = f"{command} expand{radius} shapes the path of that radius; --compensation keep leaves these moves unchanged"
-    return located_error(file or program.source, line, 1, f"{said}\nnext: {go_on}")
-
-
-def _radius_of(number: str) -> str:
-    return f"give it: --set input.tool_radius_mm.{number}=RADIUS_IN_MM, or G10 L12 P{number} R... in the program"
+    return located_error(file or program.source, line, 1, f"{sentence}\nnext: {go_on}")
 
 
 def header_lines(radii_mm: Mapping[int, float]) -> list[str]:
@@ -166,8 +165,8 @@ def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.R
 
 
 def _unknown_radius(nominal: Program) -> str:
-    said = (warning for warning in nominal.warnings if RADIUS_NOT_KNOWN in warning)
-    why = next(said, f"{nominal.source}: cutter compensation is on and not expanded").partition(" (")[0]
+    sentence = (warning for warning in nominal.warnings if RADIUS_NOT_KNOWN in warning)
+    why = next(sentence, f"{nominal.source}: cutter compensation is on and not expanded").partition(" (")[0]
     return (
         f"{why}: the path of the original is not known, and a shaped program cannot be measured against it: set "
         "input.tool_radius_mm to the radius that it was shaped with, in the machine file or with --set"

@@ -12,15 +12,10 @@ from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode._core import ProgramError
-from shapegcode.program.reading import (
-    Reading,
-    is_program_text,
-    program_bytes,
-    require_memory_for_lines,
-    signs_of_turning,
-)
+from shapegcode.program.computer import require_memory_for_lines
+from shapegcode.program.reading import Reading, given_text, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
-from shapegcode.program.stamp import STAMP_BEGIN, Stamp, judge, judged, mark_of, stamp_of
+from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -82,22 +77,15 @@ class Program:
         from shapegcode.machine import Machine
 
         machine = Machine.of(machine or "vx500")
-        if is_program_text(path):
-            return cls.from_text(
-                str(path),
-                machine,
-                program_number=program_number,
-                expand_compensation=expand_compensation,
-                collect_alarms=collect_alarms,
-            )
+        text, source, folder = given_text(path, machine)
         return cls.from_text(
-            program_bytes(path, machine.controller.max_program_bytes),
+            text,
             machine,
-            source=str(path),
+            source=source,
             program_number=program_number,
             expand_compensation=expand_compensation,
             collect_alarms=collect_alarms,
-            folder=Path(path).parent,
+            folder=folder,
         )
 
     @classmethod
@@ -144,8 +132,8 @@ class Program:
         require_memory_for_lines(data, source)
         if not emitted and (turning := signs_of_turning(data)) is not None:
             line, signs = turning
-            said = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"
-            raise located_error(source, line, 1, said)
+            message = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"
+            raise located_error(source, line, 1, message)
         reading = Reading(
             machine,
             # What shapegcode wrote has FANUC's arcs, whatever those of its original were.
@@ -211,6 +199,18 @@ class Program:
                 f"{'; '.join(differences)}; read it with that machine: machine= of Program.read or Program.from_text"
             )
 
+    def refuse_shaped(self, remedy: str) -> None:
+        """Refuse a program that shapegcode has shaped.
+
+        Args:
+            remedy: what to do instead.
+
+        Raises:
+            ProgramError: its header says so.
+        """
+        if self.stamp is not None:
+            raise ProgramError(f"{self.source}:1:1: shaped by shapegcode already (its header says so): {remedy}")
+
     @property
     def text(self) -> bytes:
         """The text that was read, to the letter."""
@@ -248,8 +248,8 @@ class Program:
             The program.
         """
         if self.unexpanded is not None:
-            return replace(self, unexpanded=judged(self.unexpanded, good=good, better=better))
-        judge(self.core, self.mark, good=good, better=better)
+            return replace(self, unexpanded=text_with_verdict(self.unexpanded, good=good, better=better))
+        write_verdict(self.core, self.mark, good=good, better=better)
         return replace(self)  # nothing of it was worked out from the text as it was
 
     @cached_property
@@ -398,7 +398,7 @@ def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
 
 
 def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
-    """Which axes rest through a whole region where none of its words leads: nothing may be written of them."""
+    """Axes at rest through a whole region at a position that no word can give: no word of them may be written."""
     off_mm = end_off_grid_mm(region, increment_mm)
     return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 
@@ -410,9 +410,9 @@ def located_error(source: str, line: int, column: int, message: str, alarm: int 
     return error
 
 
-def _other_arc_centre(data: bytes, options: _core.ReaderOptions, said: str) -> str:
-    """The other meaning of I, J, K, if it explains an alarm: the whole program reads with it. Never a guess."""
-    if _ARC_OFF_RADIUS not in said:
+def _other_arc_centre(data: bytes, options: _core.ReaderOptions, message: str) -> str:
+    """The other meaning of I, J, K, if the whole program can be read with it; else none."""
+    if _ARC_OFF_RADIUS not in message:
         return ""
     options.absolute_arc_centres = not options.absolute_arc_centres
     options.collect_alarms = False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 import os
@@ -14,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
-from shapegcode._core import ProgramError
 from shapegcode.io.atomic import named_errors
 from shapegcode.io.data_file import open_file
+from shapegcode.program.computer import require_memory
 from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:
@@ -42,24 +41,15 @@ _NOT_READ = ("compensation", "material_side")
 
 @dataclass(frozen=True)
 class Reading:
-    """How a program was read.
+    """How a program was read."""
 
-    Attributes:
-        machine: whose controller read it.
-        emitted: shapegcode wrote the text: its arcs are FANUC's, whatever the original's were.
-        keeps_calls: shapegcode has just written it: every call in it was kept.
-        probe_lines: ascending line numbers behind which the modal state is kept.
-        expand_compensation: G41/G42 became plain moves.
-        collect_alarms: the reader went on behind an alarm.
-        called: name and text of programs in other files that it calls, by O number; found when it was read.
-    """
-
-    machine: Machine
-    emitted: bool = False
-    keeps_calls: bool = False
-    probe_lines: tuple[int, ...] = ()
-    expand_compensation: bool = True
-    collect_alarms: bool = False
+    machine: Machine  # whose controller read it
+    emitted: bool = False  # shapegcode wrote the text: its arcs are FANUC's, whatever the original's were
+    keeps_calls: bool = False  # shapegcode has just written it: every call in it was kept
+    probe_lines: tuple[int, ...] = ()  # ascending line numbers behind which the modal state is kept
+    expand_compensation: bool = True  # G41/G42 became plain moves
+    collect_alarms: bool = False  # the reader went on behind an alarm
+    # name and text of programs in other files that it calls, by O number; found when it was read
     called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
     def options(self, folders: Sequence[Path]) -> _core.ReaderOptions:
@@ -80,7 +70,7 @@ class Reading:
         return options
 
     def differences(self, machine: Machine) -> list[str]:
-        """Settings with which another machine would read the text otherwise."""
+        """Settings by which another machine would read the text differently."""
         if machine is self.machine:
             return []
         unused = {"input.arc_centre"} if self.emitted else set()
@@ -224,6 +214,13 @@ def program_bytes(path: str | Path, most: int) -> bytes:
         return file.read(size)
 
 
+def given_text(program: str | Path, machine: Machine) -> tuple[bytes, str, Path | None]:
+    """A program's text where it is given or from its file, its name in messages, and the folder of the file."""
+    if is_program_text(program):
+        return str(program).encode(), "<text>", None
+    return program_bytes(program, machine.controller.max_program_bytes), str(program), Path(program).parent
+
+
 def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[str, bytes] | None]:
     """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix."""
 
@@ -237,77 +234,6 @@ def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[
         return None
 
     return load
-
-
-_CGROUP = Path("/sys/fs/cgroup")
-_PER_LINE = 130
-"""Bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)."""
-_SMALL_BYTES = 2**20
-MEMORY_NEEDED = "bytes of memory are needed"
-"""What a refusal for want of memory says: a batch that limits it tells it apart by that."""
-
-
-def available_bytes() -> int | None:
-    """Memory that this process may still take: of the machine, of its control group, and of its own limits."""
-    found = [_of_meminfo("MemAvailable"), *_of_groups(), *_of_own_limits()]
-    known = [value for value in found if value is not None]
-    return max(0, min(known)) if known else None
-
-
-def require_memory(source: str, needed: int, what: str) -> None:
-    """Refuse what the memory would not hold."""
-    available = available_bytes()
-    if available is not None and needed > available:
-        raise ProgramError(
-            f"{source}:1:1: {what}: some {needed} {MEMORY_NEEDED} and {available} are available; split the "
-            "program, or take a machine with more memory"
-        )
-
-
-def require_memory_for_lines(text: bytes, source: str, per_line: int = _PER_LINE) -> None:
-    """Refuse a program text whose lines the memory would not hold; one of less than a megabyte is not counted."""
-    if len(text) > _SMALL_BYTES:
-        lines = text.count(b"\n")
-        require_memory(source, lines * per_line, f"{lines} lines are to be read")
-
-
-def _of_meminfo(name: str) -> int | None:
-    return _kilobytes(Path("/proc/meminfo"), name)
-
-
-def _kilobytes(file: Path, name: str) -> int | None:
-    """A line "Name:  123 kB" of a file of /proc, in bytes."""
-    with contextlib.suppress(OSError):
-        for line in file.read_text().splitlines():
-            if line.startswith(f"{name}:"):
-                return int(line.split()[1]) * 1024
-    return None
-
-
-def _of_groups() -> list[int | None]:
-    """What the control group of this process (version 2) leaves."""
-    with contextlib.suppress(OSError, ValueError):
-        own = Path("/proc/self/cgroup").read_text().partition("::")[2].strip().lstrip("/")
-        for folder in {_CGROUP / own, _CGROUP}:
-            limit = folder / "memory.max"
-            if limit.is_file() and (said := limit.read_text().strip()) != "max":
-                return [int(said) - int((folder / "memory.current").read_text())]
-    return []
-
-
-def _of_own_limits() -> list[int | None]:
-    """What `ulimit` leaves of address space and data."""
-    try:
-        import resource
-    except ModuleNotFoundError:  # not on this system
-        return []
-    found: list[int | None] = []
-    for limit, taken in ((resource.RLIMIT_AS, "VmSize"), (resource.RLIMIT_DATA, "VmData")):
-        most = resource.getrlimit(limit)[0]
-        used = _kilobytes(Path("/proc/self/status"), taken)
-        if most != resource.RLIM_INFINITY and used is not None:
-            found.append(most - used)
-    return found
 
 
 _LOOKED_AT_BYTES = 65536
@@ -334,5 +260,5 @@ def signs_of_turning(text: bytes) -> tuple[int, str] | None:
     if not sure or len(sure) + len(likely) < 2 or _OF_A_MILL.search(code):
         return None
     signs = sorted((*sure, *likely), key=lambda sign: sign[0].start())
-    said = ", ".join(f"{' '.join(found[0].decode('latin-1').split())} ({meaning})" for found, meaning in signs)
-    return code.count(b"\n", 0, signs[0][0].start()) + 1, said
+    sentence = ", ".join(f"{' '.join(found[0].decode('latin-1').split())} ({meaning})" for found, meaning in signs)
+    return code.count(b"\n", 0, signs[0][0].start()) + 1, sentence

@@ -19,22 +19,15 @@ _RETURNS, _ENDS = re.compile(rb"M *0*99(?!\d)"), re.compile(rb"M *0*(?:2|30)(?!\
 
 @dataclass(frozen=True)
 class ProgramPlace:
-    """One program of a file.
+    """One program of a file."""
 
-    Attributes:
-        index: how many programs stand before it.
-        address: what picks this one and no other: its number ``O0001``, its name ``<PART>``, either behind its folder
-            (``/USER/O0001``) where it stands in several; ``#3``, the third one, where nothing else tells them apart.
-        first_line: from 1.
-        text_begin: byte at which its lines begin.
-        text_end: byte behind them.
-    """
-
-    index: int
+    index: int  # how many programs stand before it
+    # what picks this one and no other: its number ``O0001``, its name ``<PART>``, either behind its folder
+    # (``/USER/O0001``) where it stands in several; ``#3``, the third one, where nothing else tells them apart
     address: str
-    first_line: int
-    text_begin: int
-    text_end: int
+    first_line: int  # from 1
+    text_begin: int  # byte at which its lines begin
+    text_end: int  # byte behind them
 
 
 def is_subprogram(text: bytes) -> bool:
@@ -75,10 +68,10 @@ def place_of(text: bytes, wanted: str, source: str) -> int:
     if len(found) == 1:
         return found[0]
     known = ", ".join(places[index].address for index in found) or _listed([place.address for place in places])
-    said = (
+    reason = (
         f"holds several programs {wanted}: say which, {known}" if found else f"holds no program {wanted} (but {known})"
     )
-    raise _core.ProgramError(f"{source}:1:1: the file {said}")
+    raise _core.ProgramError(f"{source}:1:1: the file {reason}")
 
 
 def index_of(text: bytes, wanted: int | str, source: str) -> int | None:

@@ -1,5 +1,7 @@
 """The header of an emitted program: written by the converter, read by everything that is given such a program.
 
+Its cautions are those of reports, pages, test cuts and characterization tests too: a sentence, and a comment.
+
 (SHAPEGCODE 0.1.0 MACHINE VX500)
 (VERDICT WITHIN TOLERANCE       )    or (BETTER - TOLERANCE NOT MET     )
 (TEXT 8A1F00C3)
@@ -22,7 +24,65 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from shapegcode import _core
-from shapegcode.program.operating import FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK
+
+
+@dataclass(frozen=True)
+class Habit:
+    """One caution."""
+
+    topic: str  # what it is about, in a word or two
+    comment: str  # for programs: capitals, 60 characters at most
+    sentence: str  # the same for people who read
+
+
+OVERRIDE = Habit(
+    "override",
+    "SET FEED OVERRIDE 100 PCT",
+    "feed override 100 %: any other setting changes the time of every block, and the blocks no longer fit the modes",
+)
+OVERRIDE_LOCKED = Habit(
+    "override",
+    "FEED OVERRIDE IS OFF IN SHAPED MOVES",
+    "the program switches the feed override off in shaped moves and gives it back behind them: there only feed hold "
+    "acts",
+)
+OVERRIDE_ANY = Habit(
+    "override",
+    "BLOCKS OF ONE DURATION FOR ANY FEED OVERRIDE",
+    "blocks of one duration: another feed override scales all of them alike; vibration is lowest at 100 %",
+)
+OVERRIDES = {"ask": OVERRIDE, "lock": OVERRIDE_LOCKED, "any": OVERRIDE_ANY}
+"""By `emission.override`."""
+SINGLE_BLOCK = Habit(
+    "single block",
+    "NO SINGLE BLOCK IN SHAPED CUTS",
+    "no single block inside of shaped cuts: the control would stop at every block, some milliseconds apart; to look "
+    "through the program use the graphic display, machine lock, or dry run above the part, and single block between "
+    "the cuts; then the first run above the part",
+)
+FEED_HOLD = Habit(
+    "feed hold",
+    "AFTER FEED HOLD GO ON AT 100 PCT",
+    "feed hold is safe; the machine may vibrate once, since the control decelerates in its own way; "
+    "cycle start resumes the program",
+)
+RESTART = Habit(
+    "restart",
+    "RESTART ONLY BEHIND A SHAPED COMMENT OR AT A LISTED N",
+    "restart only where a cut begins, or at a restart point: other blocks of a shaped cut are not valid restart points",
+)
+FIRST_RUN = Habit(
+    "first run",
+    "FIRST RUN ABOVE THE PART WITHOUT TOOL",
+    "first run above the part: shift Z of the work offset by more than the deepest cut, no tool, spindle off, rapid "
+    "override 25 %, feed override 100 %",
+)
+
+
+def no_room(room_bytes: int) -> str:
+    """What to do with a shaped program that the memory of the control does not hold."""
+    return f"convert the original with --max-bytes {room_bytes}; or memory card, data server or drip feed (DNC)"
+
 
 REGION_MARK = "(SHAPED)"
 """Stands before each shaped region."""
@@ -54,31 +114,18 @@ _LINE_HEAD = re.compile(rb"(\n(?:/\d?)?)(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
 
 @dataclass(frozen=True)
 class Stamp:
-    """What the header of an emitted program says; texts are as a comment holds them.
+    """What the header of an emitted program says; texts are as a comment holds them."""
 
-    Attributes:
-        version: of shapegcode.
-        machine: its name.
-        modes: such as "X 46 HZ 0.02", in the order of the machine file.
-        block_period_ms: of the shaped blocks.
-        shaper_ms: duration of the shaper.
-        family: of the shaper; empty: not said.
-        own_filter: how the control itself smooths shaped blocks, such as "24 MS" or "48 MS BELL 24 MS".
-        mark: of the text, see `text_mark`; eight zeros: not yet known.
-        override: which of `OVERRIDES` the text is for.
-        notes: further lines.
-    """
-
-    version: str
-    machine: str
-    modes: tuple[str, ...]
-    block_period_ms: str
-    shaper_ms: str
-    family: str
-    own_filter: str
-    mark: str = _NO_MARK
-    override: str = "ask"
-    notes: tuple[str, ...] = ()
+    version: str  # of shapegcode
+    machine: str  # its name
+    modes: tuple[str, ...]  # such as "X 46 HZ 0.02", in the order of the machine file
+    block_period_ms: str  # of the shaped blocks
+    shaper_ms: str  # duration of the shaper
+    family: str  # of the shaper; empty: not said
+    own_filter: str  # how the control itself smooths shaped blocks, such as "24 MS" or "48 MS BELL 24 MS"
+    mark: str = _NO_MARK  # of the text, see `text_mark`; eight zeros: not yet known
+    override: str = "ask"  # which of `OVERRIDES` the text is for
+    notes: tuple[str, ...] = ()  # further lines
 
     def lines(self) -> list[str]:
         """The header, its verdict still open."""
@@ -155,14 +202,7 @@ def text_mark(text: bytes) -> str:
     Comments, blanks, kinds of line end, N words, the program's number and `%` do not count: what a control or an
     editor changes in passing.
     """
-
-    def chunks() -> Iterator[bytes]:
-        end = 0
-        while end < len(text):
-            begin, end = end, 1 + text.find(b"\n", end + _CHUNK) or len(text)
-            yield text[begin:end]
-
-    return _mark_of(chunks())
+    return _mark_of(_chunks(len(text), text.find, lambda begin, end: text[begin:end]))
 
 
 def _mark_of(chunks: Iterable[bytes]) -> str:
@@ -199,7 +239,7 @@ def _one_end(text: bytes) -> bytes:
     return text
 
 
-def judged(text: bytes, *, good: bool, better: bool = False) -> bytes:
+def text_with_verdict(text: bytes, *, good: bool, better: bool = False) -> bytes:
     """An emitted program with verdict and mark in its header."""
     changes = _changes(text.find, text_mark(text), good=good, better=better)
     if not changes:
@@ -212,10 +252,10 @@ def judged(text: bytes, *, good: bool, better: bool = False) -> bytes:
 
 def mark_of(program: _core.ProgramText) -> str:
     """The mark of a program that was read; see `text_mark`."""
-    return _mark_of(_lines_of(program))
+    return _mark_of(whole_lines(program))
 
 
-def judge(program: _core.ProgramText, mark: str, *, good: bool, better: bool = False) -> None:
+def write_verdict(program: _core.ProgramText, mark: str, *, good: bool, better: bool = False) -> None:
     """The same in the text of a program that was read; it holds what it held in the same places."""
     for begin, after in _changes(program.find, mark, good=good, better=better):
         program.overwrite(begin, after)
@@ -229,8 +269,13 @@ def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: boo
     return [(begin, after) for before, after in wanted if (begin := find(before)) >= 0]
 
 
-def _lines_of(program: _core.ProgramText) -> Iterator[bytes]:
+def whole_lines(program: _core.ProgramText) -> Iterator[bytes]:
+    """The text of a program in chunks of whole lines."""
+    return _chunks(program.size, program.find, program.slice)
+
+
+def _chunks(size: int, find: Callable[[bytes, int], int], part: Callable[[int, int], bytes]) -> Iterator[bytes]:
     end = 0
-    while end < program.size:
-        begin, end = end, 1 + program.find(b"\n", end + _CHUNK) or program.size
-        yield program.slice(begin, end)
+    while end < size:
+        begin, end = end, 1 + find(b"\n", end + _CHUNK) or size
+        yield part(begin, end)

@@ -58,7 +58,7 @@ class Deviation:
         )
 
     def gouge_and_excess_um(self, material_side: str) -> dict[str, float]:
-        """What is cut away too much and what is left standing."""
+        """Material cut too deep (gouge) and material left (excess)."""
         gouge, excess = (self.left_mm, self.right_mm) if material_side == "left" else (self.right_mm, self.left_mm)
         return {"gouge": gouge * 1e3, "excess": excess * 1e3}
 

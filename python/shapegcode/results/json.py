@@ -122,9 +122,6 @@ class Streamed(list[Any]):
     """Many entries that become plain one by one, while `json.JSONEncoder.iterencode` goes over them.
 
     `json.dumps` would find it empty.
-
-    Args:
-        entries: as they are.
     """
 
     def __init__(self, entries: Sequence[object]) -> None:
@@ -252,9 +249,9 @@ def _meanings(cls: type) -> dict[str, str]:
     """What the docstrings of a class and its bases say under `Attributes:`, and those of the properties."""
     found: dict[str, str] = {}
     for name in getattr(cls, "json_extra", {}):
-        said = getattr(cls, name, None)
-        if isinstance(said, property) and said.__doc__:
-            found[name] = said.__doc__.strip().partition("\n")[0]
+        member = getattr(cls, name, None)
+        if isinstance(member, property) and member.__doc__:
+            found[name] = member.__doc__.strip().partition("\n")[0]
     for base in reversed(cls.__mro__):
         lines = (base.__doc__ or "").splitlines()
         at = next((rank for rank, line in enumerate(lines) if line.strip() == "Attributes:"), len(lines))

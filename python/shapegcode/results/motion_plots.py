@@ -220,11 +220,11 @@ def plot_vibration(views: Sequence[View], ax: Axes | None = None, *, part: str =
     swinging = [axis for axis in moving if swing_mm[axis] >= SHOWN_MM]
     still = [AXIS_NAMES[axis] for axis in moving if axis not in swinging]
     shown = swinging or moving[:1]
-    said = ["Vibration"]
-    said += ["dashed: the command has come to rest"] if any(trace.stops for trace in traces) else []
-    said += [f"{', '.join(still)}: rigid (below {SHOWN_MM * 1e3:g} µm)"] if still else []
+    parts = ["Vibration"]
+    parts += ["dashed: the command has come to rest"] if any(trace.stops for trace in traces) else []
+    parts += [f"{', '.join(still)}: rigid (below {SHOWN_MM * 1e3:g} µm)"] if still else []
     names = [f"{AXIS_NAMES[axis]} table − command\nin µm" for axis in shown]
-    columns = _columns(ax, views, names, 2.2, "; ".join(said), part)
+    columns = _columns(ax, views, names, 2.2, "; ".join(parts), part)
     for view, panels in zip(views, columns, strict=True):
         for panel, axis in zip(panels, shown, strict=True):
             for number, trace in enumerate(view.traces):

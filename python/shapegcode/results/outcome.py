@@ -19,7 +19,6 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.results.json import plain
-from shapegcode.results.plot import save_all
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,12 +31,7 @@ class NotKeptError(_core.ArgumentError):
 
 
 class CoreFigures:
-    """The figures of an object of the core, in a result that was pickled.
-
-    Args:
-        name: of its class.
-        figures: by the name of the property.
-    """
+    """The figures of an object of the core, in a result that was pickled."""
 
     def __init__(self, name: str, figures: Mapping[str, Any]) -> None:
         self.__dict__.update(figures)
@@ -233,6 +227,8 @@ class Outcome:
 
     def save_plots(self, folder: str | Path) -> list[str]:
         """Write every picture as PNG and SVG into a folder, which is made where it is missing."""
+        from shapegcode.results.plot import save_all
+
         return save_all(self.plots(), folder)
 
     def __eq__(self, other: object) -> bool:

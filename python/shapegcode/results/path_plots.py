@@ -125,6 +125,11 @@ def plot_path(
     return panel
 
 
+def _distances(polyline: FloatArray) -> FloatArray:
+    """How far each vertex is along a polyline."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
+
+
 def _checked_polyline(name: str, points: npt.ArrayLike) -> FloatArray:
     polyline = np.asarray(points, dtype=np.float64)
     if polyline.ndim != 2 or polyline.shape[1] != 3 or len(polyline) < 2 or not np.isfinite(polyline).all():
@@ -159,10 +164,10 @@ def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apar
 
 def _style(number: int, curve: FloatArray, polyline: FloatArray) -> dict[str, Any]:
     """Colour and width of a curve; one that oscillates is finer, so that its cycles do not run together."""
-    swings = float(np.nansum(np.linalg.norm(np.diff(curve, axis=0), axis=1)))
-    way = float(np.linalg.norm(np.diff(polyline, axis=0), axis=1).sum())
+    drawn_mm = float(np.nansum(np.linalg.norm(np.diff(curve, axis=0), axis=1)))
+    length_mm = float(_distances(polyline)[-1])
     style = line_style(number)
-    return style if swings < _SWINGS * way else style | {"linewidth": 0.6}
+    return style if drawn_mm < _SWINGS * length_mm else style | {"linewidth": 0.6}
 
 
 def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: bool) -> str:
@@ -191,7 +196,7 @@ def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
     """The whole path, small, and where the piece lies on it."""
     axes.plot(whole[:, 0], whole[:, 1], color=plot.GREY, linewidth=0.8)
     axes.plot(piece[:, 0], piece[:, 1], color="black", linewidth=2)
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(piece, axis=0), axis=1))])
+    along = _distances(piece)
     middle = [float(np.interp(along[-1] / 2, along, piece[:, axis])) for axis in range(2)]
     axes.plot(*middle, marker="o", markersize=16, markerfacecolor="none", markeredgecolor="black")
     axes.set_aspect("equal", adjustable="box", anchor="N")
@@ -236,15 +241,12 @@ def follow(
 ) -> tuple[FloatArray, FloatArray]:
     """Where on a polyline are samples that follow it?
 
-    Where the polyline passes a place twice, the distance that the command has gone decides.
+    Where the polyline passes a point twice, the distance that the command has travelled decides.
     """
     vertices = _refine(polyline_mm)
-    lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(lengths)])
-    steps = np.linalg.norm(np.diff(command_mm, axis=0), axis=1)
-    gone = np.concatenate([[0.0], np.cumsum(steps)])
+    gone = _distances(command_mm)
     if complete and gone[-1] > 0:
-        gone *= along[-1] / gone[-1]
+        gone *= _distances(vertices)[-1] / gone[-1]
     return _feet(points_mm, vertices, gone, _PROGRESS_WEIGHT)
 
 
@@ -254,8 +256,8 @@ def _feet(points: FloatArray, vertices: FloatArray, gone: FloatArray, weight: fl
 
     if len(vertices) < 2:
         return np.zeros(len(points)), np.broadcast_to(vertices[0], points.shape).copy()
-    lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
-    distance = np.concatenate([[0.0], np.cumsum(lengths)])
+    distance = _distances(vertices)
+    lengths = np.diff(distance)
     tree = KDTree(np.column_stack([vertices, weight * distance]))
     nearest = tree.query(np.column_stack([points, weight * gone]), workers=-1)[1]
     feet, best = np.empty_like(points), np.full(len(points), np.inf)
@@ -290,7 +292,7 @@ def _refine(polyline: FloatArray) -> FloatArray:
 
 def piece_of(polyline: FloatArray, begin_mm: float, end_mm: float) -> FloatArray:
     """What lies between two distances along a polyline."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
+    along = _distances(polyline)
     inside = (along > begin_mm) & (along < end_mm)
     ends = [[np.interp(s, along, polyline[:, axis]) for axis in range(3)] for s in (begin_mm, end_mm)]
     return np.concatenate([ends[:1], polyline[inside], ends[1:]])
@@ -341,10 +343,10 @@ class SimulatedRegion:
     ) -> SimulatedRegion:
         """The region that vibrates most, as the core simulated it."""
         traces = tuple(_trace(label, run, period_s) for label, run in runs.items())
-        said = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
+        parts = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
         if not traces[0].stops:
-            said.append(f"first {traces[0].times_s[-1]:.0f} s of {next(iter(runs.values())).duration_s:.0f} s")
-        return cls(traces, path, "; ".join(said))
+            parts.append(f"first {traces[0].times_s[-1]:.0f} s of {next(iter(runs.values())).duration_s:.0f} s")
+        return cls(traces, path, "; ".join(parts))
 
 
 def _trace(label: str, run: _core.PlaybackFigures, period_s: float) -> Trace:
@@ -409,7 +411,7 @@ class _Scene:
 
 @dataclass(frozen=True, eq=False)
 class _Worst:
-    """The neighbourhood of the place where the first trace is furthest from the path."""
+    """The neighbourhood of the point where the first trace is furthest from the path."""
 
     traces: tuple[Trace, ...]  # the stretches of all traces that pass it; each is there at time 0
     piece: FloatArray  # of the programmed path, (m, 3), mm

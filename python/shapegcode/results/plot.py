@@ -77,6 +77,11 @@ def grid(
     return [list(row) for row in found]
 
 
+def column(ax: Axes | None, rows: int, *, sharex: bool = True, **options: Any) -> list[Axes]:
+    """Panels above each other; options as those of `grid`."""
+    return [row[0] for row in grid(ax, rows, 1, sharex=sharex, **options)]
+
+
 def _style(panel: Axes) -> None:
     panel.grid(True, color="#e4e4e4", linewidth=0.6)
     panel.set_axisbelow(True)

@@ -48,9 +48,9 @@ class Reports(Result):
     def answer(self) -> str:
         """How many pages, and whether they can be trusted."""
         count = len(self.pages)
-        said = f"{count} page{'s' if count > 1 else ''} written"
+        sentence = f"{count} page{'s' if count > 1 else ''} written"
         bad = sum(bool(page.problems) for page in self.pages)
-        return f"{said}, {bad} with a caution" if bad else said
+        return f"{sentence}, {bad} with a caution" if bad else sentence
 
     @property
     def next_step(self) -> str:

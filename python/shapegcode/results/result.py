@@ -60,7 +60,7 @@ class Result(Outcome):
 
     @property
     def simulated(self) -> Simulatable | None:
-        """What was simulated, to play it again for a page; a result of programs has a field of this name."""
+        """What was simulated, to simulate it again for a page; a result of programs has a field of this name."""
         return None
 
     @property
@@ -68,8 +68,8 @@ class Result(Outcome):
         """Colour of the traffic light on its page, and the reason."""
         if not self.ok:
             return "red", self.next_step
-        if said := len(self.warnings):
-            return "amber", f"{said} warning{'s' if said > 1 else ''} to resolve first"
+        if count := len(self.warnings):
+            return "amber", f"{count} warning{'s' if count > 1 else ''} to resolve first"
         return "green", "done, without a warning"
 
     @property
@@ -107,7 +107,7 @@ class Result(Outcome):
         """The result as a page.
 
         Args:
-            motion: play the programs again for the picture that one can turn; else the page has none.
+            motion: simulate the programs again for the picture that one can turn; else the page has none.
             made: of what the result was made; None: from Python, it is not known.
             problems: what is not as it should be with the page, such as a program that was changed since.
             on_progress: called with the share that is done.

@@ -194,7 +194,7 @@ def _least_width(columns: Sequence[Column], rows: Sequence[Sequence[str]], *, wh
 def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int) -> list[int]:
     """How wide each column is, so that no word is cut and the table has no more lines than it must have.
 
-    rich shrinks every column alike, below what it was told to keep, and then cuts the last ones.
+    rich shrinks every column alike, below its minimum width, and then cuts the last ones.
     """
     least, most = _least_and_most(columns, rows)
     found = list(least)
@@ -226,9 +226,9 @@ def _whole(column: Column, cell: str) -> str:
     return cell if column.text or column.left else cell.replace(" ", NO_BREAK)
 
 
-def xyz_columns(cell: Callable[[str, Any], object], *, digits: int | None = None) -> tuple[Column, ...]:
+def xyz_columns(cell: Callable[[str, Any], object]) -> tuple[Column, ...]:
     """Columns of the three axes."""
-    return tuple(Column(axis.upper(), value=partial(cell, axis), digits=digits) for axis in "xyz")
+    return tuple(Column(axis.upper(), value=partial(cell, axis)) for axis in "xyz")
 
 
 def share_percent(part: float, whole: float) -> str:

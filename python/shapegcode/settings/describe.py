@@ -1,17 +1,16 @@
-"""A machine in words: values with their origin, its file, long and short, its reference and JSON Schema."""
+"""A settings file written with comments, long or short; its JSON Schema."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, get_origin
 
 from pydantic.fields import FieldInfo
 
+from shapegcode.settings.edit import origin_lines
 from shapegcode.settings.keys import (
     InlineTable,
-    KeyInfo,
-    KeyValue,
     TomlTable,
     facts,
     item_type,
@@ -19,40 +18,9 @@ from shapegcode.settings.keys import (
     table_type,
     toml,
 )  # fmt: skip
-from shapegcode.settings.remarks import ORIGIN, ORIGIN_TEXT, origin_lines, origin_of
+from shapegcode.settings.remarks import ORIGIN, ORIGIN_TEXT, origin_of
 
 _LINE_WIDTH = 110
-
-
-def values_of(
-    table: TomlTable, prefix: str = "", given: bool = True, remarks: Mapping[str, str] | None = None
-) -> Iterator[KeyValue]:
-    """Every key below a table with its value and origin, in the order of the file."""
-    for name, field in type(table).model_fields.items():
-        value, key = getattr(table, name), f"{prefix}{name}"
-        from_file = given and name in table.model_fields_set
-        if isinstance(value, TomlTable) and not isinstance(value, InlineTable):
-            yield from values_of(value, f"{key}.", from_file, remarks)
-        elif item_type(field) and value:
-            for number, item in enumerate(value, start=1):
-                yield from values_of(item, f"{key}.{number}.", from_file, remarks)
-        else:
-            info = key_info(field, key)
-            remark = (remarks or {}).get(key, "")
-            # A key without a value can have a remark that says why: "assumed: not limited", "not measured: rigid".
-            says_why = not value and (value is not None or remark.startswith("assumed"))
-            origin = origin_of(remark) if from_file or (remark and says_why) else "default"
-            assumed = origin == "assumed" or (info.assumed and origin == "default")
-            yield KeyValue(
-                key=key,
-                value="not set" if value is None else toml(value),
-                unit=info.unit,
-                origin=origin,
-                assumed=assumed,
-                meaning=info.meaning,
-                fanuc=info.fanuc,
-                remark=remark,
-            )
 
 
 _HEAD = (
@@ -63,7 +31,7 @@ _SHORT_HEAD = (
     "Machine file of shapegcode, the short form: what is not here has its default. `shapegcode machine show FILE` "
     "prints every value with its meaning; docs/reference/machine.md explains the keys."
 )
-_TOLD = ("measured", "dump")
+_FOUND = ("measured", "dump")
 
 
 def write_toml(machine: TomlTable, remarks: Mapping[str, str], *, short: bool = False) -> str:
@@ -74,8 +42,8 @@ def write_toml(machine: TomlTable, remarks: Mapping[str, str], *, short: bool = 
     writer.table(machine, "")
     if writer.remarks and not short:
         raise KeyError(f"remarks for unknown keys: {', '.join(sorted(writer.remarks))}")
-    if said := origin_lines(writer.said):
-        writer.lines += [*([""] if writer.lines[-1] else []), *said]
+    if origins := origin_lines(writer.written):
+        writer.lines += [*([""] if writer.lines[-1] else []), *origins]
     return "\n".join(writer.lines).rstrip("\n") + "\n"
 
 
@@ -84,14 +52,14 @@ class _TomlWriter:
 
     def __init__(self, remarks: dict[str, str], short: bool) -> None:
         self.remarks = remarks  # that are not yet written
-        self.said: dict[str, str] = {}
+        self.written: dict[str, str] = {}
         self.lines: list[str] = []
         self._short = short
 
     def _add(self, line: str, key: str) -> None:
         """A line, its remark as the comment behind it: for people, what counts is the table of the origins."""
         if remark := self.remarks.pop(key, ""):
-            self.said[key] = remark
+            self.written[key] = remark
         self.lines.append(f"{line}  # {remark}" if remark else line)
 
     def comment(self, text: str) -> None:
@@ -108,7 +76,7 @@ class _TomlWriter:
             value, key = getattr(table, name), f"{prefix}{name}"
             if (isinstance(value, TomlTable) and not isinstance(value, InlineTable)) or item_type(field):
                 below.append((key, field, value))
-            elif not self._short or self._is_told(key, table, name, field):
+            elif not self._short or self._is_kept(key, table, name, field):
                 if not self._short:
                     info = key_info(field, key)
                     unit = f" [{info.unit}]" if info.unit and info.unit != "1" else ""
@@ -122,7 +90,7 @@ class _TomlWriter:
                 self._below(f"[{key}]", field.description or "", value, f"{key}.")
 
     def _below(self, head: str, meaning: str, table: TomlTable, prefix: str) -> None:
-        """A table with its head where it has keys of its own; nothing where nothing is left of it."""
+        """A TOML table with its header, if keys remain in it; else nothing."""
         before = list(self.lines)
         if self.lines and self.lines[-1]:
             self.lines.append("")
@@ -146,7 +114,7 @@ class _TomlWriter:
             meaning = (item.__doc__ or "").rstrip(".") if number == 1 else ""
             self._below(f"[[{key}]]", meaning, table, f"{key}.{number}.")
 
-    def _is_told(self, key: str, table: TomlTable, name: str, field: FieldInfo) -> bool:
+    def _is_kept(self, key: str, table: TomlTable, name: str, field: FieldInfo) -> bool:
         """Whether the file must hold it, or holds it with a word of where it comes from."""
         value = getattr(table, name)
         if field.is_required():
@@ -155,145 +123,12 @@ class _TomlWriter:
         origin = origin_of(remark)
         # What equals the default goes where nothing is lost: an assumption whose default is marked as one, a statement
         # without a word of where it comes from whose default is not.
-        told = {"assumed": not assumed, "inherited": not assumed, "file": bool(remark) or assumed}.get(
-            origin, origin in _TOLD
+        kept = {"assumed": not assumed, "inherited": not assumed, "file": bool(remark) or assumed}.get(
+            origin, origin in _FOUND
         )
         if value is None:
             return remark.startswith("assumed")
-        return name in table.model_fields_set and (told or value != field.get_default(call_default_factory=True))
-
-
-_EXAMPLE = """\
-name = "VMC-3"
-
-[axes.x]
-max_feed_mm_per_min = 12000.0
-rapid_mm_per_min = 24000.0
-max_acceleration_mm_s2 = 3000.0
-
-[[axes.x.modes]]
-frequency_hz = 46.0
-damping_ratio = 0.02
-
-[axes.y]
-max_feed_mm_per_min = 12000.0
-rapid_mm_per_min = 24000.0
-max_acceleration_mm_s2 = 3000.0
-
-[axes.z]
-max_feed_mm_per_min = 12000.0
-rapid_mm_per_min = 18000.0
-max_acceleration_mm_s2 = 3000.0
-rigid = true
-
-[controller]
-dnc_baud = 9600  # a comment is for people
-
-[origin]
-axes.x.max_acceleration_mm_s2 = "assumed: 0.3 g, usual for a machining centre"
-axes.x.modes.1.frequency_hz = "measured: tap test"
-axes.x.modes.1.damping_ratio = "measured: tap test"
-axes.y.max_acceleration_mm_s2 = "assumed: 0.3 g, usual for a machining centre"
-axes.z.max_acceleration_mm_s2 = "assumed: 0.3 g, usual for a machining centre"
-axes.z.rapid_mm_per_min = "parameters: FANUC 1420"
-axes.z.rigid = "stated: nothing of it was seen in the tap test"
-"""
-
-
-def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
-    """The reference of a machine file's keys as Markdown."""
-    builtin = ", ".join(f"`{name}`" for name in builtin_names)
-    lines = [
-        "# The machine file",
-        "",
-        "<!-- Generated: make docs -->",
-        "",
-        "A whole machine file:",
-        "",
-        "```toml",
-        *_EXAMPLE.splitlines(),
-        "```",
-        "",
-        "What is left out has its default. [`shapegcode setup`](../howto/setup.md) writes such a file from answers,",
-        "`shapegcode machine init NAME` from a built-in machine; `--full` gives every key with its meaning.",
-        "`shapegcode machine show FILE` prints every value with its origin, `machine diff A B` in which values two",
-        "machines differ, `machine schema` the JSON Schema of the file, with which editors complete and check it.",
-        "",
-        "The file is TOML. An unknown key, a number that is not finite or a value outside its limits is an error,",
-        "and all errors of a file are listed at once.",
-        "",
-        f"Built-in machines, usable by name in place of a file: {builtin}.",
-        'For one run `--set KEY=VALUE` replaces a value, in Python `machine.with_values("tolerance.contour_um", 5)`;',
-        "both are checked as the file is. Modes count from 1 in every key (`machine show`, `--set`, `with_values`,",
-        "`study`, `optimize`): `axes.x.modes.1.frequency_hz` is the first mode of X, `axes.x.modes.0` an error.",
-        "",
-        "Where a value comes from (its provenance) stands in the table `[origin]`, by its key, or beside it:",
-        '`frequency_hz = { value = 46.2, origin = "measured" }`. The text begins with `measured`, `parameters`',
-        "(of the control), `inherited` (from another machine), `assumed`, `choice` (a property of no machine),",
-        '`default` or `stated`, and a note may follow: `"measured: tap of 3 May"`. A value without an origin is',
-        "what the file states. Comments are for people and never read. Older files have neither form: the first",
-        "words of their comments count (`# measured ...`), with a warning; `shapegcode machine show FILE",
-        "--write-origins` writes the table into the file. `machine show` counts the origins, and a verdict ends",
-        "with those that it depends on and that are unverified.",
-        "",
-        "A default marked **assumed** is not known for real controllers in general: look it up or measure",
-        "it. The FANUC column names the parameter that corresponds to a key; numbers differ between series,",
-        "so check your manual.",
-    ]
-    return "\n".join([*lines, *key_tables(model)]) + "\n"
-
-
-def key_tables(model: type[TomlTable], *, fanuc: bool = True, heading: str = "##") -> list[str]:
-    """The keys of a file as Markdown: a heading and a table for each of its tables, a line each."""
-    lines: list[str] = []
-    columns = ("key", "unit", "default", "FANUC", "meaning") if fanuc else ("key", "unit", "default", "meaning")
-    for table, meaning, infos in _documented(model, ""):
-        lines += ["", f"{heading} {_heading(table)}", ""]
-        if meaning:
-            lines += [f"{meaning[:1].upper()}{meaning[1:]}.", ""]
-        lines += [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
-        for info in infos:
-            name = info.key.removeprefix(f"{table}.")
-            default = info.default if info.default in ("required", "not set") else f"`{info.default}`"
-            cells = {
-                "key": f"`{name}`",
-                "unit": info.unit or "–",
-                "default": default + (" **assumed**" if info.assumed else ""),
-                "FANUC": info.fanuc or "–",
-                "meaning": info.meaning,
-            }
-            lines.append("| " + " | ".join(cells[column].replace("|", "\\|") for column in columns) + " |")
-    return lines
-
-
-def _documented(model: type[TomlTable], prefix: str) -> Iterator[tuple[str, str, list[KeyInfo]]]:
-    """Per table of the file: its name, its meaning, its keys."""
-    keys: list[KeyInfo] = []
-    below: list[tuple[str, str, type[TomlTable]]] = []
-    for name, field in model.model_fields.items():
-        sub, key = table_type(field), f"{prefix}{name}"
-        if sub is None or issubclass(sub, InlineTable):
-            keys.append(key_info(field, key))
-            continue
-        alike = [other for other, inner in model.model_fields.items() if table_type(inner) is sub]
-        if item_type(field):
-            below.append((f"{key}[].", field.description or "", sub))
-        elif len(alike) == 1:
-            below.append((f"{key}.", field.description or "", sub))
-        elif name == alike[0]:
-            # Tables of one type, such as the axes, are described once, by the words of their type.
-            below.append((f"{prefix}<{'|'.join(alike)}>.", (sub.__doc__ or "").rstrip("."), sub))
-    if keys:
-        yield prefix.rstrip("."), "", keys
-    for sub_prefix, meaning, sub in below:
-        for table, text, infos in _documented(sub, sub_prefix):
-            yield table, text or meaning, infos
-
-
-def _heading(table: str) -> str:
-    if not table:
-        return "Top level"
-    return f"`[[{table.removesuffix('[]')}]]`" if table.endswith("[]") else f"`[{table}]`"
+        return name in table.model_fields_set and (kept or value != field.get_default(call_default_factory=True))
 
 
 def toml_schema(model: type[TomlTable], title: str, *, origins: bool = False) -> dict[str, Any]:
@@ -325,8 +160,8 @@ def _allow_origins(model: type[TomlTable], found: dict[str, Any], defs: dict[str
                 continue
             value = entry["properties"][name]
             if beside not in value.get("anyOf", ()):
-                said = {key: value.pop(key) for key in ("description", "default") if key in value}
-                entry["properties"][name] = {"anyOf": [*value.get("anyOf", [value]), beside]} | said
+                text = {key: value.pop(key) for key in ("description", "default") if key in value}
+                entry["properties"][name] = {"anyOf": [*value.get("anyOf", [value]), beside]} | text
     found["properties"][ORIGIN] = {"$ref": "#/$defs/Origins", "description": "where values come from, by key"}
 
 
@@ -357,8 +192,8 @@ def _table(patterns: dict[str, Any]) -> dict[str, Any]:
 
 def _describe(entry: dict[str, Any]) -> None:
     unit, fanuc, assumed = (entry.pop(name, "") for name in ("unit", "fanuc", "assumed"))
-    said = entry.get("description", "")
-    said += f" [{unit}]" if unit and unit != "1" else ""
-    said += f" (FANUC parameter {fanuc})" if fanuc else ""
-    entry["description"] = said + (" The default is assumed." if assumed else "")
+    text = entry.get("description", "")
+    text += f" [{unit}]" if unit and unit != "1" else ""
+    text += f" (FANUC parameter {fanuc})" if fanuc else ""
+    entry["description"] = text + (" The default is assumed." if assumed else "")
     entry.pop("title", None)

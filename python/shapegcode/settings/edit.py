@@ -1,4 +1,4 @@
-"""A TOML file edited with tomlkit: some entries change, the rest stays byte for byte.
+"""A TOML file edited with tomlkit: some entries, or where values come from, change, the rest stays byte for byte.
 
 The entries of a table are the list ``table.value.body``: keys with their items, comments, blank lines. It is edited in
 place; then the document is rendered. Whoever edits reads the result again and compares it with what was meant.
@@ -7,15 +7,22 @@ place; then the document is rendered. Whoever edits reads the result again and c
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import Any, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import tomlkit
-from tomlkit.items import AoT, Comment, Item, Key, Table, Whitespace
+from tomlkit.items import AoT, Comment, InlineTable, Item, Key, Table, Whitespace
 
-from shapegcode.errors import ArgumentError, FileError, Problem
-from shapegcode.settings.keys import InlineTable, TomlTable, toml
-from shapegcode.settings.load import validated
+from shapegcode.errors import ArgumentError
+from shapegcode.settings.remarks import (
+    ORIGIN,
+    ORIGIN_TEXT,
+    ORIGIN_WORDS,
+    lines_of,
+    origin_of,
+    remarks_of,
+    take_origins,
+)
 
 Entry = tuple[Key | None, Item]
 
@@ -41,27 +48,27 @@ def entry_of(line: str) -> Entry:
 
 def commented_key(entry: Entry) -> str:
     """The name in a comment ``# name = ...``, which stands for a key that is left out; empty for everything else."""
-    return _said(entry, _COMMENTED_KEY)
+    return _commented(entry, _COMMENTED_KEY)
 
 
 def commented_table(entry: Entry) -> str:
     """The name in a comment ``# [[name]]``, which stands for a list without tables; empty for everything else."""
-    return _said(entry, _COMMENTED_TABLE)
+    return _commented(entry, _COMMENTED_TABLE)
 
 
-def _said(entry: Entry, pattern: re.Pattern[str]) -> str:
+def _commented(entry: Entry, pattern: re.Pattern[str]) -> str:
     match = pattern.match(entry[1].trivia.comment) if isinstance(entry[1], Comment) else None
     return match[1] if match else ""
 
 
 def own_end(entries: list[Entry]) -> int:
     """One behind the last key, and behind the commented keys that follow it at once: what is there is of others."""
-    end = max((place + 1 for place, (key, _) in enumerate(entries) if key is not None), default=0)
-    for place in range(end, len(entries)):
-        if not isinstance(entries[place][1], Comment) or commented_table(entries[place]):
+    end = max((index + 1 for index, (key, _) in enumerate(entries) if key is not None), default=0)
+    for index in range(end, len(entries)):
+        if not isinstance(entries[index][1], Comment) or commented_table(entries[index]):
             break
-        if commented_key(entries[place]):
-            end = place + 1
+        if commented_key(entries[index]):
+            end = index + 1
     return end
 
 
@@ -88,84 +95,59 @@ def is_blank(entry: Entry) -> bool:
     return isinstance(entry[1], Whitespace)
 
 
-_Model = TypeVar("_Model", bound=TomlTable)
-# A part of a dotted key: in quotes where it holds a dot itself.
-_PART = re.compile(r'"([^"]*)"|([^."]+)')
+# --- where values come from -------------------------------------------------------------------------------------------
 
 
-def with_values(settings: _Model, values: Mapping[str, object], source: str, error: type[FileError]) -> _Model:
-    """The settings with other values; what was a default stays one."""
-    data = _plain(settings)
-    for key, value in values.items():
-        *tables, last = parts = _parts(key)
-        place: Any = data
-        held: Any = settings
-        for rank, name in enumerate(parts):
-            if wrong := _no_row(place, parts[:rank], name):
-                raise error(source, (Problem(key, toml(value), wrong),))
-            if rank < len(tables):
-                held = _below(held, name)
-                place = _entry(place, name, held)
-        if isinstance(place, list):
-            place[int(last) - 1] = value
-        elif isinstance(place, dict) and value is None:
-            place.pop(last, None)
-        elif isinstance(place, dict):
-            place[last] = value
-        else:
-            raise error(source, (Problem(key, toml(value), "no such key"),))
-    return validated(type(settings), data, source, "", error)
+def origin_lines(remarks: Mapping[str, str]) -> list[str]:
+    """The table of the origins."""
+    lines = [f"{key} = {tomlkit.string(_stated(remark)).as_string()}" for key, remark in remarks.items() if remark]
+    return [f"[{ORIGIN}]  # where values come from: {', '.join(ORIGIN_WORDS.values())}", *lines] if lines else []
 
 
-def missing_row(settings: TomlTable, key: str) -> str:
-    """Why a dotted key names no entry of a list: there it must be a number from 1 to as many as there are."""
-    held: Any = settings
-    parts = _parts(key)
-    for rank, name in enumerate(parts):
-        if wrong := _no_row(held, parts[:rank], name):
-            return wrong
-        held = _below(held, name)
-    return ""
+def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> str:
+    """A file with its origins in a table at its end; the rest stays byte for byte, but for values with an origin."""
+    remarks = remarks_of(text) if remarks is None else remarks
+    document = tomlkit.parse(text)
+    if take_origins(document)[1] is not None:
+        document.pop(ORIGIN, None)
+        _unwrap(document)
+        text = document.as_string()
+    newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
+    table = "".join(line + newline for line in origin_lines(remarks))
+    return text.rstrip("\r\n") + 2 * newline + table if table else text
 
 
-def _no_row(held: Any, above: list[str], name: str) -> str:
-    if not isinstance(held, list | tuple) or _is_row(name, held):
-        return ""
-    there = f"there {'is' if len(held) == 1 else 'are'} {len(held)}" if held else "there is none"
-    return f"no such key: {'.'.join(above)} counts from 1, and {there}"
+def _unwrap(table: Any) -> None:
+    for name, item in list(table.items()):
+        if isinstance(item, InlineTable) and item.keys() == {"value", ORIGIN}:
+            table[name] = item["value"]
+        elif isinstance(item, AoT):
+            for each in item.body:
+                _unwrap(each)
+        elif isinstance(item, Table) or (not isinstance(item, InlineTable) and isinstance(item, Mapping)):
+            _unwrap(item)
 
 
-def _parts(key: str) -> list[str]:
-    return [quoted or bare for quoted, bare in _PART.findall(key)] or [key]
+def with_remarks(text: str, change: Callable[[str, str], str]) -> str:
+    """A file whose values come from elsewhere; comments that said the same as an origin follow it."""
+    old = remarks_of(text)
+    new = {key: change(key, remark) for key, remark in old.items()}
+    lines = []
+    for raw, line in lines_of(text):
+        if (
+            line is None
+            or line.kind == "table"
+            or line.remark != old.get(line.key, "")
+            or new.get(line.key, "") == line.remark
+        ):
+            lines.append(raw)
+            continue
+        body, remark = raw.rstrip("\r\n"), new[line.key]
+        lines.append(body[: line.end].rstrip() + (f"  # {remark}" if remark else "") + raw[len(body) :])
+    return with_origin_table("".join(lines), new)
 
 
-def _plain(value: Any) -> Any:
-    """What a file says of a value, in the dictionaries and lists of a TOML file."""
-    if isinstance(value, TomlTable):
-        fields = {name: getattr(value, name) for name in value.model_fields_set}
-        return {name: _plain(held) for name, held in fields.items() if held is not None}
-    if isinstance(value, Mapping):
-        return {name: _plain(held) for name, held in value.items()}
-    return [_plain(held) for held in value] if isinstance(value, list | tuple) else value
-
-
-def _is_row(name: str, rows: list[Any] | tuple[Any, ...]) -> bool:
-    return name.isdigit() and 0 < int(name) <= len(rows)
-
-
-def _below(held: Any, name: str) -> Any:
-    """What the loaded settings hold under a name, defaults as well; None where there is nothing."""
-    if isinstance(held, Mapping):
-        return held.get(name)
-    if isinstance(held, list | tuple):
-        return held[int(name) - 1] if _is_row(name, held) else None
-    return getattr(held, name, None) if isinstance(held, TomlTable) else None
-
-
-def _entry(place: Any, name: str, held: Any) -> Any:
-    """A table of the file by its name, made where the file leaves it out; None where there can be none."""
-    if isinstance(place, dict):
-        # A value that is a table goes as a whole: its other keys must not be lost.
-        whole = held is not None and (isinstance(held, InlineTable) or not isinstance(held, TomlTable))
-        return place.setdefault(name, _plain(held) if whole else {})
-    return place[int(name) - 1] if isinstance(place, list) else None
+def _stated(remark: str) -> str:
+    word = ORIGIN_WORDS[origin_of(remark)]
+    found = re.match(ORIGIN_TEXT, remark)
+    return remark if found and found[1] == word else f"{word}: {remark}"

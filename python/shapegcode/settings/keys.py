@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, get_args
@@ -12,7 +13,7 @@ from typing import Annotated, Any, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
 from pydantic.fields import FieldInfo
 
-from shapegcode.settings.remarks import Origin
+from shapegcode.settings.remarks import Origin, origin_of
 
 # Numbers are strict: a string or a truth value in place of a number is an error; 3 for 3.0 is not.
 Float = Annotated[float, Strict(), Field(allow_inf_nan=False)]
@@ -208,6 +209,37 @@ def key_info(field: FieldInfo, key: str) -> KeyInfo:
         fanuc=noted.get("fanuc", ""),
         assumed=bool(noted.get("assumed")),
     )
+
+
+def values_of(
+    table: TomlTable, prefix: str = "", given: bool = True, remarks: Mapping[str, str] | None = None
+) -> Iterator[KeyValue]:
+    """Every key below a table with its value and origin, in the order of the file."""
+    for name, field in type(table).model_fields.items():
+        value, key = getattr(table, name), f"{prefix}{name}"
+        from_file = given and name in table.model_fields_set
+        if isinstance(value, TomlTable) and not isinstance(value, InlineTable):
+            yield from values_of(value, f"{key}.", from_file, remarks)
+        elif item_type(field) and value:
+            for number, item in enumerate(value, start=1):
+                yield from values_of(item, f"{key}.{number}.", from_file, remarks)
+        else:
+            info = key_info(field, key)
+            remark = (remarks or {}).get(key, "")
+            # A key without a value can have a remark that says why: "assumed: not limited", "not measured: rigid".
+            says_why = not value and (value is not None or remark.startswith("assumed"))
+            origin = origin_of(remark) if from_file or (remark and says_why) else "default"
+            assumed = origin == "assumed" or (info.assumed and origin == "default")
+            yield KeyValue(
+                key=key,
+                value="not set" if value is None else toml(value),
+                unit=info.unit,
+                origin=origin,
+                assumed=assumed,
+                meaning=info.meaning,
+                fanuc=info.fanuc,
+                remark=remark,
+            )
 
 
 def toml(value: object) -> str:

@@ -1,10 +1,11 @@
-"""Reading a TOML file of settings as its model: every problem at once, each with its line."""
+"""Reading a TOML file of settings as its model: every problem at once, each with its line; values changed by key."""
 
 from __future__ import annotations
 
 import difflib
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,8 +14,8 @@ from pydantic.fields import FieldInfo
 
 from shapegcode.errors import FileError, Problem
 from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file, toml_tables
-from shapegcode.settings.keys import TomlTable, facts, table_type, toml, toml_key
-from shapegcode.settings.remarks import open_brackets
+from shapegcode.settings.keys import InlineTable, TomlTable, facts, table_type, toml, toml_key
+from shapegcode.settings.remarks import lines_of
 
 MAX_PROBLEMS = 100
 _LONGEST_NAME = 200  # that is compared with known ones
@@ -31,7 +32,7 @@ class KeyProblem(ValueError):
 
 
 def syntax_problem(message: str, text: str) -> Problem:
-    """The place of a TOML syntax error, which tomllib only tells in words."""
+    """Line and column of a TOML syntax error, which tomllib has only in its message."""
     found = re.search(r"\s*\(at line (\d+), column (\d+)\)$", message)
     if found:
         return Problem("", "", f"{message[: found.start()]} (column {found[2]})", int(found[1]))
@@ -72,52 +73,38 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
 
 
 def further_problems(count: int) -> tuple[Problem, ...]:
-    """That there are more than the first `MAX_PROBLEMS`, where there are: to find the line of each takes time."""
+    """Note that there are more than `MAX_PROBLEMS` problems; finding the line of each takes time."""
     more = count - MAX_PROBLEMS
     return (Problem("", "", f"{more} further problems are not listed"),) if more > 0 else ()
 
 
-def _number(limit: float) -> str:
-    return f"{limit:g}" if abs(limit) < 1e6 else str(limit)
+_LIMITS = {
+    "missing": "required, but missing",
+    "greater_than": "must be greater than {gt}",
+    "greater_than_equal": "must be {ge} or more",
+    "less_than": "must be less than {lt}",
+    "less_than_equal": "must be {le} or less",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    **dict.fromkeys(("int_type", "int_from_float"), "must be a whole number"),
+    "bool_type": "must be true or false",
+    "string_type": "must be a text in quotes",
+    "literal_error": "must be {expected}",
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "must be a table"),
+    "too_short": "must have {min_length} or more values",
+    "too_long": "must have {max_length} or fewer values",
+    **dict.fromkeys(("tuple_type", "list_type"), "must be a list"),
+    "value_error": "{error}",
+}
+"""What a value must be, in words, by pydantic's kind of the error."""
 
 
 def _limit(kind: str, context: Mapping[str, Any], message: str) -> str:
-    """What a value must be, in words, from pydantic's description of the error."""
-    match kind:
-        case "missing":
-            return "required, but missing"
-        case "greater_than":
-            return f"must be greater than {_number(context['gt'])}"
-        case "greater_than_equal":
-            return f"must be {_number(context['ge'])} or more"
-        case "less_than":
-            return f"must be less than {_number(context['lt'])}"
-        case "less_than_equal":
-            return f"must be {_number(context['le'])} or less"
-        case "finite_number":
-            return "must be a finite number"
-        case "float_type":
-            return "must be a number"
-        case "int_type" | "int_from_float":
-            return "must be a whole number"
-        case "bool_type":
-            return "must be true or false"
-        case "string_type":
-            return "must be a text in quotes"
-        case "literal_error":
-            return f"must be {context['expected']}".replace("'", '"')
-        case "model_type" | "model_attributes_type" | "dict_type":
-            return "must be a table"
-        case "too_short":
-            return f"must have {context['min_length']} or more values"
-        case "too_long":
-            return f"must have {context['max_length']} or fewer values"
-        case "tuple_type" | "list_type":
-            return "must be a list"
-        case "value_error":
-            return str(context["error"])
-        case _:
-            return message[:1].lower() + message[1:]
+    if kind not in _LIMITS:
+        return message[:1].lower() + message[1:]
+    numbers = {name: f"{context[name]:g}" for name in ("gt", "ge", "lt", "le") if abs(context.get(name, 1e9)) < 1e6}
+    text = _LIMITS[kind].format_map({**context, **numbers})
+    return text.replace("'", '"') if kind == "literal_error" else text
 
 
 def _short(value: object) -> str:
@@ -176,33 +163,20 @@ def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     return f"; known here: {', '.join(model.model_fields)}"
 
 
-_HEADER = re.compile(r"\s*\[{1,2}\s*([^\[\]]+?)\s*\]{1,2}\s*(?:#.*)?")
+@lru_cache(maxsize=1)  # every problem of a file asks
+def _first_lines(text: str) -> dict[tuple[str, str], int]:
+    found: dict[tuple[str, str], int] = {}
+    for number, (_, line) in enumerate(lines_of(text), start=1):
+        if line is not None:
+            found.setdefault((line.kind, line.key), number)
+    return found
 
 
 def line_of(key: str, text: str) -> int | None:
     """Line of a dotted key in a text of the plain layout ``[table]`` / ``key = value``; None if not found there."""
-    table, counts = "", dict[str, int]()
-    inside = 0  # depth of the brackets of a list that goes over several lines
-    for number, line in enumerate(text.splitlines(), start=1):
-        if inside:
-            inside += open_brackets(line)
-            continue
-        header = _HEADER.fullmatch(line)
-        if header:
-            table = re.sub(r"\s*\.\s*", ".", header[1])
-            if line.lstrip().startswith("[["):
-                counts[table] = counts.get(table, 0) + 1
-                table = f"{table}.{counts[table]}"
-            if table == key:
-                return number
-            continue
-        assignment = re.match(r'\s*([A-Za-z0-9_.-]+|"[^"]*")\s*=', line)
-        if assignment:
-            name = f"{table}.{assignment[1]}" if table else assignment[1]
-            if key == name or key.startswith(name + "."):
-                return number
-            inside = open_brackets(line[assignment.end() :])
-    return None
+    lines, parts = _first_lines(text), key.split(".")
+    names = [("key", ".".join(parts[:count])) for count in range(1, len(parts) + 1)]
+    return min((lines[name] for name in (*names, ("table", key)) if name in lines), default=None)
 
 
 _Model = TypeVar("_Model", bound=TomlTable)
@@ -238,3 +212,87 @@ def loaded(model: type[_Model], path: str | Path, error: type[FileError]) -> _Mo
     """A file as its model."""
     text = read_text(Path(path), error)
     return validated(model, parsed(text, str(path), error), str(path), text, error)
+
+
+# --- values changed by their dotted keys ------------------------------------------------------------------------------
+
+# A part of a dotted key: in quotes where it holds a dot itself.
+_PART = re.compile(r'"([^"]*)"|([^."]+)')
+
+
+def with_values(settings: _Model, values: Mapping[str, object], source: str, error: type[FileError]) -> _Model:
+    """The settings with other values; what was a default stays one."""
+    data = _plain(settings)
+    for key, value in values.items():
+        *tables, last = parts = _parts(key)
+        table: Any = data
+        held: Any = settings
+        for rank, name in enumerate(parts):
+            if wrong := _no_row(table, parts[:rank], name):
+                raise error(source, (Problem(key, toml(value), wrong),))
+            if rank < len(tables):
+                held = _below(held, name)
+                table = _entry(table, name, held)
+        if isinstance(table, list):
+            table[int(last) - 1] = value
+        elif isinstance(table, dict) and value is None:
+            table.pop(last, None)
+        elif isinstance(table, dict):
+            table[last] = value
+        else:
+            raise error(source, (Problem(key, toml(value), "no such key"),))
+    return validated(type(settings), data, source, "", error)
+
+
+def missing_row(settings: TomlTable, key: str) -> str:
+    """Why a dotted key names no entry of a list: there it must be a number from 1 to as many as there are."""
+    held: Any = settings
+    parts = _parts(key)
+    for rank, name in enumerate(parts):
+        if wrong := _no_row(held, parts[:rank], name):
+            return wrong
+        held = _below(held, name)
+    return ""
+
+
+def _no_row(held: Any, above: list[str], name: str) -> str:
+    if not isinstance(held, list | tuple) or _is_row(name, held):
+        return ""
+    there = f"there {'is' if len(held) == 1 else 'are'} {len(held)}" if held else "there is none"
+    return f"no such key: {'.'.join(above)} counts from 1, and {there}"
+
+
+def _parts(key: str) -> list[str]:
+    return [quoted or bare for quoted, bare in _PART.findall(key)] or [key]
+
+
+def _plain(value: Any) -> Any:
+    """What a file says of a value, in the dictionaries and lists of a TOML file."""
+    if isinstance(value, TomlTable):
+        fields = {name: getattr(value, name) for name in value.model_fields_set}
+        return {name: _plain(held) for name, held in fields.items() if held is not None}
+    if isinstance(value, Mapping):
+        return {name: _plain(held) for name, held in value.items()}
+    return [_plain(held) for held in value] if isinstance(value, list | tuple) else value
+
+
+def _is_row(name: str, rows: list[Any] | tuple[Any, ...]) -> bool:
+    return name.isdigit() and 0 < int(name) <= len(rows)
+
+
+def _below(held: Any, name: str) -> Any:
+    """What the loaded settings hold under a name, defaults as well; None where there is nothing."""
+    if isinstance(held, Mapping):
+        return held.get(name)
+    if isinstance(held, list | tuple):
+        return held[int(name) - 1] if _is_row(name, held) else None
+    return getattr(held, name, None) if isinstance(held, TomlTable) else None
+
+
+def _entry(table: Any, name: str, held: Any) -> Any:
+    """A table of the file by its name, made where the file leaves it out; None where there can be none."""
+    if isinstance(table, dict):
+        # A value that is a table goes as a whole: its other keys must not be lost.
+        whole = held is not None and (isinstance(held, InlineTable) or not isinstance(held, TomlTable))
+        return table.setdefault(name, _plain(held) if whole else {})
+    return table[int(name) - 1] if isinstance(table, list) else None

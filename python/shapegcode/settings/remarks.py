@@ -13,19 +13,13 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
-
-import tomlkit
-from tomlkit.items import AoT, InlineTable, Table
 
 Origin = Literal["measured", "dump", "inherited", "assumed", "choice", "file", "default"]
 """Of a value: measured on this machine; read from the control's dump; taken over from another machine; assumed; a
 choice, no property of a machine; stated in the file without a word of where it comes from; left out of the file."""
-
-MEASURED = "measured"
-"""What the remark of a measured value begins with."""
 
 DEFAULT = "default"
 """The remark of a default that was written into a file."""
@@ -33,7 +27,7 @@ DEFAULT = "default"
 ORIGIN = "origin"
 """Name of the table, and of the key beside an inline value."""
 
-_WORDS: dict[Origin, str] = {
+ORIGIN_WORDS: dict[Origin, str] = {
     "measured": "measured",
     "dump": "parameters",
     "inherited": "inherited",
@@ -42,7 +36,7 @@ _WORDS: dict[Origin, str] = {
     "default": "default",
     "file": "stated",
 }
-ORIGIN_TEXT = rf"^({'|'.join(_WORDS.values())})($|: .|, .| \(.)"
+ORIGIN_TEXT = rf"^({'|'.join(ORIGIN_WORDS.values())})($|: .|, .| \(.)"
 """What the text of an origin begins with; a note may follow."""
 
 _BEGINNINGS: tuple[tuple[str, Origin], ...] = (
@@ -75,12 +69,13 @@ def inherited(name: str, remark: str) -> str:
 
 
 @dataclass(frozen=True)
-class _Line:
-    """A line with a key: what it is called, where its remark begins, and the remark."""
+class KeyLine:
+    """A line that names a table or a key, or in a comment ``# name = ...`` a key that is left out."""
 
-    key: str
-    end: int
-    remark: str
+    kind: Literal["table", "key", "unset"]
+    key: str  # dotted name
+    end: int = 0  # where its remark begins
+    remark: str = ""
 
 
 def take_origins(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any] | None]:
@@ -90,8 +85,8 @@ def take_origins(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
     plain = {name: _plain(value, name, inline) for name, value in data.items() if name != ORIGIN}
     if ORIGIN in data:
         _flatten(data[ORIGIN], "", found)
-    for key, said in inline.items():
-        _note(key, said, found)
+    for key, origin in inline.items():
+        _note(key, origin, found)
     return plain, found if ORIGIN in data or inline else None
 
 
@@ -114,8 +109,8 @@ def _flatten(value: Any, key: str, found: dict[str, Any]) -> None:
         _flatten(each, f"{key}.{name}" if key else name, found)
 
 
-def _note(key: str, said: Any, found: dict[str, Any]) -> None:
-    found[key] = [found[key], said] if key in found else said
+def _note(key: str, origin: Any, found: dict[str, Any]) -> None:
+    found[key] = [found[key], origin] if key in found else origin
 
 
 def remark_of(stated: str) -> str:
@@ -124,69 +119,19 @@ def remark_of(stated: str) -> str:
     return note if note and origin_of(note) == origin_of(word) else stated
 
 
-def _stated(remark: str) -> str:
-    word = _WORDS[origin_of(remark)]
-    found = re.match(ORIGIN_TEXT, remark)
-    return remark if found and found[1] == word else f"{word}: {remark}"
-
-
 def remarks_of(text: str) -> dict[str, str]:
     """Where the values of a file come from."""
     stated = take_origins(tomllib.loads(text))[1]
-    return remarks_in_comments(text) if stated is None else {key: remark_of(said) for key, said in stated.items()}
+    return remarks_in_comments(text) if stated is None else {key: remark_of(origin) for key, origin in stated.items()}
 
 
 def remarks_in_comments(text: str) -> dict[str, str]:
     """What stands behind the values of a file that has neither form of origins."""
-    return {line.key: line.remark for _, line in _lines(text) if line is not None and line.remark}
+    return {line.key: line.remark for _, line in lines_of(text) if line and line.remark}
 
 
-def origin_lines(remarks: Mapping[str, str]) -> list[str]:
-    """The table of the origins."""
-    lines = [f"{key} = {tomlkit.string(_stated(remark)).as_string()}" for key, remark in remarks.items() if remark]
-    return [f"[{ORIGIN}]  # where values come from: {', '.join(_WORDS.values())}", *lines] if lines else []
-
-
-def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> str:
-    """A file with its origins in a table at its end; the rest stays byte for byte, but for values with an origin."""
-    remarks = remarks_of(text) if remarks is None else remarks
-    document = tomlkit.parse(text)
-    if take_origins(document)[1] is not None:
-        document.pop(ORIGIN, None)
-        _unwrap(document)
-        text = document.as_string()
-    newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
-    table = "".join(line + newline for line in origin_lines(remarks))
-    return text.rstrip("\r\n") + 2 * newline + table if table else text
-
-
-def _unwrap(table: Any) -> None:
-    for name, item in list(table.items()):
-        if isinstance(item, InlineTable) and item.keys() == {"value", ORIGIN}:
-            table[name] = item["value"]
-        elif isinstance(item, AoT):
-            for each in item.body:
-                _unwrap(each)
-        elif isinstance(item, Table) or (not isinstance(item, InlineTable) and isinstance(item, Mapping)):
-            _unwrap(item)
-
-
-def with_remarks(text: str, change: Callable[[str, str], str]) -> str:
-    """A file whose values come from elsewhere; comments that said the same as an origin follow it."""
-    old = remarks_of(text)
-    new = {key: change(key, remark) for key, remark in old.items()}
-    lines = []
-    for raw, line in _lines(text):
-        if line is None or line.remark != old.get(line.key, "") or new.get(line.key, "") == line.remark:
-            lines.append(raw)
-            continue
-        body, said = raw.rstrip("\r\n"), new[line.key]
-        lines.append(body[: line.end].rstrip() + (f"  # {said}" if said else "") + raw[len(body) :])
-    return with_origin_table("".join(lines), new)
-
-
-def _lines(text: str) -> Iterator[tuple[str, _Line | None]]:
-    """Every line with its end, and what it says of a key; None for every other line."""
+def lines_of(text: str) -> Iterator[tuple[str, KeyLine | None]]:
+    """Every line with its end, and what it names; None for every other line."""
     table, counts, inside = "", dict[str, int](), 0
     texts = _lines_of_long_texts(text)
     for number, raw in enumerate(text.splitlines(keepends=True)):
@@ -201,18 +146,18 @@ def _lines(text: str) -> Iterator[tuple[str, _Line | None]]:
             if header[1] == "[[":
                 counts[table] = counts.get(table, 0) + 1
                 table = f"{table}.{counts[table]}"
-            yield raw, None
+            yield raw, KeyLine("table", table)
         elif (found := _UNSET_LIST.fullmatch(line)) or (found := _UNSET.fullmatch(line)):
             listed = "[[" in line.partition("=")[0]
             key = found[1] if listed or not table else f"{table}.{found[1]}"
             end_of = len(line) if found[2] is None else line.rindex("#", 0, found.start(2))
-            yield raw, _Line(key, end_of, (found[2] or "").strip())
+            yield raw, KeyLine("unset", key, end_of, (found[2] or "").strip())
         elif found := _KEY.match(line):
             key = f"{table}.{found[1]}" if table else found[1]
             end = _VALUE.match(line, found.end())
             assert end is not None
             inside = open_brackets(line[found.end() :])
-            yield raw, _Line(key, end.end(), line[end.end() :].lstrip("# ").rstrip())
+            yield raw, KeyLine("key", key, end.end(), line[end.end() :].lstrip("# ").rstrip())
         else:
             yield raw, None
 

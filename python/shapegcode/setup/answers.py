@@ -54,15 +54,15 @@ class ModesAnswer(InlineTable):
 
     @field_validator("x", "y", "z")
     @classmethod
-    def _possible(cls, said: str) -> str:
-        if is_mode(said):
-            frequency, damping = mode_of(said)
+    def _possible(cls, answer: str) -> str:
+        if is_mode(answer):
+            frequency, damping = mode_of(answer)
             if not 0.0 < frequency <= _HIGHEST_HZ or not 0.0 <= damping < 1.0:
                 raise ValueError(
                     f"the frequency must be above 0 and at most {_HIGHEST_HZ:g} (unit: Hz), the damping ratio "
                     "0 or more and below 1"
                 )
-        return said
+        return answer
 
 
 class Answers(TomlTable):
@@ -86,17 +86,17 @@ class Answers(TomlTable):
 
     @field_validator("name")
     @classmethod
-    def _plain(cls, said: str) -> str:
-        if not re.fullmatch(r"[\x20-\x7e]{1,60}", said) or not said.strip():
+    def _plain(cls, answer: str) -> str:
+        if not re.fullmatch(r"[\x20-\x7e]{1,60}", answer) or not answer.strip():
             raise ValueError("must be 1 to 60 plain ASCII characters, as it goes into the header of programs")
-        return said
+        return answer
 
     @model_validator(mode="after")
     def _likely(self) -> Answers:
         for name, (low, high, example) in _LIKELY.items():
-            said = getattr(self, name)
-            if said is not None and not all(low <= value <= high for value in said.as_tuple()):
-                raise KeyProblem(name, said, f"must be {low:g} to {high:g} ({example})")
+            answer = getattr(self, name)
+            if answer is not None and not all(low <= value <= high for value in answer.as_tuple()):
+                raise KeyProblem(name, answer, f"must be {low:g} to {high:g} ({example})")
         return self
 
     @model_validator(mode="after")
@@ -114,24 +114,24 @@ class Answers(TomlTable):
         Returns:
             New answers.
         """
-        taps = {axis: _file_in(folder, said) for axis, said in self.modes.model_dump().items()}
+        taps = {axis: _file_in(folder, answer) for axis, answer in self.modes.model_dump().items()}
         dump = None if self.dump is None else str(folder / self.dump)
         return self.model_copy(update={"dump": dump, "modes": ModesAnswer(**taps)})
 
 
-def is_mode(said: str) -> bool:
+def is_mode(answer: str) -> bool:
     """Whether an answer on vibration is a frequency in Hz, with or without a damping ratio."""
-    return _MODE.fullmatch(said) is not None
+    return _MODE.fullmatch(answer) is not None
 
 
-def mode_of(said: str) -> tuple[float, float]:
+def mode_of(answer: str) -> tuple[float, float]:
     """An answer that `is_mode` as frequency in Hz and damping ratio, 0.02 where none is said."""
-    frequency, _, damping = said.partition(":")
+    frequency, _, damping = answer.partition(":")
     return float(frequency), float(damping) if damping.strip() else _USUAL_DAMPING
 
 
-def _file_in(folder: Path, said: str) -> str:
-    return said if said in ("rigid", "unknown") or is_mode(said) else str(folder / said)
+def _file_in(folder: Path, answer: str) -> str:
+    return answer if answer in ("rigid", "unknown") or is_mode(answer) else str(folder / answer)
 
 
 def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
@@ -155,7 +155,7 @@ def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
         data = parsed(text, str(path), AnswersError)
     else:
         try:
-            with DataFile(path, lambda said: AnswersError(str(path), (Problem("", "", said),))) as file:
+            with DataFile(path, lambda answer: AnswersError(str(path), (Problem("", "", answer),))) as file:
                 data = file.json("the answers", file.read())
         except json.JSONDecodeError as error:
             raise AnswersError(str(path), (Problem("", "", f"not JSON: {error.msg}", error.lineno),)) from None
@@ -168,9 +168,9 @@ def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
 def _with_files(answers: Answers, source: str, text: str) -> Answers:
     """The same, if its files are there."""
     named = {"dump": answers.dump} if answers.dump is not None else {}
-    for axis, said in answers.modes.model_dump().items():
-        if said not in ("rigid", "unknown") and not is_mode(said):
-            named[f"modes.{axis}"] = said
+    for axis, answer in answers.modes.model_dump().items():
+        if answer not in ("rigid", "unknown") and not is_mode(answer):
+            named[f"modes.{axis}"] = answer
     problems = tuple(
         Problem(key, toml(file), "no such file" + (_NOT_A_MODE if key != "dump" else ""), line_of(key, text))
         for key, file in named.items()
@@ -182,8 +182,8 @@ def _with_files(answers: Answers, source: str, text: str) -> Answers:
 
 
 def _of_modes(modes: ModesAnswer) -> str:
-    said = modes.model_dump()
-    unknown = "".join(axis.upper() for axis in "xyz" if said[axis] == "unknown")
+    answer = modes.model_dump()
+    unknown = "".join(axis.upper() for axis in "xyz" if answer[axis] == "unknown")
     if not unknown:
         return "Shaping is for the modes that you say; where an axis is rigid, nothing is shaped for it."
     are = "is tapped it is" if len(unknown) == 1 else "are tapped they are"
@@ -192,55 +192,55 @@ def _of_modes(modes: ModesAnswer) -> str:
 
 EXPLAINED: Mapping[str, Callable[[Any], str]] = {
     "name": lambda _: "It stands in the header of every program that is written.",
-    "control": lambda said: (
+    "control": lambda answer: (
         "A parameter file of it can be read; look-ahead is switched by G05.1 or G08."
-        if said == "fanuc"
+        if answer == "fanuc"
         else "Programs are written as FANUC controls read them: try one above the part first."
     ),
-    "dump": lambda said: (
+    "dump": lambda answer: (
         "Limits, time constants and increments come from it; it holds no vibration."
-        if said
+        if answer
         else "Limits and time constants are then what you say, or assumed and marked so."
     ),
-    "rapid_mm_per_min": lambda said: (
+    "rapid_mm_per_min": lambda answer: (
         "The time of rapids follows from it."
-        if said
+        if answer
         else "24 m/min are assumed, as usual for a machining centre: the time of rapids is a guess."
     ),
-    "max_feed_mm_per_min": lambda said: (
-        "Feeds above it are cut down, and cost time." if said else "The rapid rate is assumed for it."
+    "max_feed_mm_per_min": lambda answer: (
+        "Feeds above it are cut down, and cost time." if answer else "The rapid rate is assumed for it."
     ),
-    "max_acceleration_mm_s2": lambda said: (
+    "max_acceleration_mm_s2": lambda answer: (
         "It says how sharply corners are taken, and what excites vibration."
-        if said
+        if answer
         else "0.3 g is assumed, as usual for a machining centre: measure it with `shapegcode characterize`."
     ),
-    "least_increment_mm": lambda said: (
+    "least_increment_mm": lambda answer: (
         "Ends of blocks are rounded to it: the finer, the less shaping loses."
-        if said
+        if answer
         else "0.001 mm is assumed (IS-B)."
     ),
-    "delivery": lambda said: {
+    "delivery": lambda answer: {
         "memory": "What is written must fit the memory; convert says whether it does.",
         "dnc": "Blocks cannot come faster than the line carries them.",
         "data server": "Size and speed of the line hold nothing back.",
         None: "Nothing is held back for it.",
-    }[said],
-    "dnc_baud": lambda said: (
-        f"{said / 11:.0f} characters, or some {said / 11 / 25:.0f} short blocks a second: convert warns where that is "
-        f"too slow, and `--baud {said}` fits the program to it."
-        if said
+    }[answer],
+    "dnc_baud": lambda answer: (
+        f"{answer / 11:.0f} characters, or some {answer / 11 / 25:.0f} short blocks a second: convert warns where that "
+        f"is too slow, and `--baud {answer}` fits the program to it."
+        if answer
         else "Nobody can say then whether blocks arrive in time: set controller.dnc_baud before a shaped program runs."
     ),
-    "program_memory_kb": lambda said: "A larger program gets a warning." if said else "256 kB are assumed.",
-    "look_ahead": lambda said: (
+    "program_memory_kb": lambda answer: "A larger program gets a warning." if answer else "256 kB are assumed.",
+    "look_ahead": lambda answer: (
         "The mode goes off before each shaped cut and on again behind it."
-        if said not in (None, "none")
+        if answer not in (None, "none")
         else "No code is written: the mode must be off while a shaped program runs."
     ),
-    "contour_um": lambda said: (
+    "contour_um": lambda answer: (
         "Shaping may not leave the path further: tighter costs time at corners."
-        if said
+        if answer
         else "20 µm hold, for roughing; finishing wants less."
     ),
     "modes": _of_modes,

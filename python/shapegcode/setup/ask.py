@@ -97,8 +97,8 @@ def _asked(name: str, given: Mapping[str, Any]) -> Any:
     field = Answers.model_fields[name]
     question = field.description or ""
     if choices := _choices(field.annotation):
-        said = _chosen(question, {each: _TITLES[each] for each in choices})
-        return None if said == _UNKNOWN else said
+        reply = _chosen(question, {each: _TITLES[each] for each in choices})
+        return None if reply == _UNKNOWN else reply
     unit = _unit(name)
     kind = _FILES.get(name, f"{unit}, or x, y, z" if name in _OF_AXES else unit)
     typed = _typed(question, kind, lambda text: _problem(name, text, given))
@@ -119,8 +119,8 @@ def _typed(question: str, kind: str, check: Callable[[str], bool | str]) -> str:
         return text.strip() in ("", _BACK) or check(text)
 
     hint = "; ".join(filter(None, (kind, "Enter: not known yet", f"{_BACK}: back")))
-    said = questionary.text(f"{question} [{hint}]", validate=checked, validate_while_typing=False).unsafe_ask()
-    return str(said).strip()
+    reply = questionary.text(f"{question} [{hint}]", validate=checked, validate_while_typing=False).unsafe_ask()
+    return str(reply).strip()
 
 
 def _unit(name: str) -> str:
@@ -145,11 +145,11 @@ def _parsed(name: str, typed: str) -> Any:
     if found is None:
         raise ValueError(text)
     numbers = [float(part) for part in re.split(r"[\s,;/]+", found[1])]
-    unit, said = _unit(name), (found[2] or "").replace("s2", "s²").replace("um", "µm")
-    if said not in ("", unit):
-        into, factor = _UNITS.get(said, ("", 0.0))
+    unit, reply = _unit(name), (found[2] or "").replace("s2", "s²").replace("um", "µm")
+    if reply not in ("", unit):
+        into, factor = _UNITS.get(reply, ("", 0.0))
         if into != unit:
-            raise ValueError(said)
+            raise ValueError(reply)
         numbers = [number * factor for number in numbers]
     if len(numbers) == 3:
         return dict(zip("xyz", numbers, strict=True))
@@ -185,9 +185,9 @@ def _vibration(axis: str) -> str | None:
         kind = _chosen(f"{axis.upper()}: tapped, from a data sheet, or taken as rigid?", _VIBRATION)
         if kind not in _TYPED_MODES:
             return None if kind == _UNKNOWN else kind
-        said = _typed(*_TYPED_MODES[kind], _tap if kind == "file" else _mode)
-        if said != _BACK:
-            return said or None
+        reply = _typed(*_TYPED_MODES[kind], _tap if kind == "file" else _mode)
+        if reply != _BACK:
+            return reply or None
 
 
 def _tap(typed: str) -> bool | str:

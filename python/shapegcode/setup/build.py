@@ -17,6 +17,7 @@ from shapegcode.setup.answers import EXPLAINED, Answers, is_mode, mode_of
 from shapegcode.setup.result import MachineSetup, OpenQuestion
 
 _ANSWERED = "answered"
+_IN_WORDS = {"name": "name", "control": "description"}
 _ASSUMED_RAPID_MM_PER_MIN = 24_000.0
 _ASSUMED_ACCELERATION_MM_S2 = 3000.0
 _LOOK_AHEAD = {"G05.1": (["G05.1 Q0"], ["G05.1 Q1"]), "G08": (["G08 P0"], ["G08 P1"])}
@@ -39,27 +40,29 @@ def set_up(answers: Answers) -> MachineSetup:
     """
     machine, notes = _started(answers)
     remarks = dict(machine.remarks)
-    values = dict(_said(answers))
+    values = dict(_answered_values(answers))
     machine = machine.with_values({key: value for key, (value, _) in values.items()}, source=answers.name)
     remarks |= {key: remark for key, (_, remark) in values.items()}
     machine = machine.with_remarks(_for_axes(machine, remarks))
     text = machine.to_toml(short=True)
-    for axis, said in answers.modes.model_dump().items():
-        if said in ("rigid", "unknown") or is_mode(said):
+    for axis, answer in answers.modes.model_dump().items():
+        if answer in ("rigid", "unknown") or is_mode(answer):
             continue
-        found = identify(said)
+        found = identify(answer)
         if not found.modes:
-            raise ArgumentError(f"modes.{axis} = {said!r}: no mode that the data support: {found.answer}")
+            raise ArgumentError(f"modes.{axis} = {answer!r}: no mode that the data support: {found.answer}")
         update = update_modes(text, axis, found.modes, source=found.source, refused=found.refused, file=answers.name,
                               keep_modes=_with_modes(answers, axis))  # fmt: skip
         notes.append(
-            f"{axis.upper()}: {', '.join(f'{mode.frequency_hz.value:g} Hz' for mode in found.modes)} from {said}"
+            f"{axis.upper()}: {', '.join(f'{mode.frequency_hz.value:g} Hz' for mode in found.modes)} from {answer}"
         )
         text = update.text
     machine = Machine.from_toml(text, answers.name)
+    # Name and kind of control go into words that have no origin.
+    named = {key for name, key in _IN_WORDS.items() if getattr(answers, name) != Answers.model_fields[name].default}
     return MachineSetup(
         machine=answers.name,
-        answered=tuple(sorted(value.key for value in machine.values() if value.remark.startswith(_ANSWERED))),
+        answered=tuple(sorted(named | {v.key for v in machine.values() if v.remark.startswith(_ANSWERED)})),
         imported=tuple(sorted(value.key for value in machine.values() if value.origin in ("dump", "measured"))),
         open=tuple(_open(machine)),
         notes=tuple(notes),
@@ -70,7 +73,7 @@ def set_up(answers: Answers) -> MachineSetup:
 
 def _started(answers: Answers) -> tuple[Machine, list[str]]:
     """The machine of the dump, or one that has what every machine file must have."""
-    rigid = "".join(axis for axis, said in answers.modes.model_dump().items() if said == "rigid")
+    rigid = "".join(axis for axis, answer in answers.modes.model_dump().items() if answer == "rigid")
     if answers.dump is not None:
         found = _imported(answers, rigid)
         if not found.ok:
@@ -92,13 +95,13 @@ def _imported(answers: Answers, rigid: str) -> ParameterImport:
     own = {
         f"axes.{axis}.max_feed_mm_per_min": getattr(found.machine.axes, axis).rapid_mm_per_min
         for axis in "xyz"
-        if answers.max_feed_mm_per_min is None and f"axes.{axis}.max_feed_mm_per_min" not in _read(found)
+        if answers.max_feed_mm_per_min is None and f"axes.{axis}.max_feed_mm_per_min" not in _read_keys(found)
     }
     machine = found.machine.with_values(own, source=answers.name) if own else found.machine
     return replace(found, machine=machine.with_remarks(dict(found.machine.remarks)))
 
 
-def _read(found: ParameterImport) -> set[str]:
+def _read_keys(found: ParameterImport) -> set[str]:
     return {each.key for each in found.read}
 
 
@@ -146,24 +149,24 @@ def _plain(answers: Answers) -> Machine:
             ),
         }
         axes[axis] = {
-            name: assumed if said is None else getattr(said, axis) for name, (said, assumed, _) in limits.items()
+            name: assumed if answer is None else getattr(answer, axis) for name, (answer, assumed, _) in limits.items()
         }
-        for name, (said, _, why) in limits.items():
-            remarks[f"axes.{axis}.{name}"] = f"assumed: {why}" if said is None else _ANSWERED
+        for name, (answer, _, why) in limits.items():
+            remarks[f"axes.{axis}.{name}"] = f"assumed: {why}" if answer is None else _ANSWERED
     control = {"fanuc": "FANUC control", "other": "control that reads FANUC's G-code", None: "control not known yet"}
     data = {"name": answers.name, "description": f"{control[answers.control]}; set up by answers", "axes": axes}
     return Machine.from_data(data, answers.name).with_remarks(remarks)
 
 
-def _said(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
+def _answered_values(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
     """Key of the machine file, value and remark of what was said beside limits and dump."""
     yield "name", (answers.name, "")
     if answers.dump is not None:
         yield "description", (f"read from {Path(answers.dump).name}; set up by answers", "")
         for name in _LIMITS:
-            if (said := getattr(answers, name)) is not None:
+            if (answer := getattr(answers, name)) is not None:
                 for axis in "xyz":
-                    yield f"axes.{axis}.{name}", (getattr(said, axis), _ANSWERED)
+                    yield f"axes.{axis}.{name}", (getattr(answer, axis), _ANSWERED)
     if answers.least_increment_mm is not None:
         yield "controller.least_increment_mm", (answers.least_increment_mm, _ANSWERED)
     if answers.dnc_baud is not None:
@@ -178,14 +181,14 @@ def _said(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
         yield "emission.epilogue", (on, f"{_ANSWERED}: and on again")
     if answers.contour_um is not None:
         yield "tolerance.contour_um", (answers.contour_um, f"choice, {_ANSWERED}")
-    for axis, said in answers.modes.model_dump().items():
-        if said == "rigid":
+    for axis, answer in answers.modes.model_dump().items():
+        if answer == "rigid":
             yield f"axes.{axis}.rigid", (True, f"{_ANSWERED}: no mode counts")
-        elif is_mode(said):
-            frequency, damping = mode_of(said)
+        elif is_mode(answer):
+            frequency, damping = mode_of(answer)
             mode = {"frequency_hz": frequency, "damping_ratio": damping}
             yield f"axes.{axis}.modes", ([mode], "")
-            if ":" in said:
+            if ":" in answer:
                 yield f"axes.{axis}.modes.1.damping_ratio", (mode["damping_ratio"], _ANSWERED)
 
 
@@ -205,12 +208,12 @@ def _for_axes(machine: Machine, remarks: dict[str, str]) -> dict[str, str]:
 
 def _with_modes(answers: Answers, axis: str) -> str:
     """The other axes whose modes were said: they are this machine's."""
-    said = answers.modes.model_dump()
-    return "".join(other for other in "xyz" if other != axis and said[other] not in ("rigid", "unknown"))
+    answer = answers.modes.model_dump()
+    return "".join(other for other in "xyz" if other != axis and answer[other] not in ("rigid", "unknown"))
 
 
 def _open(machine: Machine) -> Iterator[OpenQuestion]:
-    """What nobody said and a verdict may rest on: axes without modes first."""
+    """Parameters without an answer to which a verdict may be sensitive: axes without modes first."""
     for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True):
         if not axis.modes and not axis.rigid:
             why = "taken as rigid until it is tapped"

@@ -59,9 +59,10 @@ class MachineSetup(Result):
     @property
     def answer(self) -> str:
         """How much of it is said, and what is open."""
-        said = f"{self.machine}: {len(self.answered)} values answered, {len(self.imported)} imported"
+        count = len(self.answered)
+        sentence = f"{self.machine}: {count} value{'' if count == 1 else 's'} answered, {len(self.imported)} imported"
         unknown = [each.key.split(".")[1].upper() for each in self.open if each.key.endswith(".modes")]
-        return f"{said}; vibration of {', '.join(unknown)} is not known" if unknown else said
+        return f"{sentence}; vibration of {', '.join(unknown)} is not known" if unknown else sentence
 
     @property
     def next_step(self) -> str:

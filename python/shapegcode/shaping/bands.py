@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, worst_residual
+from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, WorstResidual, worst_residual
 from shapegcode.results.json import hidden
 
 if TYPE_CHECKING:
@@ -29,6 +29,10 @@ _SIZE = r"(?:\d+\.?\d*|\.\d+)"
 _TEXT = re.compile(
     rf"({_NUMBER})(?::({_NUMBER}))?(?:(?:±|\+-|\+/-)({_NUMBER})(%|Hz)?|[-−]({_SIZE})(%|Hz)/?\+({_SIZE})(%|Hz))?"
 )
+VIBRATION_LIMIT = 0.05
+"""Residual ratio that a robust design may leave anywhere in the bands unless another one is asked for."""
+SAME = 0.02
+"""Durations (or, where none is good, worst residuals) that differ by less, relative, give way to a longer period."""
 ON_GRID = 1e-9
 """Periods; forgives the rounding of a quotient."""
 
@@ -202,7 +206,7 @@ def whole_periods(duration_s: float, period_s: float) -> int:
     return math.floor(duration_s / period_s + ON_GRID)
 
 
-_EXACT = 1e-3  # of the vibration; taps that someone typed have four digits
+_EXACT = 1e-3  # of the vibration; impulses that someone typed have four digits
 _TAP = re.compile(rf"\s*({_NUMBER})\s*(ms|s)?\s*:\s*({_NUMBER})\s*")
 _FORM = "TIME:AMPLITUDE,TIME:AMPLITUDE with times in s or with ms behind them, for example 0:0.5,10.87ms:0.5"
 
@@ -213,7 +217,7 @@ class Design:
 
     Attributes:
         family: name of its row in the registry.
-        shaper: the taps.
+        shaper: its impulses.
         period_s: grid on which its times lie and its zeros are exact, s; None: times are continuous.
         residual: largest residual ratio of the modes at their nominal frequencies.
         worst_residual: the same over the modes' bands.
@@ -241,17 +245,17 @@ class Design:
 
     @property
     def times_s(self) -> tuple[float, ...]:
-        """Times of the taps, s."""
+        """Times of the impulses, s."""
         return tuple(self.shaper.times_s.tolist())
 
     @property
     def amplitudes(self) -> tuple[float, ...]:
-        """Amplitudes of the taps; they add up to 1."""
+        """Amplitudes of the impulses; they add up to 1."""
         return tuple(self.shaper.amplitudes.tolist())
 
     @property
     def duration_s(self) -> float:
-        """Time of the last tap, s."""
+        """Time of the last impulse, s."""
         return self.shaper.duration_s
 
     @property
@@ -261,12 +265,12 @@ class Design:
 
     @property
     def abs_sum(self) -> float:
-        """Sum of the taps' magnitudes: 1 without negative impulses."""
+        """Sum of the impulses' magnitudes: 1 without negative impulses."""
         return self.shaper.abs_sum
 
     @property
     def negative(self) -> bool:
-        """Whether any tap is negative."""
+        """Whether any impulse is negative."""
         return self.shaper.has_negative
 
     @staticmethod
@@ -282,26 +286,30 @@ class Design:
 def evaluate(family: str, shaper: Shaper, bands: Sequence[ModeBand], period_s: float | None = None) -> Design:
     """The figures of a shaper for modes and their bands; the worst residual is proven to 1e-6 of it."""
     residual = max(shaper.residual_ratio(band.mode) for band in bands)
-    worst = max(_worst(shaper, band) for band in bands)
+    worst = max(_worst(shaper, band).residual_ratio for band in bands)
     exact = all(shaper.residual_ratio(band.mode) <= _EXACT for band in bands if not band.uncertainty)
     return Design(family, shaper, period_s, residual, worst, exact)
 
 
-def _worst(shaper: Shaper, band: ModeBand) -> float:
-    if band.uncertainty == 0.0:
-        return shaper.residual_ratio(band.mode)
-    ends_hz = (band.shifted(-1.0).frequency_hz, band.shifted(1.0).frequency_hz)
-    return worst_residual(shaper, band.mode, *ends_hz).residual_ratio
+def proven_worst(shaper: Shaper, bands: Sequence[ModeBand]) -> float:
+    """Upper bound on the residual ratio over the bands."""
+    return max(_worst(shaper, band).upper_bound for band in bands)
+
+
+def _worst(shaper: Shaper, band: ModeBand) -> WorstResidual:
+    return worst_residual(shaper, band.mode, band.shifted(-1.0).frequency_hz, band.shifted(1.0).frequency_hz)
 
 
 @dataclass(frozen=True)
 class DesignOptions:
     """What a design may be."""
 
-    period_s: float | None = None  # grid on which the taps must lie, s; None: continuous times
+    period_s: float | None = None  # grid on which the impulses must lie, s; None: continuous times
     max_duration_s: float = 0.25  # longest shaper, s
-    max_abs_sum: float = 10.0  # largest sum of the taps' magnitudes
-    vibration_limit: float = 0.05  # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
+    max_abs_sum: float = 10.0  # largest sum of the impulses' magnitudes
+    vibration_limit: float = (
+        VIBRATION_LIMIT  # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
+    )
     taps: Shaper | None = None  # the shaper of the family `taps`; no other family uses it
 
     @property
@@ -338,7 +346,7 @@ def on_grid(shaper: Shaper, period_s: float) -> Shaper:
         steps = time_s / period_s
         if abs(steps - round(steps)) > ON_GRID * max(1.0, steps):
             raise DesignError(
-                f"the tap at {ms(time_s)} is not on the {ms(period_s)} grid, nearest "
+                f"the impulse at {ms(time_s)} is not on the {ms(period_s)} grid, nearest "
                 f"{ms(round(steps) * period_s)}; rounding would undo the zeros: design on the grid"
             )
     return shaper
@@ -349,7 +357,7 @@ def _from_text(text: str) -> Shaper:
     for part in text.split(","):
         match = _TAP.fullmatch(part)
         if match is None:
-            raise ArgumentError(f"{part.strip()!r} is no tap: {_FORM}")
+            raise ArgumentError(f"{part.strip()!r} is no impulse: {_FORM}")
         times_s.append(float(match[1]) * (1e-3 if match[2] == "ms" else 1.0))
         amplitudes.append(float(match[3]))
     return Shaper(times_s, amplitudes)

@@ -33,7 +33,7 @@ from shapegcode.shaping.robust import least_worst
 
 _SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of the slowest mode and of a faster one
 _ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
-_OWN_TAPS = "taps"  # the family of taps that the user gives
+_OWN_TAPS = "taps"  # the family of impulses that the user gives
 _MOST_PERIODS = 5000  # of the longest shaper: finer grids are as good as continuous times
 _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of cycles per period
 
@@ -63,12 +63,12 @@ def choose_shaper(
             bands; one or several; empty: those of the machine.
         machine: its modes, unless some are given, and its controller: the block periods worth trying.
         uncertainty: half width of the band, relative, of modes that state none.
-        periods_s: grids on which the taps may lie, s; None among them: continuous times too. None: with a machine its
-            block period or the best few, without one continuous times and the best few multiples of 1 ms.
+        periods_s: grids on which the impulses may lie, s; None among them: continuous times too. None: with a machine
+            its block period or the best few, without one continuous times and the best few multiples of 1 ms.
         families: names of the families to compare; None: all.
         max_duration_s: longest shaper in s; None: three periods of the slowest mode, and the machine's limit if that
             is not enough.
-        max_abs_sum: largest sum of the taps' magnitudes.
+        max_abs_sum: largest sum of the impulses' magnitudes.
         vibration_limit: largest worst residual ratio of the design to take; None: the machine's
             `shaping.vibration_limit`, without a machine 0.05.
         objective: "shortest", "contour" (least contour cost) or "robust" (least worst residual).
@@ -140,10 +140,7 @@ def choose(
     allow_negative: bool = False,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Recommendation:
-    """Design every family on every kind of times, compare, and recommend.
-
-    Source: this project.
-    """
+    """Design every family on every kind of times, compare, and recommend."""
     options = options or DesignOptions()
     _check(bands, periods_s, options, objective)
     rows = _rows(families, options)
@@ -154,9 +151,10 @@ def choose(
     for done, (row, period_s) in enumerate(work):
         on_progress(done / len(work))
         if row.continuous if period_s is None else row.on_grid:
-            designs, refusal = _designs(row, bands, replace(options, period_s=period_s))
-            found += designs
-            refusals += [Refusal(row.name, period_s, refusal)] if refusal else []
+            try:
+                found += design(row.name, bands, replace(options, period_s=period_s))
+            except ShapegcodeError as error:
+                refusals.append(Refusal(row.name, period_s, str(error)))
     refusals += _never_tried(rows, usable, bands, periods_s)
     least = _least_worst(rows, usable, bands, options, found)
     found += least
@@ -182,7 +180,7 @@ def choose(
 
 
 def _rows(families: Sequence[str] | None, options: DesignOptions) -> tuple[Family, ...]:
-    """The families to compare: the user's taps only where there are some."""
+    """The families to compare: the user's impulses only where there are some."""
     if families is None:
         return tuple(row for row in FAMILIES if row.name != _OWN_TAPS or options.taps is not None)
     names = [*families, *([] if options.taps is None else [_OWN_TAPS])]
@@ -208,7 +206,7 @@ def _check(
     if options.max_duration_s > _MOST_PERIODS * finest_s:
         raise ArgumentError(
             f"a shaper of {ms(options.max_duration_s)} on a grid of {ms(finest_s)} has up to "
-            f"{options.max_duration_s / finest_s:.3g} taps, at most {_MOST_PERIODS} can be searched: take a longer "
+            f"{options.max_duration_s / finest_s:.3g} impulses, at most {_MOST_PERIODS} can be searched: take a longer "
             "period or a shorter duration"
         )
     if objective not in OBJECTIVES:
@@ -227,21 +225,13 @@ def _usable(bands: Sequence[ModeBand], periods_s: Sequence[float | None]) -> lis
 def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:
     """Why a mode cannot be cancelled on a grid, empty if all can: at the grid's instants it seems to stand still."""
     for band in bands:
-        swings = abs(band.mode.pole.imag) * period_s / (2.0 * math.pi)
-        if swings > 0.5 and abs(cmath.exp(band.mode.pole * period_s) - 1.0) < _NEAR_ONE:
+        cycles = abs(band.mode.pole.imag) * period_s / (2.0 * math.pi)
+        if cycles > 0.5 and abs(cmath.exp(band.mode.pole * period_s) - 1.0) < _NEAR_ONE:
             return (
                 f"the mode at {band.mode.frequency_hz:g} Hz cannot be cancelled on a grid of {ms(period_s)}: its "
-                f"{swings:.4g} cycles per period look like standing still there; take another period"
+                f"{cycles:.4g} cycles per period look like standing still there; take another period"
             )
     return ""
-
-
-def _designs(row: Family, bands: Sequence[ModeBand], options: DesignOptions) -> tuple[list[Design], str]:
-    """The family's designs within the limits, or why there is none."""
-    try:
-        return design(row.name, bands, options), ""
-    except ShapegcodeError as error:
-        return [], str(error)
 
 
 def _least_worst(

@@ -19,7 +19,7 @@ import highspy
 import numpy as np
 from numpy.typing import NDArray
 
-from shapegcode._core import DesignError, Shaper
+from shapegcode._core import DesignError
 from shapegcode.shaping.bands import ModeBand
 
 # Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.
@@ -53,15 +53,10 @@ def _give_back(solver: _Quiet) -> None:
 
 
 class LinearProgram:
-    """Least ``cost @ x`` over x between two bounds, under linear conditions that may be added to.
-
-    Args:
-        lower: (n,) least value of each unknown.
-        upper: (n,) largest value of each unknown; may be infinite.
-        equal: matrix and right-hand side of the equations.
-    """
+    """Least ``cost @ x`` over x between two bounds, under linear conditions that may be added to."""
 
     def __init__(self, lower: FloatArray, upper: FloatArray, equal: tuple[FloatArray, FloatArray]) -> None:
+        """Bounds of each unknown, (n,); matrix and right-hand side of the equations."""
         self._columns = np.arange(len(lower), dtype=np.int32)
         self._solver = _solver()
         weakref.finalize(self, _give_back, self._solver).atexit = False
@@ -82,7 +77,7 @@ class LinearProgram:
         self._solver.changeColsCost(len(cost), self._columns, cost)
 
     def bound(self, column: int, lower: float, upper: float) -> None:
-        """Bound one unknown anew."""
+        """Change the bounds of one unknown."""
         self._solver.changeColBounds(column, lower, upper)
 
     def solve(self) -> FloatArray | None:
@@ -126,6 +121,46 @@ class LinearProgram:
     def _set(self, **options: bool | float | str) -> None:
         for name, value in options.items():
             self._solver.setOptionValue(name, value)
+
+
+class TapProgram:
+    """Taps under equations and planes, of least cost; one unknown more is by how much the planes are exceeded.
+
+    Taps that may be negative are the difference of two that are not, so that their magnitude is linear.
+    """
+
+    def __init__(
+        self, equal: tuple[FloatArray, FloatArray], *, signed: bool, largest: float = math.inf, last_tap: float = 0.0
+    ) -> None:
+        matrix, right = equal
+        self._count, self._signed = matrix.shape[1], signed
+        matrix = np.hstack([*self._parts(matrix), np.zeros((len(matrix), 1))])
+        least = np.zeros(matrix.shape[1])
+        least[self._count - 1] = last_tap
+        self._program = LinearProgram(least, np.full(matrix.shape[1], largest), (matrix, right))
+
+    def add_planes(self, planes: FloatArray, above: FloatArray) -> None:
+        """Planes below their limits, but for the excess."""
+        self._program.add_below(np.hstack([*self._parts(planes), np.full((len(planes), 1), -1.0)]), above)
+
+    def limit_magnitudes(self, total: float) -> None:
+        """Limit the sum of the magnitudes of signed taps."""
+        self._program.add_below(np.append(np.ones(2 * self._count), 0.0)[None, :], np.array([total]))
+
+    def solve(self, cost: FloatArray | None, most: float) -> tuple[FloatArray, float] | None:
+        """Taps of least cost whose excess is at most that; without a cost those of the least excess, and it."""
+        objective = np.zeros(self._count) if cost is None else cost
+        width = len(objective) * (1 + self._signed)
+        self._program.set_cost(np.append(np.resize(objective, width), 1.0 if cost is None else 0.0))
+        self._program.bound(width, 0.0, math.inf if cost is None else most)
+        x = self._program.solve()
+        if x is None:
+            return None
+        taps = x[: self._count] - x[self._count : width] if self._signed else x[:width]
+        return taps, float(x[-1])
+
+    def _parts(self, matrix: FloatArray) -> list[FloatArray]:
+        return [matrix, -matrix] if self._signed else [matrix]
 
 
 def non_negative_least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
@@ -178,8 +213,6 @@ _FEWEST_STEPS = 8
 _MOST_ROUNDS = 60
 _STARTS = 5  # frequencies of a band at which every search begins
 _BOUNDS_SHARE = 0.5  # of the worst residual: a plane that the taps come less close to did not bound them
-_PROOF_SHARE = 1e-4  # of the residual: what a proven sweep may add for what lies between its samples
-_PROOF_SAMPLES = 200_000
 _SAME_VALUE = 1e-6  # relative
 _BESIDE = np.array([-1.0, 0.0, 1.0])
 _QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
@@ -271,7 +304,7 @@ class TapProblem:
     last_tap: float = 0.0  # the tap at `last` periods is at least that
     _bands: list[_Band] = field(init=False)
     _rows: list[list[FloatArray]] = field(init=False)
-    _program: LinearProgram | None = field(init=False, default=None)
+    _program: TapProgram | None = field(init=False, default=None)
     _limit: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
@@ -344,12 +377,8 @@ class TapProblem:
             omegas[:] = [omegas[k] for k in keep]
             directions[:] = [directions[k] for k in keep]
 
-    def _with_planes(self, limit: float) -> LinearProgram:
-        """The linear program with the planes so far, all of them below a limit.
-
-        Unknowns are the taps (their positive and their negative parts, where they may be negative), and how far above
-        the limit the bound lies.
-        """
+    def _with_planes(self, limit: float) -> TapProgram:
+        """The linear program with the planes so far, all of them below a limit."""
         new: list[FloatArray] = []
         for band, rows, omegas, directions in zip(
             self._bands, self._rows, self.pool.omegas, self.pool.directions, strict=True
@@ -360,43 +389,19 @@ class TapProblem:
                 rows.extend(turned.real)
                 new.extend(turned.real)
         if self._program is None or limit != self._limit:
-            self._program, self._limit = self._without_planes(), limit
+            self._program = TapProgram(self.equalities, signed=self.max_abs_sum is not None, last_tap=self.last_tap)
+            if self.max_abs_sum is not None:
+                self._program.limit_magnitudes(self.max_abs_sum)
+            self._limit = limit
             new = [row for rows in self._rows for row in rows]
         if new:
-            planes = np.array(new)
-            if self.max_abs_sum is not None:
-                planes = np.hstack([planes, -planes])
-            self._program.add_below(np.hstack([planes, np.full((len(new), 1), -1.0)]), np.full(len(new), limit))
+            self._program.add_planes(np.array(new), np.full(len(new), limit))
         return self._program
-
-    def _without_planes(self) -> LinearProgram:
-        matrix, right = self.equalities
-        if self.max_abs_sum is not None:
-            matrix = np.hstack([matrix, -matrix])
-        count = matrix.shape[1]
-        least = np.zeros(count + 1)
-        least[self.last] = self.last_tap
-        program = LinearProgram(
-            least, np.full(count + 1, math.inf), (np.hstack([matrix, np.zeros((len(matrix), 1))]), right)
-        )
-        if self.max_abs_sum is not None:
-            program.add_below(np.append(np.ones(count), 0.0)[None, :], np.array([self.max_abs_sum]))
-        return program
 
     def _solve(self, cost: FloatArray | None, limit: float) -> tuple[FloatArray, float] | None:
         """The linear program with the planes so far: least cost below the limit, or the least bound above it."""
-        program = self._with_planes(limit)
-        signed = self.max_abs_sum is not None
-        count = (2 if signed else 1) * (self.last + 1)
-        objective = np.zeros(count) if cost is None else np.tile(cost, 2) if signed else cost
-        objective = np.append(objective, 1.0 if cost is None else 0.0)
-        program.set_cost(objective)
-        program.bound(count, 0.0, math.inf if cost is None else 0.0)
-        x = program.solve()
-        if x is None:
-            return None
-        taps = x[: self.last + 1] - x[self.last + 1 : count] if signed else x[:count]
-        return taps, float(objective @ x) + (limit if cost is None else 0.0)
+        found = self._with_planes(limit).solve(cost, 0.0)
+        return None if found is None else (found[0], found[1] + limit)
 
 
 def _within(values: FloatArray, low: float, high: float) -> FloatArray:
@@ -407,34 +412,3 @@ def _within(values: FloatArray, low: float, high: float) -> FloatArray:
 def _ends(band: ModeBand) -> tuple[float, float]:
     omega = 2.0 * math.pi * band.mode.frequency_hz
     return omega * (1.0 - band.uncertainty), omega * (1.0 + band.uncertainty)
-
-
-def proven_worst(shaper: Shaper, bands: Sequence[ModeBand]) -> float:
-    """Upper bound on the residual ratio over the bands, at most 0.01 % above the largest value of a sweep.
-
-    Between two samples a distance h apart, |R| is at most the larger of the two plus ``h²/8*max|R''|``, and R'' is
-    bounded by the taps' magnitudes times |q|²; the sweep is as fine as that asks for.
-    """
-    worst = 0.0
-    for band in bands:
-        worst = max(worst, _proven(shaper, band))
-    return worst
-
-
-def _proven(shaper: Shaper, band: ModeBand) -> float:
-    view = _Band(band, np.asarray(shaper.times_s))
-    taps = np.asarray(shaper.amplitudes)
-    curvature = float(np.abs(taps) @ (np.abs(view.q) ** 2 * np.exp(view.q.real * view.low)))
-    found = float(np.abs(view.terms @ taps).max())
-    width = view.high - view.low
-    allowed = max(_PROOF_SHARE * found, 0.1 * NO_RESIDUAL)
-    steps = math.ceil(width * math.sqrt(curvature / (8.0 * allowed)))
-    if steps > _PROOF_SAMPLES:
-        raise DesignError(f"{steps} samples would be needed to prove the residual of {band}, limit {_PROOF_SAMPLES}")
-    if steps > 0:
-        omegas = np.linspace(view.low, view.high, steps + 1)
-        found = max(
-            float(np.abs(view.residual(taps, part)).max()) for part in np.array_split(omegas, 1 + steps // 4096)
-        )
-        found += (width / steps) ** 2 * curvature / 8.0
-    return found

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +17,8 @@ from shapegcode.model.modes import axis_modes, mode_tables, moving_axis, numbere
 from shapegcode.shaping.bands import (
     NO_MODE,
     ON_GRID,
+    SAME,
+    VIBRATION_LIMIT,
     DesignOptions,
     ModeBand,
     band_names,
@@ -27,23 +28,8 @@ from shapegcode.shaping.bands import (
     whole_periods,
 )
 from shapegcode.shaping.grid_designs import shortest_non_negative
-from shapegcode.shaping.ranking import SAME
-from shapegcode.shaping.registry import design
-from shapegcode.shaping.robust import (
-    VIBRATION_LIMIT,
-    RobustDesign,
-    Task,
-    best_within,
-    refusal,
-    shortest_below,
-    unreachable,
-)
 from shapegcode.shaping.track import MovingMode, ShaperTrack, design_per_axis, design_track
 
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
-
-_SAME = 0.02  # designs whose durations (or worst residuals) differ by less are equal, relative
 _ASSUMED_TICK_S = 0.001  # interpolation period where no machine states one
 _LONGEST_BLOCK_PERIOD_S = 0.02
 _PERIODS_COMPARED = 3
@@ -115,21 +101,19 @@ def choose_block_period(
     """
     bands = [each if isinstance(each, ModeBand) else ModeBand(each) for each in modes]
     periods_s = _periods(bands, interpolation_period_s, block_time_s, max_block_period_s, max_duration_s)
-    if not any(band.uncertainty for band in bands):
-        candidates = tuple(_exact_candidate(bands, period_s, max_duration_s) for period_s in periods_s)
-        if any(each.shaper is not None for each in candidates):
-            return _shortest(candidates)
-    else:
-        _check_limit(vibration_limit)
-        rough = tuple(_below_candidate(bands, each, max_duration_s, vibration_limit) for each in periods_s)
-        if any(each.shaper is not None for each in rough):
-            period_s = _shortest(rough).period_s
-            best = _below_candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
-            return _shortest(tuple(best if each.period_s == period_s else each for each in rough))
-        candidates = tuple(_fallback(each, bands, max_duration_s, vibration_limit) for each in rough)
+    candidates = tuple(_candidate(bands, each, max_duration_s, vibration_limit) for each in periods_s)
+    wide = any(band.uncertainty for band in bands)
+    if any(each.shaper is not None for each in candidates):
+        choice = _shortest(candidates)
+        if not wide:
+            return choice
+        best = _candidate(bands, choice.period_s, max_duration_s, vibration_limit, least_cost=True)
+        return _shortest(tuple(best if each.period_s == choice.period_s else each for each in candidates))
+    if wide:
+        candidates = tuple(_fallback(each, bands, max_duration_s, vibration_limit) for each in candidates)
         found = [(each, each.worst_residual) for each in candidates if each.worst_residual is not None]
         if found:
-            least = (1.0 + _SAME) * min(worst for _, worst in found)
+            least = (1.0 + SAME) * min(worst for _, worst in found)
             near = (each for each, worst in found if worst <= least)
             return _choice(max(near, key=lambda each: each.period_s), candidates)
     raise DesignError(
@@ -145,17 +129,10 @@ def robust_candidate(
     max_duration_s: float = 0.25,
     vibration_limit: float = VIBRATION_LIMIT,
 ) -> BlockPeriodCandidate:
-    """What :func:`choose_block_period` would take on one given period.
-
-    Source: this project.
-    """
+    """What :func:`choose_block_period` would take on one given period."""
     check_modes_and_times(bands, period_s=period_s, max_duration_s=max_duration_s)
-    if not any(band.uncertainty for band in bands):
-        shaper = shortest_non_negative([band.mode for band in bands], period_s, max_duration_s)
-        return BlockPeriodCandidate(period_s, shaper)
-    _check_limit(vibration_limit)
-    candidate = _below_candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
-    if candidate.shaper is None:
+    candidate = _candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
+    if candidate.shaper is None and any(band.uncertainty for band in bands):
         candidate = _fallback(candidate, bands, max_duration_s, vibration_limit)
     if candidate.shaper is None:
         raise DesignError(candidate.refusal)
@@ -188,14 +165,9 @@ def _periods(
     return [multiple * interpolation_period_s for multiple in range(fewest, most + 1)]
 
 
-def _check_limit(vibration_limit: float) -> None:
-    if not 0.0 < vibration_limit < 1.0:
-        raise ArgumentError(f"vibration_limit is {vibration_limit}: it must be above 0 and below 1")
-
-
 def _shortest(candidates: tuple[BlockPeriodCandidate, ...]) -> BlockPeriodChoice:
     durations_s = [each.shaper.duration_s for each in candidates if each.shaper is not None]
-    limit_s = (1.0 + _SAME) * min(durations_s)
+    limit_s = (1.0 + SAME) * min(durations_s)
     short = [each for each in candidates if each.shaper is not None and each.shaper.duration_s <= limit_s]
     return _choice(max(short, key=lambda each: each.period_s), candidates)
 
@@ -205,34 +177,34 @@ def _choice(chosen: BlockPeriodCandidate, candidates: tuple[BlockPeriodCandidate
     return BlockPeriodChoice(chosen.period_s, chosen.shaper, candidates, chosen.worst_residual, chosen.note)
 
 
-def _exact_candidate(bands: Sequence[ModeBand], period_s: float, max_duration_s: float) -> BlockPeriodCandidate:
-    try:
-        shaper = shortest_non_negative([band.mode for band in bands], period_s, max_duration_s)
-        return BlockPeriodCandidate(period_s, shaper)
-    except DesignError as error:
-        return BlockPeriodCandidate(period_s, None, str(error))
-
-
-def _task(bands: Sequence[ModeBand], period_s: float) -> Task:
-    return Task.checked(bands, period_s, non_negative=True, max_abs_sum=1.0, zeros_at_nominal=False)
-
-
-def _below_candidate(
+def _candidate(
     bands: Sequence[ModeBand], period_s: float, max_duration_s: float, limit: float, *, least_cost: bool = False
 ) -> BlockPeriodCandidate:
-    """The shortest design below the limit, without the search for hints that a refusal by itself would make."""
-    task = _task(bands, period_s)
+    """The shortest design on a grid, without the search for hints that a refusal by itself would make."""
+    if not any(band.uncertainty for band in bands):
+        try:
+            shaper = shortest_non_negative([band.mode for band in bands], period_s, max_duration_s)
+        except DesignError as error:
+            return BlockPeriodCandidate(period_s, None, str(error))
+        return BlockPeriodCandidate(period_s, shaper)
+    from shapegcode.shaping.robust import Task, refusal, shortest_below
+
+    if not 0.0 < limit < 1.0:
+        raise ArgumentError(f"vibration_limit is {limit}: it must be above 0 and below 1")
+    task = Task.checked(bands, period_s)
     found = shortest_below(task, limit, max_duration_s, least_cost=least_cost)
-    if found is not None:
-        return _candidate(found)
-    return BlockPeriodCandidate(period_s, None, refusal(task, limit, max_duration_s))
+    if found is None:
+        return BlockPeriodCandidate(period_s, None, refusal(task, limit, max_duration_s))
+    return BlockPeriodCandidate(period_s, found.shaper, worst_residual=found.worst_residual)
 
 
 def _fallback(
     refused: BlockPeriodCandidate, bands: Sequence[ModeBand], max_duration_s: float, limit: float
 ) -> BlockPeriodCandidate:
     """The least worst design of the longest duration, and the sentence that says so; else the refusal as it is."""
-    task = _task(bands, refused.period_s)
+    from shapegcode.shaping.robust import Task, best_within, unreachable
+
+    task = Task.checked(bands, refused.period_s)
     last = task.periods(max_duration_s)
     found = best_within(task, last) if last and not unreachable(task) else None
     if found is None:
@@ -242,11 +214,7 @@ def _fallback(
         f"on a {ms(refused.period_s)} grid: the one with the least worst residual, {100.0 * found.worst_residual:.3g} "
         "%, is used"
     )
-    return replace(_candidate(found), note=note)
-
-
-def _candidate(found: RobustDesign) -> BlockPeriodCandidate:
-    return BlockPeriodCandidate(found.period_s, found.shaper, worst_residual=found.worst_residual)
+    return BlockPeriodCandidate(found.period_s, found.shaper, worst_residual=found.worst_residual, note=note)
 
 
 def check_block_period(period_s: float, machine: Machine) -> None:
@@ -270,6 +238,8 @@ def candidate_periods(
     bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float, vibration_limit: float = 0.05
 ) -> list[float]:
     """The block periods worth comparing, ascending, s: those on which a non-negative shaper is shortest."""
+    from shapegcode.shaping.robust import Task, shortest_below
+
     if machine is not None and machine.emission.block_period_s is not None:
         return [machine.emission.block_period_s]
     if machine is not None:
@@ -286,7 +256,7 @@ def candidate_periods(
         longest_s = max_duration_s
         if len(every) >= _PERIODS_COMPARED:
             longest_s = min(longest_s, max(every[_PERIODS_COMPARED - 1][0], (1.0 + SAME) * every[0][0]))
-        task = Task.checked(bands, period_s, non_negative=True, max_abs_sum=1.0, zeros_at_nominal=False)
+        task = Task.checked(bands, period_s)
         found = shortest_below(task, vibration_limit, longest_s, least_cost=False)
         if found is not None:
             every = sorted([*every, (round(found.shaper.duration_s, 9), -period_s)])
@@ -343,8 +313,8 @@ def choose_grid(
 
     With `shaping.family` = "auto" the shortest shaper without negative impulses that leaves at most
     `shaping.vibration_limit` of the vibration anywhere in the modes' stated bands; exact where no band is stated. With
-    a named family its shortest one. Text that shall bear a turned feed override (`Machine.bears_override`) gets the
-    period that suits other feed overrides, see `best_for_dial`.
+    a named family its shortest one. An override-tolerant program (`Machine.bears_override`) gets the
+    period that suits other feed overrides, see `best_for_overrides`.
 
     Args:
         machine: modes and controller.
@@ -386,7 +356,7 @@ def choose_grid(
         )  # fmt: skip
         if machine.bears_override:
             designs = [(each.period_s, each.shaper) for each in best.candidates if each.shaper is not None]
-            period, _ = best_for_dial(designs, machine, feed)
+            period = best_for_overrides(designs, machine, feed)
     if period is not None:
         best = robust_candidate(bands, period, shaping.max_duration_s, shaping.vibration_limit)
     assert best.shaper is not None  # what is chosen exists
@@ -424,6 +394,8 @@ def _of_family(
     name: str, bands: list[ModeBand], machine: Machine, period_s: float | None, feed_mm_per_s: float
 ) -> Grid:
     """The shortest shaper of a family, on one grid or on the one on which it is shortest."""
+    from shapegcode.shaping.registry import design
+
     shaping = machine.shaping
     periods_s = (
         [period_s]
@@ -442,7 +414,7 @@ def _of_family(
         raise _core.DesignError(f"shaping.family = {name!r}: {refusals[0]}")
     best, period = min(found, key=lambda pair: (pair[0].duration_s, -pair[1]))
     if machine.bears_override and len(found) > 1:
-        period, _ = best_for_dial([(each, design.shaper) for design, each in found], machine, feed_mm_per_s)
+        period = best_for_overrides([(each, design.shaper) for design, each in found], machine, feed_mm_per_s)
         best = next(design for design, each in found if each == period)
     note = ""
     if best.worst_residual > shaping.vibration_limit:
@@ -457,9 +429,7 @@ def _track(machine: Machine, period_s: float) -> ShaperTrack | None:
     return None if moving_axis(machine) is None else shaper_track(machine, period_s)
 
 
-def shaper_track(
-    machine: Machine, period_s: float, max_duration_s: float | None = None, *, residual_limit: float = 0.01
-) -> ShaperTrack:
+def shaper_track(machine: Machine, period_s: float) -> ShaperTrack:
     """Shapers for all modes of a machine along the axis over which some of them vary."""
     axis = moving_axis(machine)
     if axis is None:
@@ -470,12 +440,12 @@ def shaper_track(
         for (_, _, mode), table in zip(numbered_modes(machine), tables, strict=True)
     ]
     reached = [position for table in tables for position in table.position_mm]
-    longest = machine.shaping.max_duration_s if max_duration_s is None else max_duration_s
-    span = (min(reached), max(reached))
-    return design_track(modes, axis, span, period_s, longest, residual_limit=residual_limit)
+    return design_track(modes, axis, (min(reached), max(reached)), period_s, machine.shaping.max_duration_s)
 
 
-def dial_vibration_um(block_period_s: float, shaper: _core.Shaper, model: MachineModel, feed_mm_per_s: float) -> float:
+def override_vibration_um(
+    block_period_s: float, shaper: _core.Shaper, model: MachineModel, feed_mm_per_s: float
+) -> float:
     """Largest residual vibration of straight moves in equal blocks, over the feed overrides."""
     moves = np.array([float(bool(axis.modes)) for axis in model.machine.axes.as_tuple()])
     speed = feed_mm_per_s * math.sqrt(moves.sum())
@@ -484,12 +454,12 @@ def dial_vibration_um(block_period_s: float, shaper: _core.Shaper, model: Machin
     for stroke_s in _STROKES_S:
         path = _core.Path([_core.Segment.line(np.zeros(3), moves * feed_mm_per_s * stroke_s, speed)])
         samples = fir.apply(_core.interpolate(path, _core.plan_speed(path, model.limits()), block_period_s))
-        ways = np.linalg.norm(np.diff(samples, axis=0), axis=1)
+        lengths = np.linalg.norm(np.diff(samples, axis=0), axis=1)
         blocks = _core.Path(
             [
-                _core.Segment.line(start, end, way / block_period_s)
-                for start, end, way in zip(samples[:-1], samples[1:], ways, strict=True)
-                if way > 0.0
+                _core.Segment.line(start, end, length / block_period_s)
+                for start, end, length in zip(samples[:-1], samples[1:], lengths, strict=True)
+                if length > 0.0
             ]
         )
         for ratio in model.machine.dial_positions:
@@ -498,9 +468,7 @@ def dial_vibration_um(block_period_s: float, shaper: _core.Shaper, model: Machin
     return worst_mm * 1e3
 
 
-def best_for_dial(
-    designs: Iterable[tuple[float, _core.Shaper]], machine: Machine, feed_mm_per_s: float
-) -> tuple[float, _core.Shaper]:
+def best_for_overrides(designs: Iterable[tuple[float, _core.Shaper]], machine: Machine, feed_mm_per_s: float) -> float:
     """The block period with the best of both: a short shaper, and little vibration with another feed override.
 
     What stays below `tolerance.residual_floor_um` counts as that. Above it twice the vibration weighs as much as a
@@ -511,6 +479,6 @@ def best_for_dial(
 
     def cost(design: tuple[float, _core.Shaper]) -> float:
         period_s, shaper = design
-        return shaper.duration_s * max(floor_um, dial_vibration_um(period_s, shaper, model, feed_mm_per_s))
+        return shaper.duration_s * max(floor_um, override_vibration_um(period_s, shaper, model, feed_mm_per_s))
 
-    return min(designs, key=cost)
+    return min(designs, key=cost)[0]

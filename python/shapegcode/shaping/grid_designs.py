@@ -57,22 +57,27 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
     """
     check_modes_and_times(modes, period_s=period_s, max_duration_s=max_duration_s)
     most = whole_periods(max_duration_s, period_s)
-    last = _smallest_feasible(modes, period_s, most)
+    # A solution stays one with further taps at zero.
+    last = smallest_enough(lambda last: _non_negative_solution(modes, period_s, last) is not None, 1, most)
     while last is not None and last <= most:
         for vertex in _vertices(modes, period_s, last):
-            shaper = _polished(vertex, modes, period_s)
-            if shaper is not None:
-                return shaper
+            conditions = exact_conditions(modes, period_s, last)
+            for threshold in _SUPPORT_THRESHOLDS:
+                shaper = polished(vertex, conditions, period_s, threshold, signed=False)
+                if shaper is not None and max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT:
+                    return shaper
         last += 1
     raise DesignError(_none_exists(modes, period_s, max_duration_s))
 
 
-def exact_conditions(modes: Sequence[Mode], period_s: float, last: int) -> tuple[FloatArray, FloatArray]:
+def exact_conditions(
+    modes: Sequence[Mode], period_s: float, last: int, multiplicities: Sequence[int] = ()
+) -> tuple[FloatArray, FloatArray]:
     """Matrix and right-hand side of the equality conditions on the taps at 0, 1 ... `last` periods.
 
     The modes' rows (each mode's residual sum, which decay keeps at most 1) are replaced by an orthonormal
     basis of their span: near-equal modes then cost no precision, and equal ones no row. Without modes the sum
-    is the only condition.
+    is the only condition. Zeros are simple, or of these multiplicities.
     """
     if not modes:
         return np.ones((1, last + 1)), np.ones(1)
@@ -80,10 +85,30 @@ def exact_conditions(modes: Sequence[Mode], period_s: float, last: int) -> tuple
     poles = np.array([mode.pole for mode in modes])
     decay = np.exp(np.outer(poles.real * period_s, last - steps))
     terms = decay * np.exp(1j * np.outer(poles.imag, steps * period_s))
+    if multiplicities:
+        powers = [(rank, power) for rank, count in enumerate(multiplicities) for power in range(count)]
+        terms = np.array([terms[rank] * (steps / max(1, last)) ** power for rank, power in powers])
     _, strength, basis = np.linalg.svd(np.vstack([terms.real, terms.imag]), full_matrices=False)
     kept = basis[strength > _SAME_CONDITION * strength[0]] * math.sqrt(last + 1)
     matrix = np.vstack([kept, np.ones(last + 1)])
     return matrix, np.eye(len(matrix))[-1]
+
+
+def smallest_enough(
+    is_enough: Callable[[int], bool], start: int, most: int, too_few: int = 0, *, growth: float = 2.0,
+    precision: float = 0.0,
+) -> int | None:  # fmt: skip
+    """The smallest number that is enough, by growing from a start and then halving; None: it exceeds `most`.
+
+    To a relative precision it may exceed the smallest.
+    """
+    enough = min(most, start)
+    while enough < most and not is_enough(enough):
+        too_few, enough = enough, max(enough + 1, math.ceil(growth * enough))
+    enough = min(enough, most)
+    if enough <= too_few or not is_enough(enough):
+        return None
+    return halved(is_enough, too_few, enough, precision)
 
 
 def halved(is_enough: Callable[[int], bool], too_few: int, enough: int, precision: float = 0.0) -> int:
@@ -115,20 +140,6 @@ def _non_negative_solution(modes: Sequence[Mode], period_s: float, last: int) ->
     if taps is None:  # it went round in circles: the linear program decides
         return Vertices(matrix, right)(np.zeros(last + 1))
     return taps if float(np.linalg.norm(matrix @ taps - right)) <= _FEASIBLE else None
-
-
-def _smallest_feasible(modes: Sequence[Mode], period_s: float, most: int) -> int | None:
-    """Smallest number of periods that has a non-negative solution, or None if it exceeds `most`.
-
-    A solution stays one with further taps at zero, so doubling and then halving finds it.
-    """
-    too_few, enough = 0, 1
-    while enough < most and _non_negative_solution(modes, period_s, enough) is None:
-        too_few, enough = enough, 2 * enough
-    enough = min(enough, most)
-    if enough <= too_few or _non_negative_solution(modes, period_s, enough) is None:
-        return None
-    return halved(lambda last: _non_negative_solution(modes, period_s, last) is not None, too_few, enough)
 
 
 class Vertices:
@@ -221,20 +232,17 @@ def _least_between(left: _Corner, right: _Corner) -> float:
     return min(left.variance, right.variance, second - mean**2)
 
 
-def _polished(vertex: FloatArray, modes: Sequence[Mode], period_s: float) -> Shaper | None:
-    """The vertex solved again to rounding on its own taps, or None if that is no non-negative design."""
-    matrix, right = exact_conditions(modes, period_s, len(vertex) - 1)
-    for threshold in _SUPPORT_THRESHOLDS:
-        support = np.flatnonzero(vertex > threshold)
-        columns = matrix[:, support]
-        taps = vertex[support]
-        taps = refined(columns, right, taps)
-        if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT):
-            continue
-        shaper = Shaper(((support - support[0]) * period_s).tolist(), (taps / taps.sum()).tolist())
-        if max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT:
-            return shaper
-    return None
+def polished(
+    taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float, *, signed: bool
+) -> Shaper | None:
+    """Taps above a threshold, solved again to rounding; None if they then miss the sum 1 or change their sign."""
+    matrix, right = conditions
+    support = np.flatnonzero(np.abs(taps) > threshold)
+    amplitudes = refined(matrix[:, support], right, taps[support])
+    total = float(amplitudes.sum())
+    if abs(total - 1.0) > RESIDUAL_LIMIT or not (signed or np.all(amplitudes > 0.0)):
+        return None
+    return Shaper(((support - support[0]) * period_s).tolist(), (amplitudes / total).tolist())
 
 
 def _none_exists(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> str:

@@ -27,17 +27,14 @@ from shapegcode._core import (
     worst_residual,
 )
 from shapegcode.shaping.bands import check_times, ms, whole_periods
-from shapegcode.shaping.cutting_planes import LinearProgram
-from shapegcode.shaping.grid_designs import halved
+from shapegcode.shaping.cutting_planes import TapProgram
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, halved, refined
 
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _HINT_PERIODS = 400  # longest grid that a refusal searches, periods
 FloatArray = NDArray[np.float64]
-RESIDUAL_LIMIT = 1e-10
-"""Largest residual ratio at a zero of a design that is handed out; the usual one is 1e-16 to 1e-15."""
 LIMIT_MARGIN = 1e-3
 """Share of a tolerated residual that the search leaves unused, so that it ends: the shortest is meant with it."""
-_SAME_CONDITION = 1e-13  # relative singular value below which two zeros ask for the same thing on this grid
 _SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # magnitudes above one of these are taps
 _FIRST_DIRECTIONS = 8
 _FIRST_FREQUENCIES = 5
@@ -134,11 +131,10 @@ class GridSearch:
         self._conditions = conditions
         self._period_s = period_s
         # By number of periods, with the number of planes that are in it.
-        self._programs: dict[int, tuple[LinearProgram, int]] = {}
+        self._programs: dict[int, tuple[TapProgram, int]] = {}
         self._answers: dict[int, FloatArray | None] = {}
-        self._equations: dict[int, tuple[FloatArray, FloatArray]] = {}
         self._planes = [
-            _plane(each, float(frequency_hz), float(direction))
+            _Plane(Mode(float(frequency_hz), each.mode.damping_ratio).pole, float(direction), each.limit)
             for each in conditions.limits
             for frequency_hz in _frequencies(each, _FIRST_FREQUENCIES)
             for direction in 2.0 * np.pi * np.arange(_FIRST_DIRECTIONS) / _FIRST_DIRECTIONS
@@ -203,9 +199,9 @@ class GridSearch:
         return [*sorted(centred, key=variance), *rest]
 
     def _centred(self, last: int, centre: float, seen: list[float]) -> list[FloatArray]:
-        """Taps on the way from a centre (periods) to a local minimum of the second central moment.
+        """Taps of each step from a centre (periods) to a local minimum of the second central moment.
 
-        From a centre that another way has seen it goes on as that one did.
+        From a centre that an earlier search passed it continues as that search did.
         """
         found: list[FloatArray] = []
         for _ in range(_CENTRINGS):
@@ -223,7 +219,7 @@ class GridSearch:
     def _feasible(self, last: int) -> FloatArray | None:
         """Taps at 0 ... `last` periods that meet the conditions, or None.
 
-        With limits: those whose largest share of its limit is least, until it is below 1 or proven not to be.
+        With limits: those whose largest ratio to its limit is smallest, until it is below 1 or proven not to be.
         """
         if self._conditions.limits:  # the planes found since say more
             return self._found_feasible(last)
@@ -256,70 +252,32 @@ class GridSearch:
         return None
 
     def _program(self, last: int, cost: FloatArray | None) -> tuple[FloatArray, float] | None:
-        """The taps of least cost, or (None) with the least share of the limits used, and that share.
-
-        The last variable is the share; with a cost it stays below what the margin leaves.
-        """
-        program = self._with_planes(last)
-        is_signed = self._conditions.largest_tap is not None
-        objective = np.zeros(last + 1) if cost is None else cost
-        if is_signed:
-            objective = np.full(2 * last + 2, 0.0 if cost is None else 1.0)
-        program.set_cost(np.append(objective, 1.0 if cost is None else 0.0))
-        program.bound(len(objective), 0.0, math.inf if cost is None else 1.0 - LIMIT_MARGIN)
+        """The taps of least cost, or (None) with the least share of the limits used, and that share."""
+        if cost is not None and self._conditions.largest_tap is not None:
+            cost = np.ones(last + 1)
         try:
-            solution = program.solve()
+            return self._with_planes(last).solve(cost, 1.0 - LIMIT_MARGIN)
         except DesignError:
             return None
-        if solution is None:
-            return None
-        taps = solution[: last + 1]
-        return taps - solution[last + 1 : -1] if is_signed else taps, float(solution[-1])
 
-    def _with_planes(self, last: int) -> LinearProgram:
+    def _with_planes(self, last: int) -> TapProgram:
         """The linear program of a duration, with every plane so far."""
         largest = self._conditions.largest_tap
         program, done = self._programs.get(last, (None, 0))
         if program is None:
-            matrix, right = self._equalities(last)
-            if largest is not None:
-                # a tap is the difference of two that are not negative, so that its magnitude is linear
-                matrix = np.hstack([matrix, -matrix])
-            count = matrix.shape[1]
-            upper = np.full(count + 1, math.inf if largest is None else largest)
-            program = LinearProgram(
-                np.zeros(count + 1), upper, (np.hstack([matrix, np.zeros((len(matrix), 1))]), right)
-            )
+            program = TapProgram(self._equalities(last), signed=largest is not None, largest=largest or math.inf)
         new = self._planes[done:]
         if new:
             planes = self._inequalities(new, last) / np.array([plane.limit for plane in new])[:, None]
-            if largest is not None:
-                planes = np.hstack([planes, -planes])
-            program.add_below(np.hstack([planes, -np.ones((len(new), 1))]), np.zeros(len(new)))
+            program.add_planes(planes, np.zeros(len(new)))
         self._programs[last] = program, len(self._planes)
         return program
 
     def _equalities(self, last: int) -> tuple[FloatArray, FloatArray]:
-        """Matrix and right-hand side of zeros and sum; the zeros' rows are an orthonormal basis of their span.
-
-        Near-equal zeros then cost no precision, and equal ones no row.
-        """
-        known = self._equations.get(last)
-        if known is not None:
-            return known
-        rows = []
-        steps = np.arange(last + 1)
-        for zero in self._conditions.zeros:
-            terms = self._terms(zero.mode.pole, last)
-            weighted = [terms * (steps / max(1, last)) ** power for power in range(zero.multiplicity)]
-            rows += [part for each in weighted for part in (each.real, each.imag)]
-        kept = np.empty((0, last + 1))
-        if rows:
-            _, strength, basis = np.linalg.svd(np.array(rows), full_matrices=False)
-            kept = basis[strength > _SAME_CONDITION * strength[0]] * math.sqrt(last + 1)
-        matrix = np.vstack([kept, np.ones(last + 1)])
-        self._equations[last] = matrix, np.eye(len(matrix))[-1]
-        return self._equations[last]
+        """Matrix and right-hand side of zeros and sum."""
+        zeros = self._conditions.zeros
+        modes, counts = [zero.mode for zero in zeros], [zero.multiplicity for zero in zeros]
+        return exact_conditions(modes, self._period_s, last, counts)
 
     def _inequalities(self, planes: Sequence[_Plane], last: int) -> FloatArray:
         poles = np.array([plane.pole for plane in planes])
@@ -327,12 +285,6 @@ class GridSearch:
         phases = poles.imag[:, None] * self._period_s * (np.arange(last + 1) - 0.5 * last) - directions[:, None]
         decay = np.exp(poles.real[:, None] * self._period_s * (last - np.arange(last + 1)))
         return np.asarray(decay * np.cos(phases), dtype=np.float64)
-
-    def _terms(self, pole: complex, last: int) -> NDArray[np.complex128]:
-        """What each tap leaves of a mode at the instant of the last one."""
-        steps = np.arange(last + 1)
-        decay = np.exp(pole.real * self._period_s * (last - steps))
-        return np.asarray(decay * np.exp(1j * pole.imag * self._period_s * steps), dtype=np.complex128)
 
     def _cut(self, taps: FloatArray) -> bool:
         """Add the planes that cut these taps off; False if they meet every limit."""
@@ -351,7 +303,8 @@ class GridSearch:
             peaks = sweep[(curve >= padded[:-2]) & (curve >= padded[2:]) & (curve > each.limit)]
             for frequency in (*peaks.tolist(), frequency_hz):
                 pole = Mode(frequency, each.mode.damping_ratio).pole
-                left = complex(self._terms(pole, last) @ taps)
+                steps = np.arange(last + 1)
+                left = np.exp(self._period_s * (pole.real * (last - steps) + 1j * pole.imag * steps)) @ taps
                 direction = float(np.angle(left)) - pole.imag * self._period_s * 0.5 * last
                 self._planes.append(_Plane(pole, direction, each.limit))
         return len(self._planes) > before
@@ -368,8 +321,7 @@ class GridSearch:
                 free = np.abs(taps) < largest - 1e-8
                 taps[~free] = np.copysign(largest, taps[~free])
             columns = matrix[:, support]
-            for _ in range(3):  # the second removes what the first one's rounding left, the third nothing
-                taps[free] += np.linalg.lstsq(columns[:, free], right - columns @ taps, rcond=1e-14)[0]
+            taps[free] = refined(columns[:, free], right - columns[:, ~free] @ taps[~free], taps[free])
             if abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT and (taps.min() > 0.0 or largest is not None):
                 times = (support - support[0]) * self._period_s
                 shaper = Shaper(times.tolist(), (taps / taps.sum()).tolist())
@@ -384,10 +336,6 @@ class GridSearch:
             and all(each.worst(shaper)[0] <= each.limit for each in self._conditions.limits)
             and (largest is None or float(np.abs(shaper.amplitudes).max()) <= largest * (1.0 + RESIDUAL_LIMIT))
         )
-
-
-def _plane(limit: ResidualLimit, frequency_hz: float, direction: float) -> _Plane:
-    return _Plane(Mode(frequency_hz, limit.mode.damping_ratio).pole, direction, limit.limit)
 
 
 def _frequencies(limit: ResidualLimit, count: int) -> FloatArray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode import _core
-from shapegcode._core import MinimalBranches, Mode, Shaper, minimal_branches
+from shapegcode._core import ArgumentError, MinimalBranches, Mode, Shaper, minimal_branches
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 from shapegcode.shaping.bands import Design, ModeBand, mode_band
@@ -29,7 +28,7 @@ _PERIODS_IN_DURATION = 2.0
 _SAMPLES_OF_A_STEP = 3000
 _SWINGS_SHOWN = 3.0  # of the slowest mode, behind the longest shaper
 FloatArray = NDArray[np.float64]
-_AXES = 3  # modes per run of the plant: one on each axis
+Shapers = Recommendation | Shaper | Mapping[str, Shaper]
 
 
 def plots_of(result: Recommendation) -> dict[str, Plot]:
@@ -40,34 +39,31 @@ def plots_of(result: Recommendation) -> dict[str, Plot]:
         "shaper-impulses": partial(plot_impulses, result),
         "shaper-steps": partial(plot_steps, result),
     }
-    branches = _branches(result)
-    if branches is not None:
-        found["shaper-branches"] = partial(draw_branches, branches, [band.mode for band in result.modes])
-    return found
+    return found | ({} if _branches(result) is None else {"shaper-branches": partial(plot_branches, result)})
 
 
-def selected(result: Recommendation, count: int = _CURVES) -> list[Design]:
+def selected(result: Recommendation) -> list[Design]:
     """The designs worth a curve: what is recommended, then one of each family on the Pareto front, from short to long.
 
     Where there is room, one of each other family. Designs with negative impulses are left out where they may not be
     recommended and there are others.
     """
-    places = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))
+    indices = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))
     negative = result.allow_negative or result.design.negative
-    shown = [place for place in result.shown() if negative or not result.designs[place].negative]
-    families = {result.designs[place].family for place in places}
-    drawn = {_taps(result.designs[place]) for place in places}
+    shown = [index for index in result.shown() if negative or not result.designs[index].negative]
+    families = {result.designs[index].family for index in indices}
+    seen = {_taps(result.designs[index]) for index in indices}
     for pareto in (True, False):
         others = []
-        for place in shown:
-            each = result.designs[place]
-            if each.pareto == pareto and each.family not in families and _taps(each) not in drawn:
+        for index in shown:
+            each = result.designs[index]
+            if each.pareto == pareto and each.family not in families and _taps(each) not in seen:
                 families.add(each.family)
-                drawn.add(_taps(each))
-                others.append(place)
-        room = min(count - len(places), len(others))
-        places += [others[round(step)] for step in np.linspace(0, len(others) - 1, room)] if room > 0 else []
-    return [result.designs[place] for place in places]
+                seen.add(_taps(each))
+                others.append(index)
+        room = min(_CURVES - len(indices), len(others))
+        indices += [others[round(step)] for step in np.linspace(0, len(others) - 1, room)] if room > 0 else []
+    return [result.designs[index] for index in indices]
 
 
 def _taps(each: Design) -> tuple[float, ...]:
@@ -75,13 +71,18 @@ def _taps(each: Design) -> tuple[float, ...]:
     return tuple(float(f"{value:.9g}") for value in (*each.shaper.times_s, *each.shaper.amplitudes))
 
 
-def _named(result: Recommendation) -> dict[str, Shaper]:
-    """The shapers worth a curve by their names in a legend."""
-    return {
-        f"{each.family}, {each.duration_s * 1e3:.4g} ms"
-        + (f" ({times_name(each.period_s)})" if each.period_s is not None else ""): each.shaper
-        for each in selected(result)
-    }
+def _shapers_and_bands(
+    result: Shapers, modes: Sequence[float | str | Mode | ModeBand]
+) -> tuple[Mapping[str, Shaper], Sequence[ModeBand]]:
+    """Shapers by their names in a legend: those of a comparison that are worth a curve; and the modes."""
+    if isinstance(result, Recommendation):
+        shapers = {
+            f"{each.family}, {each.duration_s * 1e3:.4g} ms"
+            + (f" ({times_name(each.period_s)})" if each.period_s is not None else ""): each.shaper
+            for each in selected(result)
+        }
+        return shapers, result.modes
+    return {"shaper": result} if isinstance(result, Shaper) else result, [mode_band(each) for each in modes]
 
 
 def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
@@ -96,11 +97,10 @@ def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
     Returns:
         The upper panel.
     """
-    rows = plot.grid(
-        ax, 2, 1, size_inch=(9.0, 7.0), sharex="col", part=", ".join(map(str, result.modes)),
+    upper, lower = plot.column(
+        ax, 2, size_inch=(9.0, 7.0), part=", ".join(map(str, result.modes)),
         title="Duration against what is left: filled = Pareto front, ringed = recommended",
     )  # fmt: skip
-    upper, lower = (row[0] for row in rows)
     families = list(dict.fromkeys(each.family for each in result.designs))
     colours = {family: plot.COLOURS[number % len(plot.COLOURS)] for number, family in enumerate(families)}
     markers = {family: "osD^vP*X"[number // len(plot.COLOURS) % 8] for number, family in enumerate(families)}
@@ -135,12 +135,9 @@ def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
 
 
 def plot_sensitivity(
-    result: Recommendation | Shaper | Mapping[str, Shaper],
-    ax: Axes | None = None,
-    *,
-    modes: Sequence[float | str | Mode | ModeBand] = (),
+    result: Shapers, ax: Axes | None = None, *, modes: Sequence[float | str | Mode | ModeBand] = ()
 ) -> Axes:
-    """Residual vibration over the frequency of a mode.
+    """What is left if the frequency is another one? Residual vibration over the frequency of a mode, bands shaded.
 
     Args:
         result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, or shapers by name.
@@ -151,85 +148,8 @@ def plot_sensitivity(
     Returns:
         The axes that were drawn into.
     """
-    if isinstance(result, Recommendation):
-        return draw_sensitivity(_named(result), result.modes, result.vibration_limit, ax)
-    shapers = {"shaper": result} if isinstance(result, Shaper) else dict(result)
-    return draw_sensitivity(shapers, [mode_band(each) for each in modes], None, ax)
-
-
-def plot_impulses(result: Recommendation, ax: Axes | None = None) -> Axes:
-    """Which taps have they? One panel for each of `selected`.
-
-    Args:
-        result: the comparison.
-        ax: whose place is divided; None: a new figure.
-
-    Returns:
-        The upper panel.
-    """
-    return draw_impulses(_named(result), ax)
-
-
-def plot_steps(result: Recommendation, ax: Axes | None = None) -> Axes:
-    """What becomes of a step, and how do the modes follow? One curve for each of `selected`.
-
-    Args:
-        result: the comparison.
-        ax: whose place is divided; None: a new figure.
-
-    Returns:
-        The upper panel.
-    """
-    return draw_steps(_named(result), [band.mode for band in result.modes], ax)
-
-
-def plot_branches(result: Recommendation, ax: Axes | None = None) -> Axes:
-    """How long are the minimal shapers if the faster of two modes is another one?
-
-    Args:
-        result: a comparison for two modes.
-        ax: where to draw; None: a new figure.
-
-    Returns:
-        The axes that were drawn into.
-
-    Raises:
-        ValueError: another number of modes, or no minimal shaper within the longest duration.
-    """
-    branches = _branches(result)
-    if branches is None:
-        raise ValueError(f"{len(result.modes)} modes have no branches to draw: there are some of two")
-    return draw_branches(branches, [band.mode for band in result.modes], ax)
-
-
-def _branches(result: Recommendation) -> MinimalBranches | None:
-    """All minimal shapers of two modes around their ratio, the slower one held; None for another number of modes."""
-    if len(result.modes) != 2:
-        return None
-    slow, fast = sorted((band.mode for band in result.modes), key=lambda mode: mode.frequency_hz)
-    ratio = fast.frequency_hz / slow.frequency_hz
-    lowest = max(_LEAST_RATIO, 0.6 * ratio)
-    ratios = np.arange(lowest, max(1.4 * ratio, lowest + 0.2), _RATIO_STEP)
-    # No more than the search takes at the largest ratio, and not more curves than one can tell apart.
-    longest_s = min(result.max_duration_s, _BRANCH_SWINGS / slow.frequency_hz, 99.0 / (ratios[-1] * slow.frequency_hz))
-    branches = minimal_branches(slow, fast.damping_ratio, ratios.tolist(), longest_s)
-    return branches if np.isfinite(branches.times_s).any() else None
-
-
-def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: Sequence[Mode]) -> NDArray[np.float64]:
-    """Residual ratio over frequency, with the damping ratios of the modes and between them what lies between."""
-    known = sorted((mode.frequency_hz, mode.damping_ratio) for mode in modes) or [(0.0, 0.0)]
-    damping = np.interp(frequencies_hz, [frequency for frequency, _ in known], [ratio for _, ratio in known])
-    return np.asarray(shaper.residual(frequencies_hz, damping))
-
-
-def draw_sensitivity(
-    shapers: Mapping[str, Shaper],
-    bands: Sequence[ModeBand],
-    vibration_limit: float | None = None,
-    ax: Axes | None = None,
-) -> Axes:
-    """What is left if the frequency is another one? Residual ratio over frequency, the bands of the modes shaded."""
+    shapers, bands = _shapers_and_bands(result, modes)
+    vibration_limit = result.vibration_limit if isinstance(result, Recommendation) else None
     panel = plot.axes(ax, size_inch=(9.0, 5.4), title="What is left if the frequency is another one")
     panel.text(
         1.0, 1.01, "a curve that comes down to 0 turns there: an amplitude has no sign", ha="right", fontsize=8,
@@ -241,10 +161,10 @@ def draw_sensitivity(
         default=_PERIODS_IN_DURATION / longest_s if longest_s > 0.0 else 1.0,
     )
     frequencies_hz = np.linspace(0.0, 1.25 * highest, _FREQUENCIES)[1:]
-    modes = [band.mode for band in bands]
+    nominal = [band.mode for band in bands]
     for number, (label, shaper) in enumerate(shapers.items()):
         panel.plot(
-            frequencies_hz, 100.0 * residual_curve(shaper, frequencies_hz, modes), label=label,
+            frequencies_hz, 100.0 * residual_curve(shaper, frequencies_hz, nominal), label=label,
             color=plot.COLOURS[number % len(plot.COLOURS)], linewidth=1.6,
         )  # fmt: skip
     for band in bands:
@@ -268,12 +188,18 @@ def draw_sensitivity(
     return panel
 
 
-def draw_impulses(shapers: Mapping[str, Shaper], ax: Axes | None = None) -> Axes:
-    """The taps of each shaper, one panel each."""
-    rows = plot.grid(
-        ax, len(shapers), 1, size_inch=(9.0, 1.2 + 1.35 * len(shapers)), title="Taps", sharex="col"
-    )  # fmt: skip
-    panels = [row[0] for row in rows]
+def plot_impulses(result: Shapers, ax: Axes | None = None) -> Axes:
+    """Which impulses have they? One panel for each shaper.
+
+    Args:
+        result: a comparison (one panel for each of `selected`), a shaper, or shapers by name.
+        ax: whose place is divided; None: a new figure.
+
+    Returns:
+        The upper panel.
+    """
+    shapers, _ = _shapers_and_bands(result, ())
+    panels = plot.column(ax, len(shapers), size_inch=(9.0, 1.2 + 1.35 * len(shapers)), title="Impulses")
     unit, scale = _time_unit(max(shaper.duration_s for shaper in shapers.values()))
     for number, (panel, (label, shaper)) in enumerate(zip(panels, shapers.items(), strict=True)):
         colour = plot.COLOURS[number % len(plot.COLOURS)]
@@ -286,30 +212,46 @@ def draw_impulses(shapers: Mapping[str, Shaper], ax: Axes | None = None) -> Axes
     return panels[0]
 
 
-def draw_steps(
-    shapers: Mapping[str, Shaper], modes: Sequence[Mode], ax: Axes | None = None, *, unshaped: bool = True
-) -> Axes:
-    """A shaped unit step (the staircase), and how each mode follows it; grey: unshaped."""
-    slowest_s = 1.0 / min(mode.frequency_hz for mode in modes)
+def plot_steps(result: Shapers, ax: Axes | None = None, *, modes: Sequence[float | str | Mode | ModeBand] = ()) -> Axes:
+    """What becomes of a unit step (the staircase), and how do the modes follow? Grey: unshaped.
+
+    Args:
+        result: a comparison (one curve for each of `selected`), a shaper, or shapers by name.
+        modes: that follow shapers, at least one: as `choose_shaper` takes them.
+        ax: whose place is divided; None: a new figure.
+
+    Returns:
+        The upper panel.
+
+    Raises:
+        ArgumentError: a shaper without modes.
+    """
+    shapers, bands = _shapers_and_bands(result, modes)
+    if not bands:
+        raise ArgumentError("modes: 0 given: a step is drawn with the modes that follow it, at least one")
+    nominal = [band.mode for band in bands]
+    slowest_s = 1.0 / min(band.mode.frequency_hz for band in bands)
     until_s = max(shaper.duration_s for shaper in shapers.values()) + _SWINGS_SHOWN * slowest_s
     period_s = until_s / _SAMPLES_OF_A_STEP
     unit, scale = _time_unit(until_s)
-    rows = plot.grid(
-        ax, 1 + len(modes), 1, size_inch=(9.0, 2.2 + 1.9 * (1 + len(modes))), sharex="col",
-        title="A step behind each shaper, and how the modes follow" + " (grey: unshaped)" * unshaped,
+    panels = plot.column(
+        ax, 1 + len(nominal), size_inch=(9.0, 2.2 + 1.9 * (1 + len(nominal))),
+        title="A step behind each shaper, and how the modes follow (grey: unshaped)",
     )  # fmt: skip
-    panels = [row[0] for row in rows]
-    drawn = [("", Shaper([0.0], [1.0]), plot.GREY)] if unshaped else []
+    curves = [("", Shaper([0.0], [1.0]), plot.GREY)]
     for number, (label, shaper) in enumerate(shapers.items()):
-        drawn.append((label, shaper, plot.COLOURS[number % len(plot.COLOURS)]))
-    for label, shaper, colour in drawn:
-        run = respond(modes, shaped_step(shaper, period_s, until_s), period_s)
+        curves.append((label, shaper, plot.COLOURS[number % len(plot.COLOURS)]))
+    for label, shaper, colour in curves:
+        command = shaped_step(shaper, period_s, until_s)
+        times = np.arange(len(command)) * (period_s * scale)
+        commands = np.tile(command[:, None], (1, len(nominal)))
+        responses = _core.plant_response(commands, [[mode] for mode in nominal], period_s)
         if label:
-            panels[0].plot(run.times_s * scale, run.command, color=colour, linewidth=1.6, label=label)
-        for place, panel in enumerate(panels[1:]):
-            panel.plot(run.times_s * scale, run.responses[:, place], color=colour, linewidth=1.4 if label else 0.8)
+            panels[0].plot(times, command, color=colour, linewidth=1.6, label=label)
+        for panel, response in zip(panels[1:], responses.T, strict=True):
+            panel.plot(times, response, color=colour, linewidth=1.4 if label else 0.8)
     panels[0].set_ylabel("command")
-    for panel, mode in zip(panels[1:], modes, strict=True):
+    for panel, mode in zip(panels[1:], nominal, strict=True):
         panel.set_ylabel(f"{mode.frequency_hz:g} Hz")
     panels[-1].set_xlabel(f"time in {unit}")
     panels[-1].margins(x=0.01)
@@ -317,14 +259,28 @@ def draw_steps(
     return panels[0]
 
 
-def draw_branches(branches: MinimalBranches, modes: Sequence[Mode], ax: Axes | None = None) -> Axes:
-    """Durations of all minimal shapers of two modes over the frequency of the faster one, which a line marks."""
-    slow, fast = sorted(mode.frequency_hz for mode in modes)
+def plot_branches(result: Recommendation, ax: Axes | None = None) -> Axes:
+    """How long are the minimal shapers if the faster of two modes is another one?
+
+    Args:
+        result: a comparison for two modes.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The axes that were drawn into.
+
+    Raises:
+        ValueError: another number of modes, or no minimal shaper within the longest duration.
+    """
+    branches = _branches(result)
+    if branches is None:
+        raise ValueError(f"{len(result.modes)} modes have no branches to draw: there are some of two")
+    slow, fast = sorted(band.mode.frequency_hz for band in result.modes)
     panel = plot.axes(ax, size_inch=(9.0, 5.0), title=f"Minimal shapers of two modes, the slower one at {slow:g} Hz")
     negative = (branches.amplitudes < 0.0).any(axis=2)
     durations_s = branches.times_s[..., 2]
     unit, scale = _time_unit(float(np.nanmax(durations_s)))
-    for has, colour, label in ((True, plot.COLOURS[0], "a negative tap"), (False, plot.COLOURS[1], "none")):
+    for has, colour, label in ((True, plot.COLOURS[0], "a negative impulse"), (False, plot.COLOURS[1], "none")):
         curves = np.where(negative == has, durations_s, np.nan)
         panel.plot(branches.ratios * slow, curves.T * scale, color=colour, linewidth=1.4)
         panel.plot([], [], color=colour, label=label)
@@ -337,50 +293,36 @@ def draw_branches(branches: MinimalBranches, modes: Sequence[Mode], ax: Axes | N
     return panel
 
 
+def _branches(result: Recommendation) -> MinimalBranches | None:
+    """All minimal shapers of two modes around their ratio, the slower one held; None for another number of modes."""
+    if len(result.modes) != 2:
+        return None
+    slow, fast = sorted((band.mode for band in result.modes), key=lambda mode: mode.frequency_hz)
+    ratio = fast.frequency_hz / slow.frequency_hz
+    lowest = max(_LEAST_RATIO, 0.6 * ratio)
+    ratios = np.arange(lowest, max(1.4 * ratio, lowest + 0.2), _RATIO_STEP)
+    # No more than the search takes at the largest ratio, and not more curves than one can tell apart.
+    longest_s = min(result.max_duration_s, _BRANCH_SWINGS / slow.frequency_hz, 99.0 / (ratios[-1] * slow.frequency_hz))
+    branches = minimal_branches(slow, fast.damping_ratio, ratios.tolist(), longest_s)
+    return branches if np.isfinite(branches.times_s).any() else None
+
+
+def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: Sequence[Mode]) -> NDArray[np.float64]:
+    """Residual ratio over frequency, with the damping ratios of the modes and between them what lies between."""
+    known = sorted((mode.frequency_hz, mode.damping_ratio) for mode in modes) or [(0.0, 0.0)]
+    damping = np.interp(frequencies_hz, [frequency for frequency, _ in known], [ratio for _, ratio in known])
+    return np.asarray(shaper.residual(frequencies_hz, damping))
+
+
 def _time_unit(longest_s: float) -> tuple[str, float]:
     return ("s", 1.0) if longest_s >= 1.0 else ("ms", 1e3)
 
 
-@dataclass(frozen=True)
-class ModalRun:
-    """A command and what each mode makes of it."""
-
-    times_s: FloatArray  # instants, (n,), s
-    command: FloatArray  # the command at them, (n,); unit of the user
-    responses: FloatArray  # position of each mode's mass at them, (n, n_modes), same unit
-    # largest |response - command| of each mode from the instant at which the command rests, (n_modes,)
-    residuals: FloatArray
-
-
-def respond(modes: Sequence[_core.Mode], command: FloatArray, period_s: float) -> ModalRun:
-    """Base-excited modes, each alone, under a command that is linear between its samples (first-order hold)."""
-    command = np.asarray(command, dtype=np.float64)
-    if not modes or command.ndim != 1 or len(command) < 2:
-        raise _core.ArgumentError(
-            f"a response needs at least one mode and two samples: {len(modes)} modes, samples of shape {command.shape}"
-        )
-    options = _core.PlaybackOptions()
-    options.period_s = period_s
-    options.measure_contour = False
-    options.record_samples = len(command)
-    path = _core.Path([_core.Segment.line([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 1.0)])
-    samples = np.asfortranarray(np.tile(command[:, None], (1, _AXES)))
-    responses, residuals = [], []
-    for first in range(0, len(modes), _AXES):
-        group = modes[first : first + _AXES]
-        options.modes = [[mode] for mode in group] + [[]] * (_AXES - len(group))
-        figures = _core.play_samples(samples, path, options)
-        responses.append(figures.recorded_response[: len(command), : len(group)])
-        residuals.append(np.asarray(figures.residual_mm)[: len(group)])
-    times_s = np.arange(len(command), dtype=np.float64) * period_s
-    return ModalRun(times_s, command, np.hstack(responses, dtype=np.float64), np.hstack(residuals, dtype=np.float64))
-
-
 def shaped_step(shaper: _core.Shaper, period_s: float, until_s: float) -> FloatArray:
-    """A unit step behind a shaper: the staircase of its taps at 0, one period, ... at least `until_s`.
+    """A unit step behind a shaper: the staircase of its impulses at 0, one period, ... at least `until_s`.
 
-    All is one period late, so that the first sample is at rest. A tap between two samples is shared by both so that
-    its time is kept; its step takes two periods.
+    All is one period late, so that the first sample is at rest. An impulse between two samples is shared by both so
+    that its time is kept; its step takes two periods.
     """
     times_s = np.arange(round(until_s / period_s) + 2) * period_s
     after = (times_s[:, None] - shaper.times_s[None, :]) / period_s

@@ -12,13 +12,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shapegcode._core import ArgumentError
-from shapegcode.shaping.bands import Design, ModeBand, ms, spoken
+from shapegcode.shaping.bands import SAME, Design, ModeBand, ms, spoken
 from shapegcode.shaping.registry import FAMILIES
 
 NO_RESIDUAL = 1e-9
 """A residual ratio below this is none: what is left is the rounding of the solver."""
-SAME = 0.02
-"""Durations (or, where none is good, worst residuals) that differ by less, relative, give way to a longer period."""
 
 _CONVERTED = {"non-negative", "robust"}  # what a conversion takes by itself
 _FOR_GRIDS = {row.name for row in FAMILIES if not row.continuous}
@@ -93,31 +91,31 @@ def recommend(
     """
     if not designs:
         raise ArgumentError("there is no design to choose from: 0 given")
-    places = _eligible(designs, allow_negative)
-    good = _good(designs, places, vibration_limit)
+    indices = _eligible(designs, allow_negative)
+    good = _good(designs, indices, vibration_limit)
     least = OBJECTIVES[objective][1] if good else _flattest
 
-    def order(place: int) -> tuple[float, ...]:
-        return (*least(designs[place]), _rank(designs[place]))
+    def order(index: int) -> tuple[float, ...]:
+        return (*least(designs[index]), _rank(designs[index]))
 
-    best = min(good or places, key=order)
+    best = min(good or indices, key=order)
     if designs[best].period_s is None or (good and objective != "shortest"):
         return best
     most = (1.0 + SAME) * least(designs[best])[0]
-    near = [place for place in good or places if designs[place].period_s and least(designs[place])[0] <= most]
-    longest_s = max(designs[place].period_s or 0.0 for place in near)
-    return min((place for place in near if designs[place].period_s == longest_s), key=order)
+    near = [index for index in good or indices if designs[index].period_s and least(designs[index])[0] <= most]
+    longest_s = max(designs[index].period_s or 0.0 for index in near)
+    return min((index for index in near if designs[index].period_s == longest_s), key=order)
 
 
-def _good(designs: Sequence[Design], places: Sequence[int], vibration_limit: float) -> list[int]:
+def _good(designs: Sequence[Design], indices: Sequence[int], vibration_limit: float) -> list[int]:
     """Those within the limit; of them those that cancel the modes without a band, if there are any."""
-    good = [place for place in places if is_within(designs[place], vibration_limit)]
-    return [place for place in good if designs[place].exact] or good
+    good = [index for index in indices if is_within(designs[index], vibration_limit)]
+    return [index for index in good if designs[index].exact] or good
 
 
 def _eligible(designs: Sequence[Design], allow_negative: bool) -> list[int]:
-    places = range(len(designs))
-    return [place for place in places if allow_negative or not designs[place].negative] or list(places)
+    indices = range(len(designs))
+    return [index for index in indices if allow_negative or not designs[index].negative] or list(indices)
 
 
 def is_within(each: Design, vibration_limit: float) -> bool:
@@ -130,8 +128,8 @@ def reason_for(
 ) -> str:
     """Why `recommend` takes the design of that index, in a sentence."""
     taken = designs[index]
-    places = _eligible(designs, allow_negative)
-    among = _good(designs, places, limit)
+    indices = _eligible(designs, allow_negative)
+    among = _good(designs, indices, limit)
     good = len(among)
     only_negative = not allow_negative and taken.negative
     kind = "" if allow_negative or only_negative else "non-negative "
@@ -144,8 +142,8 @@ def reason_for(
         )
     else:
         text = (
-            f"none of {len(places)} {kind}design{'' if len(places) == 1 else 's'} stays within {_percent(limit)} over "
-            f"{spoken(bands)}; this one leaves least, {_percent(taken.worst_residual)}"
+            f"none of {len(indices)} {kind}design{'' if len(indices) == 1 else 's'} stays within {_percent(limit)} "
+            f"over {spoken(bands)}; this one leaves least, {_percent(taken.worst_residual)}"
         )
         others = [each for each in designs if each.negative and is_within(each, limit)]
         if others and not allow_negative:

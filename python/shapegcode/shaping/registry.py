@@ -110,7 +110,7 @@ FAMILIES: tuple[Family, ...] = (
         "1/64 of the fastest period apart", True, True, specified,
     ),
     Family(
-        "negative-zv", "unity-magnitude ZV with a negative tap", "Singhose, Singer and Seering 1994",
+        "negative-zv", "unity-magnitude ZV with a negative impulse", "Singhose, Singer and Seering 1994",
         "any modes; shorter than ZV, sum |a| 3 for one mode; excites faster modes", True, True, negative,
     ),
     Family(
@@ -118,7 +118,7 @@ FAMILIES: tuple[Family, ...] = (
         "any modes at continuous times; on a grid it is the family non-negative", True, False, simultaneous,
     ),
     Family(
-        "minimal", "one tap more than modes",
+        "minimal", "one impulse more than modes",
         "Park, Hong and Danielson 2009 (paper 002), eq. 4-17; searches of this project",
         "one to six modes, damped or not, at continuous times (on a grid the polynomial stands for it); exact at the "
         "nominal frequencies only; impulses may be negative", True, False, solve_minimal,
@@ -134,12 +134,12 @@ FAMILIES: tuple[Family, ...] = (
     ),
     Family(
         "robust", "shortest shaper of a grid below a residual over the bands", "this project",
-        "modes with a band; one without is cancelled exactly; no tap is negative", False, True, _robust,
+        "modes with a band; one without is cancelled exactly; no impulse is negative", False, True, _robust,
     ),
     Family(
         "mirrored", "the same read backwards: a contour comes out alike in both directions", "this project",
-        "modes with a band or without one, which is cancelled exactly; no tap is negative; longer than robust", False,
-        True, _mirrored,
+        "modes with a band or without one, which is cancelled exactly; no impulse is negative; longer than robust",
+        False, True, _mirrored,
     ),
     Family(
         "smooth-zv", "polynomial kernel with a zero at the mode (Kalico's smooth_zv)", _KALICO,
@@ -201,10 +201,7 @@ def distinct(bands: Sequence[ModeBand]) -> list[ModeBand]:
 
 
 def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None = None) -> list[Design]:
-    """All shapers of a family for some modes, judged, the preferred one first.
-
-    Modes that are given twice are designed for once (:func:`distinct`).
-    """
+    """All shapers of a family for some modes, judged, the preferred one first."""
     options = options or DesignOptions()
     row = family_named(name)
     if not bands:

@@ -46,7 +46,7 @@ class Recommendation(Result):
         allow_negative: whether a design with negative impulses may be taken.
         vibration_limit: largest worst residual ratio of the design to take.
         max_duration_s: longest shaper that was looked for, s.
-        max_abs_sum: largest sum of the taps' magnitudes.
+        max_abs_sum: largest sum of the impulses' magnitudes.
         machine: whose modes they are: its name, of the command as -m names it; None: the modes were given.
         warnings: none as a rule.
     """
@@ -84,23 +84,23 @@ class Recommendation(Result):
     @property
     def recommended_on_grid(self) -> int | None:
         """Index of the design to take of those on a grid, which alone can be written as blocks; None: there is none."""
-        return self._best_of([place for place, each in enumerate(self.designs) if each.period_s is not None])
+        return self._best_of([index for index, each in enumerate(self.designs) if each.period_s is not None])
 
     @property
     def best_by_period(self) -> dict[float, int]:
         """Index of the design to take on each grid, by its period in s, ascending."""
-        places: dict[float, list[int]] = {}
-        for place, each in enumerate(self.designs):
+        indices: dict[float, list[int]] = {}
+        for index, each in enumerate(self.designs):
             if each.period_s is not None:
-                places.setdefault(each.period_s, []).append(place)
-        best = {period_s: self._best_of(places[period_s]) for period_s in sorted(places)}
-        return {period_s: place for period_s, place in best.items() if place is not None}
+                indices.setdefault(each.period_s, []).append(index)
+        best = {period_s: self._best_of(indices[period_s]) for period_s in sorted(indices)}
+        return {period_s: index for period_s, index in best.items() if index is not None}
 
-    def _best_of(self, places: Sequence[int]) -> int | None:
-        if not places:
+    def _best_of(self, indices: Sequence[int]) -> int | None:
+        if not indices:
             return None
-        designs = [self.designs[place] for place in places]
-        return places[recommend(designs, self.vibration_limit, self.objective, self.allow_negative)]
+        designs = [self.designs[index] for index in indices]
+        return indices[recommend(designs, self.vibration_limit, self.objective, self.allow_negative)]
 
     @property
     def answer(self) -> str:
@@ -116,13 +116,13 @@ class Recommendation(Result):
                 "measure the frequencies more closely (a narrower band), or allow more: --max-duration, "
                 "--vibration-limit, --negative"
             )
-        place = self.recommended_on_grid
-        if place is None:
+        index = self.recommended_on_grid
+        if index is None:
             return (
                 "blocks of a program need impulses on a grid: compare some with --block-period 5ms, or name the "
                 "machine with -m"
             )
-        best = self.designs[place]
+        best = self.designs[index]
         options = f"--shaper {best.family} --block-period {(best.period_s or 0.0) * 1e3:.6g}ms -o shaped.nc"
         if best.family == "taps":
             return "impulses of your own cannot be written by convert: take a family, or use the Python interface"
@@ -136,11 +136,11 @@ class Recommendation(Result):
     def notes(self) -> list[str]:
         """Why it is that one; what to take for blocks where that is another one; the best of each grid."""
         lines = [f"{_MARK} {'recommended' if self.ok else 'the best there is'}: {self.reason}"]
-        place = self.recommended_on_grid
-        if place is not None and place != self.recommended:
-            other = self.designs[place]
+        index = self.recommended_on_grid
+        if index is not None and index != self.recommended:
+            other = self.designs[index]
             lines.append(f"{_GRID_MARK} for the blocks of a program: {_spoken(other)}, leaves {self._left(other)}")
-        best = [self.designs[place] for place in self.best_by_period.values()]
+        best = [self.designs[index] for index in self.best_by_period.values()]
         if len(best) > 1:
             lines.append(f"best of each grid: {'; '.join(map(_spoken, best))}")
         return lines
@@ -199,9 +199,9 @@ class Recommendation(Result):
         return [*found, self._refused_table()] if self.refused else found
 
     def _designs_table(self, speed_mm_per_s: float, radius_mm: float, everything: bool) -> Table:
-        places = self.shown(everything=everything)
-        rows = [self.designs[place] for place in places]
-        marks = {id(self.designs[place]): self._mark(place) for place in places}
+        indices = self.shown(everything=everything)
+        rows = [self.designs[index] for index in indices]
+        marks = {id(self.designs[index]): self._mark(index) for index in indices}
         columns = (
             Column("", value=lambda each: marks[id(each)], text=True),
             Column("family", text=True),

@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.bands import (
+    VIBRATION_LIMIT,
     ModeBand,
     band_names,
     check_modes_and_times,
     check_times,
     mode_names,
     ms,
+    proven_worst,
     whole_periods,
 )
 from shapegcode.shaping.cutting_planes import (
@@ -33,25 +35,22 @@ from shapegcode.shaping.cutting_planes import (
     Bounds,
     CutPool,
     TapProblem,
-    proven_worst,
 )
 from shapegcode.shaping.grid_designs import (
     RESIDUAL_LIMIT,
     exact_conditions,
-    halved,
     lower_hull,
-    refined,
+    polished,
     shortest_non_negative,
+    smallest_enough,
 )
 
-VIBRATION_LIMIT = 0.05
-"""Residual ratio that a robust design may leave anywhere in the bands unless another one is asked for."""
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # of the refused one: what a refusal looks at
 _HINT_PRECISION = 0.05  # relative, of the duration that would do
 _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 FloatArray = NDArray[np.float64]
-_NO_TAP = 1e-9  # smaller amplitudes are the solver's dust
+_NO_TAP = 1e-9  # smaller amplitudes are the solver's round-off
 _GROWTH = 1.4  # of the number of periods while it is searched
 _WHOLE = 1e-3  # cycles per period from a whole number
 _LAST_TAP = 1e-3
@@ -169,7 +168,7 @@ class RobustDesign:
 
     shaper: Shaper  # the taps; times are multiples of `period_s`
     period_s: float  # period of the grid, s
-    worst_residual: float  # largest residual ratio over the bands, proven: at most 0.01 % above the true one
+    worst_residual: float  # largest residual ratio over the bands, proven
     least_possible: float  # no design of this duration or a shorter one has a smaller worst residual
 
 
@@ -189,9 +188,9 @@ class Task:
         cls,
         bands: Sequence[ModeBand],
         period_s: float,
-        non_negative: bool,
-        max_abs_sum: float,
-        zeros_at_nominal: bool,
+        non_negative: bool = True,
+        max_abs_sum: float = 1.0,
+        zeros_at_nominal: bool = False,
         mirrored: bool = False,
     ) -> Task:
         """The task, its values checked."""
@@ -234,17 +233,12 @@ class Task:
         return replace(self, period_s=period_s, pool=CutPool.around(self.wide))
 
     def finished(self, taps: FloatArray, lower: float) -> RobustDesign | None:
-        """The taps without dust, their zeros solved again to rounding, judged; None if that breaks them."""
+        """The taps without round-off, their zeros solved again to rounding, judged; None if that breaks them."""
         if self.mirrored:
             taps = 0.5 * (taps + taps[::-1])
-        support = np.flatnonzero(np.abs(taps) > _NO_TAP)
-        matrix, right = self.conditions(len(taps) - 1)
-        amplitudes = refined(matrix[:, support], right, taps[support])
-        total = float(amplitudes.sum())
-        if abs(total - 1.0) > RESIDUAL_LIMIT or (self.max_abs_sum is None and np.any(amplitudes <= 0.0)):
-            return None
-        shaper = Shaper(((support - support[0]) * self.period_s).tolist(), (amplitudes / total).tolist())
-        if any(shaper.residual_ratio(mode) > RESIDUAL_LIMIT * shaper.abs_sum for mode in self.exact):
+        conditions, signed = self.conditions(len(taps) - 1), self.max_abs_sum is not None
+        shaper = polished(taps, conditions, self.period_s, _NO_TAP, signed=signed)
+        if shaper is None or any(shaper.residual_ratio(mode) > RESIDUAL_LIMIT * shaper.abs_sum for mode in self.exact):
             return None
         worst = proven_worst(shaper, self.bands)
         return RobustDesign(shaper, self.period_s, worst, min(lower, worst))
@@ -274,8 +268,7 @@ def _exact(task: Task, max_duration_s: float) -> RobustDesign | None:
         shaper = shortest_non_negative(task.exact, task.period_s, max_duration_s)
     except DesignError:
         return None
-    worst = proven_worst(shaper, task.bands)
-    return RobustDesign(shaper, task.period_s, worst, 0.0)
+    return RobustDesign(shaper, task.period_s, proven_worst(shaper, task.bands), 0.0)
 
 
 def best_within(task: Task, last: int) -> RobustDesign | None:
@@ -319,13 +312,10 @@ def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, pre
     the answer suffices, but may exceed the smallest by that much.
     """
     start = max(1.0, sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s, _GROWTH * too_few)
-    enough = min(most, math.ceil(start))
-    while enough < most and _below(task, enough, limit) is None:
-        too_few, enough = enough, max(enough + 1, math.ceil(_GROWTH * enough))
-    enough = min(enough, most)
-    if enough <= too_few or _below(task, enough, limit) is None:
-        return None
-    return halved(lambda last: _below(task, last, limit) is not None, too_few, enough, precision)
+    return smallest_enough(
+        lambda last: _below(task, last, limit) is not None, math.ceil(start), most, too_few, growth=_GROWTH,
+        precision=precision,
+    )  # fmt: skip
 
 
 def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesign | None:

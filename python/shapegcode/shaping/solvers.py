@@ -28,8 +28,8 @@ from shapegcode._core import (
     repeated_zv,
 )
 from shapegcode.shaping.bands import DesignOptions, ModeBand, mode_names, ms, on_grid
-from shapegcode.shaping.grid_designs import halved
-from shapegcode.shaping.grid_search import RESIDUAL_LIMIT, Conditions, ResidualLimit, Zero, shortest_on_grid
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, halved
+from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid
 
 Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
 """All shapers of a family for some bands, the preferred one first."""
@@ -123,11 +123,6 @@ negative = _defined(
 """Unity-magnitude ZV; on a grid the shortest taps between -1 and 1."""
 
 
-def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bool = False) -> Solve:
-    """A polynomial kernel with zeros at these multiples of each mode, see `smooth_kernel`."""
-    return _one_after_the_other(smooth_kernel(name, ratios, periods, at_least=at_least))
-
-
 def specified(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     """SI: the shortest non-negative impulses that leave at most the vibration limit over every band."""
     conditions = Conditions(limits=tuple(_limit(band, options.vibration_limit) for band in bands))
@@ -157,10 +152,7 @@ def user_taps(_bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper
 
 
 def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
-    """Shortest shaper with non-negative impulses at continuous times that cancels every mode.
-
-    Source: this project (numerical optimum over all modes at once).
-    """
+    """Shortest shaper with non-negative impulses at continuous times that cancels every mode."""
     fastest_hz = max(mode.frequency_hz for mode in modes)
     title = f"simultaneous shaper without negative impulses for {mode_names(modes)}"
     conditions = Conditions(zeros=tuple(Zero(mode) for mode in modes))
@@ -226,10 +218,8 @@ def _polished(times_s: FloatArray, amplitudes: FloatArray, modes: Sequence[Mode]
     return shaper if max(shaper.residual_ratio(mode) for mode in modes) <= _RESIDUAL else None
 
 
-def smooth_kernel(
-    name: str, ratios: tuple[float, ...], periods: float, *, at_least: bool = False
-) -> Callable[[Mode, DesignOptions], Shaper]:
-    """The design of one mode by a polynomial kernel.
+def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bool = False) -> Solve:
+    """A polynomial kernel with zeros at these multiples of each mode.
 
     Source: D. Butyugin's smoothers of the printer firmware Kalico; their derivation on a grid: this project.
     """
@@ -256,7 +246,7 @@ def smooth_kernel(
             )
         return Shaper((np.arange(len(found)) * period_s).tolist(), found.tolist())
 
-    return of_one
+    return _one_after_the_other(of_one)
 
 
 def _first(good: Callable[[int], bool], fewest: int, most: int, stride: int) -> int | None:

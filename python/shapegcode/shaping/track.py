@@ -66,17 +66,6 @@ class ShaperTrack:
         """Time of the last tap of the longest shaper, s."""
         return max(node.shaper.duration_s for node in self.nodes)
 
-    @property
-    def variance_s2(self) -> float:
-        """Largest contour cost, s²."""
-        return max(node.shaper.variance_s2 for node in self.nodes)
-
-    @property
-    def mean_spread_s(self) -> float:
-        """Largest difference between the mean delays of two shapers, s."""
-        means = [node.shaper.mean_s for node in self.nodes]
-        return max(means) - min(means)
-
     @cached_property
     def filters(self) -> VaryingFir:
         """The shapers in whole periods."""
@@ -143,10 +132,7 @@ def design_track(
 
 
 def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None) -> Shaper | None:
-    """Non-negative shaper of a mean delay, of least second central moment, that cancels every mode exactly.
-
-    With the mean delay given, the second central moment is linear in the taps: one linear program finds its least.
-    """
+    """Non-negative shaper of a mean delay, of least second central moment, that cancels every mode exactly."""
     found = taps_of_mean(modes, period_s, periods, mean_s)
     if found is None or found[0][0] != 0:
         return None

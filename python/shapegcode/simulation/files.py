@@ -31,12 +31,12 @@ class MotionFile(Protocol):
 class _Csv:
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
-        self._begun = False
+        self._has_head = False
 
     def write(self, chunk: Chunk) -> None:
         columns = chunk.columns()
-        if not self._begun:
-            self._begun = True
+        if not self._has_head:
+            self._has_head = True
             self._stream.write((",".join(["kind", *columns]) + "\n").encode())
         table = np.column_stack([column.astype(np.float64) for column in columns.values()])
         self._stream.write(_core.csv_rows(chunk.kind, KINDS, table))

@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.figures import CONTOURS, ContourError, Tracks
 from shapegcode.results.json import hidden, sparse
-from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result, Xyz
 from shapegcode.results.table import Column, Table, xyz_columns
 from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import ProgramFigures
+
+if TYPE_CHECKING:
+    from shapegcode.results.page.model import Figure
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -252,15 +255,17 @@ class Simulation(Result):
 
     def key_figures(self) -> tuple[Figure, ...]:
         """Time, vibration after a stop and contour error of the machine table."""
+        from shapegcode.results.page.model import Figure
+
         residual, _ = _NAMES[self.plant]
-        swings = [
+        vibrations = [
             Figure(f"{residual} {axis.upper()}", "µm", None, self.residual_vibration_um[axis], 2,
                    key_after=f"residual_vibration_um.{axis}")
             for axis in "xyz" if self.residual_vibration_um[axis] >= _LEAST_SHOWN_UM
         ]  # fmt: skip
         return (
             Figure("cycle time", "s", None, self.cycle_time_s, 2, key_after="cycle_time_s"),
-            *swings,
+            *vibrations,
             Figure(CONTOURS["response"], "µm", None, self._contour.max, 2, key_after="contour_error_um.response.max"),
         )
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +15,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import Offset, machine_warnings, region_range_warnings
-from shapegcode.model.playable import SimulatedPrograms
-from shapegcode.model.shaped_program import shaped_warnings
+from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
@@ -24,9 +24,9 @@ from shapegcode.results.result import Xyz
 from shapegcode.simulation.files import csv_file, npz_file
 from shapegcode.simulation.motion import MotionRecorder
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
+from shapegcode.verdict.cases import BLOCK_ENDS
 from shapegcode.verdict.judge import judge_program
 
-_RULES = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 # How long behind a stop its settling time is looked for. A drive is integrated all that time.
 _SHORTEST_REST_S, _LONGEST_REST_S, _DRIVE_REST_S = 0.5, 10.0, 0.5
 
@@ -43,10 +43,10 @@ def simulate(
 ) -> Simulation:
     """Simulate the cutting regions of a program through the controller's model and the plant, each from rest to rest.
 
-    `play_motion` and `stream` play the whole program in one.
+    `play_motion` and `stream` simulate the whole program in one.
 
     Args:
-        program: what to play, or its file.
+        program: what to simulate, or its file.
         machine: controller and plant.
         plant: "modal" for the modes behind an ideal servo, "feed-drive" for `axes.*.drive`; what is said of vibration
             then holds the lag of the servo loop.
@@ -77,9 +77,9 @@ def simulate(
     nominal, verdict = {}, None
     if against is not None:
         against = given_program(against, machine)
-        pairs = paired_regions(program, against)
+        pairs = list(paired_regions(program, against))
         nominal = {mine.first_line: other.path for mine, other in pairs if not mine.path.moves_as(other.path)}
-        verdict = judge_program(program, against, machine, shaped=shaped)
+        verdict = judge_program(program, against, pairs, model, shaped=shaped)
     runs: list[RegionRun] = []
     simulated: list[_core.PlaybackFigures] = []
     of_shaped: list[_core.PlaybackFigures] = []
@@ -89,7 +89,7 @@ def simulate(
         replay = partial(_play, region.path, path, model, plant, as_shaped, model.offset(region), band_um, limit_s)
         figures = [replay(record_samples)]
         if as_shaped:
-            figures += [replay(0, block_end=rule) for rule in _RULES if rule != model.own_rule]
+            figures += [replay(0, block_end=rule) for rule in BLOCK_ENDS if rule != model.own_rule]
         runs.append(
             RegionRun(
                 lines=(region.first_line, region.last_line),
@@ -120,15 +120,10 @@ def simulate(
         measured_against=(against or program).source,
         cycle_time_s=_core.time_program(program.core, fanuc_model(machine, shaped=shaped)).total_s,
         cutting_time_s=cutting_s,
-        residual_vibration_um=largest_xyz_um(figures.residual_mm for figures in simulated),
-        peak_vibration_um=largest_xyz_um(figures.peak_mm for figures in simulated),
+        **_largest(simulated),
         settling_time_s=_settling_s(simulated, band_um),
         settling_band_um=band_um,
         settling_limit_s=limit_s,
-        contour_error_um=Tracks(
-            ContourError.of(figures.command for figures in simulated),
-            ContourError.of(figures.response for figures in simulated),
-        ),
         orbit_error_percent=tuple(error for figures in own for error in figures.orbit_error_percent),
         response_orbit_error_percent=tuple(error for figures in own for error in figures.response_orbit_error_percent),
         of_shaped=_shaped_figures([run for run in runs if run.shaped and not run.was_rapid], of_shaped),
@@ -156,7 +151,7 @@ def play_motion(
     Memory does not grow with the length of the program.
 
     Args:
-        program: what to play, or its file.
+        program: what to simulate, or its file.
         machine: controller and plant.
         plant: "modal" or "feed-drive", see `simulate`.
         shaped: cuts are shaped blocks, see `simulate`.
@@ -204,13 +199,19 @@ def _shaped_figures(runs: Sequence[RegionRun], simulated: Sequence[_core.Playbac
     return ShapedFigures(
         regions=len(runs),
         cutting_time_s=math.fsum(run.time_s for run in runs),
-        residual_vibration_um=largest_xyz_um(figures.residual_mm for figures in simulated),
-        peak_vibration_um=largest_xyz_um(figures.peak_mm for figures in simulated),
-        contour_error_um=Tracks(
+        **_largest(simulated),
+    )
+
+
+def _largest(simulated: Sequence[_core.PlaybackFigures]) -> dict[str, Any]:
+    return {
+        "residual_vibration_um": largest_xyz_um(figures.residual_mm for figures in simulated),
+        "peak_vibration_um": largest_xyz_um(figures.peak_mm for figures in simulated),
+        "contour_error_um": Tracks(
             ContourError.of(figures.command for figures in simulated),
             ContourError.of(figures.response for figures in simulated),
         ),
-    )
+    }
 
 
 def _play(

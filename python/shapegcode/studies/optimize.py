@@ -20,16 +20,24 @@ import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, DesignError, MachineError
 from shapegcode.machine import Machine
-from shapegcode.machine.output import ANY_PRICE
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
-from shapegcode.studies.replay import SHARE, DrawsJob, Replay, play_all
+from shapegcode.studies.replay import SHARE, Replay, SamplesJob, simulate_all
 from shapegcode.studies.result import Candidate, ChosenValue, Optimum
 from shapegcode.studies.study import check_ends, check_probability, within
-from shapegcode.studies.varied import MAX_DRAWS, Vary, check_keys, drawn, drawn_machine, listed, varied_values
+from shapegcode.studies.varied import (
+    MAX_DRAWS,
+    Vary,
+    check_keys,
+    listed,
+    sampled_columns,
+    sampled_machine,
+    varied_values,
+)
 
-USUAL_DRAWS = 256  # Machines on which a choice is simulated, if nothing else is said
-USUAL_CONVERSIONS = 300  # Conversions at most, if nothing else is said
+USUAL_DRAWS = 256  # Machines on which a choice is simulated, if nothing else is stated
+USUAL_CONVERSIONS = 300  # Conversions at most, if nothing else is stated
 
 _FRESH = 4  # times as many draws confirm a choice: the best of many has had luck
 _UNLIKELY_S = 1e6  # a candidate that is not likely enough costs more than any program takes
@@ -85,10 +93,10 @@ def optimize(
     for each in varied:
         if each.known:
             raise ArgumentError(f"vary: {each.key}: the converter would know it: it belongs into choose")
-    samples = [drawn(varied, n, "sobol", seed, indices=False)]
+    samples = [sampled_columns(varied, n, "sobol", seed, indices=False)]
     if n > (largest := MAX_DRAWS // _FRESH):
         raise ArgumentError(f"n = {n}: must be at most {largest}: {_FRESH} times as many confirm a choice")
-    samples.append(drawn(varied, _FRESH * n, "sobol", seed + 1, indices=False))
+    samples.append(sampled_columns(varied, _FRESH * n, "sobol", seed + 1, indices=False))
     for columns in samples:
         check_ends(machine, varied, columns)
     keys = [each.key for each in varied]
@@ -112,12 +120,12 @@ def optimize(
 
 
 def _check_values(machine: Machine, choices: Choices) -> None:
-    """Every value by itself; two that do not go together are only no candidate."""
+    """Check each value by itself; invalid combinations are left out of the candidates."""
     for key, values in choices.items():
         problems = []
         for value in values:
             try:
-                drawn_machine(machine, {key: value}, "choose")
+                sampled_machine(machine, {key: value}, "choose")
             except MachineError as wrong:
                 problems.append(wrong)
         if problems and len(problems) == len(values):
@@ -146,7 +154,7 @@ class _Choosing:
             values = self._values(ranks)
             chosen = tuple(ChosenValue(key, toml(value)) for key, value in values.items())
             try:
-                machine = drawn_machine(self._machine, values, "choose")
+                machine = sampled_machine(self._machine, values, "choose")
                 replay = Replay.of(self._program, machine, self._machine, shape_all=self._shape_all, is_whole=True)
                 self._replays[ranks] = replay
                 self.candidates[ranks] = Candidate(chosen, replay.time_s)
@@ -157,7 +165,9 @@ class _Choosing:
     def _share(self, replay: Replay, which: int) -> float:
         rows = self._rows[which]
         numbers = tuple(range(1, len(rows) + 1))
-        shares = np.array(play_all(replay, DrawsJob(self._machine.name, rows, numbers, (SHARE,), times=False), None))
+        shares = np.array(
+            simulate_all(replay, SamplesJob(self._machine.name, rows, numbers, (SHARE,), times=False), None)
+        )
         return float(within(shares).mean())
 
     def simulated(self, ranks: Ranks) -> Candidate:
@@ -178,7 +188,7 @@ class _Choosing:
         return found.time_s if share >= self._probability else _UNLIKELY_S * (1.0 + self._probability - share)
 
     def best(self) -> Candidate | None:
-        """The shortest that is likely enough; of the others only those are simulated that are shorter."""
+        """The shortest candidate with enough probability; longer ones are not simulated."""
         order = sorted(
             (ranks for ranks, each in self.candidates.items() if each.time_s is not None),
             key=lambda ranks: (self.candidates[ranks].time_s, ranks),
@@ -231,7 +241,7 @@ def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
         except ArgumentError:
             raise ArgumentError(f"choose: {key} = {values!r}: must be a list of one value or more") from None
         if key in varied:
-            raise ArgumentError(f"choose: {key}: it is drawn (vary): a value is either drawn or chosen")
+            raise ArgumentError(f"choose: {key}: it is sampled (vary): a value is either sampled or chosen")
     return checked
 
 

@@ -83,9 +83,9 @@ def plot_choices(found: Optimum, ax: Axes | None = None) -> Axes:
         share = row.checked if row.checked is not None else row.within
         longer_ms = 1e3 * (time_s - times_s[0])
         panel.barh(place, longer_ms, height=0.6, color=plot.COLOURS[1] if row == found.best else plot.COLOURS[5])
-        said = f"{time_s:.3f} s, " + ("not simulated" if share is None else f"within tolerance on {share * 100:.1f} %")
+        label = f"{time_s:.3f} s, " + ("not simulated" if share is None else f"within tolerance on {share * 100:.1f} %")
         panel.annotate(
-            said, (longer_ms, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8,
+            label, (longer_ms, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8,
             fontweight="bold" if row == found.best else "normal",
         )  # fmt: skip
     panel.set_yticks(range(len(rows)), [", ".join(each.value for each in row.values) for row in rows], fontsize=8)
@@ -109,14 +109,10 @@ def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
     key = study.decides[0].key
     curves = [bins for bins in study.curves if bins.key == key and bins.measure != SHARE][:_PANELS]
     curves = curves or [bins for bins in study.curves if bins.key == key]
-    panels = [
-        row[0]
-        for row in plot.grid(
-            ax, len(curves), 1, size_inch=(8.0, 1.0 + 2.1 * len(curves)), sharex=True,
-            title=f"{study.n} machines: {Path(study.program).name} on {study.machine}",
-            part="median, and the band that holds 90 %",
-        )
-    ]  # fmt: skip
+    panels = plot.column(
+        ax, len(curves), size_inch=(8.0, 1.0 + 2.1 * len(curves)), part="median, and the band that holds 90 %",
+        title=f"{study.n} machines: {Path(study.program).name} on {study.machine}",
+    )  # fmt: skip
     for panel, bins in zip(panels, curves, strict=True):
         _band(panel, bins)
         if (limit := study.limits_um.get(bins.measure)) is not None and limit < 3.0 * max(
@@ -131,15 +127,15 @@ def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
 
 
 def _band(panel: Axes, bins: Bins) -> None:
-    places = [each.at for each in bins.bins]
+    positions = [each.at for each in bins.bins]
     low, middle, high = ([getattr(each, name) for each in bins.bins] for name in ("low", "median", "high"))
-    if bins.numbers and len(places) > 1:
-        panel.fill_between(places, low, high, color=plot.COLOURS[5], alpha=0.5, linewidth=0.0)
-        panel.plot(places, middle, color=plot.COLOURS[1])
+    if bins.numbers and len(positions) > 1:
+        panel.fill_between(positions, low, high, color=plot.COLOURS[5], alpha=0.5, linewidth=0.0)
+        panel.plot(positions, middle, color=plot.COLOURS[1])
         return
-    for place, bottom, at, top in zip(places, low, middle, high, strict=True):
-        panel.plot([place, place], [bottom, top], color=plot.COLOURS[5], linewidth=8.0, solid_capstyle="butt")
-        panel.plot([place], [at], color=plot.COLOURS[1], marker="o")
+    for position, bottom, at, top in zip(positions, low, middle, high, strict=True):
+        panel.plot([position, position], [bottom, top], color=plot.COLOURS[5], linewidth=8.0, solid_capstyle="butt")
+        panel.plot([position], [at], color=plot.COLOURS[1], marker="o")
     if not bins.numbers:
-        panel.set_xticks(places, [each.name for each in bins.bins])
+        panel.set_xticks(positions, [each.name for each in bins.bins])
         panel.margins(x=0.25)

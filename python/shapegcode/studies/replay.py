@@ -17,9 +17,9 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
+from shapegcode.program.computer import cores
 from shapegcode.results.figures import Deviation
-from shapegcode.studies.varied import drawn_machine
-from shapegcode.verdict.ahead import cores
+from shapegcode.studies.varied import sampled_machine
 from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures
 
@@ -29,7 +29,7 @@ MEASURES: Mapping[str, str] = {
     "residual_x_um": "residual vibration X",
     "residual_y_um": "residual vibration Y",
     "residual_z_um": "residual vibration Z",
-    "peak_um": "vibration on the way, worst axis",
+    "peak_um": "vibration while it moves, worst axis",
     "contour_um": "contour error that is judged",
     "command_um": "contour error of the command",
     "response_um": "contour error of the machine table",
@@ -78,7 +78,7 @@ class Replay:
         limits: Sequence[RegionLimits],  # of each
         time_s: float,  # cycle time of the text on that machine
     ) -> None:
-        self.machine, self._original, self._emitted, self._places = machine, original, emitted, tuple(parts)
+        self.machine, self._original, self._emitted, self._extents = machine, original, emitted, tuple(parts)
         self.time_s = time_s
         regions = [original.regions[index] for index, _, _ in parts]
         self._parts = [
@@ -113,15 +113,15 @@ class Replay:
         for place in found.placed:
             simulated = judging.simulate_original(place.region.path, offset=judging.offset(place.region))
             limits.append(judge.limits(RegionFigures(simulated, (), (), 0), place))
-        places = [(ranks[id(place.region)], place.first_line, place.last_line) for place in found.placed]
-        return cls(machine, original, found.emitted, places, limits, found.cycle_time_s.emitted)
+        extents = [(ranks[id(place.region)], place.first_line, place.last_line) for place in found.placed]
+        return cls(machine, original, found.emitted, extents, limits, found.cycle_time_s.emitted)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As bytes and numbers, for another process."""
         limits = [part.limits for part in self._parts]
         numbers = tuple((tuple(each.residual_um.tolist()), each.contour_um, each.target) for each in limits)
         texts = self._original.source, self._original.expanded_text, self._emitted.text
-        return _replay, (self.machine.to_toml(short=True), *texts, self._places, numbers, self.time_s)
+        return _replay, (self.machine.to_toml(short=True), *texts, self._extents, numbers, self.time_s)
 
     @property
     def contour_limit_um(self) -> float:
@@ -133,7 +133,7 @@ class Replay:
         """The smallest that is allowed of any axis that may vibrate."""
         return min(float(part.limits.residual_um.min()) for part in self._parts)
 
-    def play(
+    def simulate(
         self, machine: Machine, wanted: Collection[str], *, override: float = _FULL, times: bool = True
     ) -> dict[str, float]:
         """Simulate the text."""
@@ -167,17 +167,17 @@ class Replay:
         followed = Deviation.of([run.command]) if command else None
         answered = Deviation.of([run.response]) if contour else None
         figures = CaseFigures(run.residual_mm, followed, answered, run.duration_s)
-        judged = judge_region(figures, part.limits)
+        outcomes = judge_region(figures, part.limits)
         axes = (run.residual_mm * 1e3).tolist()
         measured = {
             "residual_um": max(axes),
             **dict(zip(("residual_x_um", "residual_y_um", "residual_z_um"), axes, strict=True)),
             "peak_um": float(run.peak_mm.max()) * 1e3,
-            "contour_um": judged[-1].value_um if contour else 0.0,
+            "contour_um": outcomes[-1].value_um if contour else 0.0,
             "command_um": run.command.max_abs_mm * 1e3 if command else 0.0,
             "response_um": run.response.max_abs_mm * 1e3 if contour else 0.0,
             "cutting_time_s": run.duration_s,
-            SHARE: max(each.share for each in judged),
+            SHARE: max(each.share for each in outcomes),
         }
         if "original_residual_um" in wanted or "original_contour_um" in wanted:
             was = model.simulate_original(path, offset=offset)
@@ -189,46 +189,46 @@ class Replay:
 OVERRIDE = "times.feed_override_percent"  # Where it is varied, the blocks are simulated at it
 
 _AT_ONCE = 64  # draws of a task at most: long enough to be worth one
-_PLAYED_S = 900.0  # of motion in a task: short enough to tell how far it is, and to be stopped
+_SIMULATED_S = 900.0  # of motion in a task: short enough to tell how far it is, and to be stopped
 _KEPT_TEXTS = 4
 
 
 @dataclass(frozen=True)
-class DrawsJob:
-    """Some draws of one text."""
+class SamplesJob:
+    """Some samples of one program."""
 
     name: str  # of the machine, in messages
     rows: tuple[Mapping[str, object], ...]  # values of the machine that simulates, by key, a row for each draw
     draws: tuple[int, ...]  # their numbers
     wanted: tuple[str, ...]  # what is measured
-    times: bool  # see `Replay.play`
+    times: bool  # see `Replay.simulate`
 
-    def play(self, replay: Replay) -> list[list[float]]:
+    def simulate(self, replay: Replay) -> list[list[float]]:
         """Simulate them."""
         found = []
         for row, draw in zip(self.rows, self.draws, strict=True):
-            machine = drawn_machine(replay.machine, row, f"{self.name}, draw {draw}")
+            machine = sampled_machine(replay.machine, row, f"{self.name}, draw {draw}")
             override = machine.times.feed_override_percent / 100.0 if OVERRIDE in row else 1.0
-            measured = replay.play(machine, self.wanted, override=override, times=self.times)
+            measured = replay.simulate(machine, self.wanted, override=override, times=self.times)
             found.append([measured[name] for name in self.wanted])
         return found
 
-    def parts(self, motion_s: float) -> Iterator[DrawsJob]:
+    def parts(self, motion_s: float) -> Iterator[SamplesJob]:
         """The same in tasks."""
-        size = max(1, min(_AT_ONCE, int(_PLAYED_S / max(motion_s, 1e-3))))
+        size = max(1, min(_AT_ONCE, int(_SIMULATED_S / max(motion_s, 1e-3))))
         for at in range(0, len(self.rows), size):
             rows, draws = self.rows[at : at + size], self.draws[at : at + size]
-            yield DrawsJob(self.name, rows, draws, self.wanted, self.times)
+            yield SamplesJob(self.name, rows, draws, self.wanted, self.times)
 
 
-def play_all(
-    replay: Replay, job: DrawsJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
+def simulate_all(
+    replay: Replay, job: SamplesJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
 ) -> list[list[float]]:
     """Simulate the draws of one text."""
     parts = list(job.parts(replay.time_s))
     found: list[list[float]] = []
     threads = ThreadPoolExecutor(cores())
-    running = [(pool or threads).submit(part.play, replay) for part in parts]
+    running = [(pool or threads).submit(part.simulate, replay) for part in parts]
     try:
         for future, part in zip(running, parts, strict=True):
             found += future.result()
@@ -246,7 +246,7 @@ def _replay(
     source: str,
     original: bytes,
     emitted: bytes,
-    places: tuple[tuple[int, int, int], ...],
+    extents: tuple[tuple[int, int, int], ...],
     limits: tuple[tuple[tuple[float, ...], float, Any], ...],
     time_s: float,
 ) -> Replay:
@@ -254,5 +254,5 @@ def _replay(
     machine = Machine.from_toml(toml)
     read = Program.from_text(original, machine, source=source)
     shaped = Program.from_text(emitted, machine, source=source, emitted=True)
-    judged = [RegionLimits(np.array(residual), contour, target) for residual, contour, target in limits]
-    return Replay(machine, read, shaped, places, judged, time_s)
+    region_limits = [RegionLimits(np.array(residual), contour, target) for residual, contour, target in limits]
+    return Replay(machine, read, shaped, extents, region_limits, time_s)

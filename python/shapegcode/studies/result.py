@@ -21,7 +21,7 @@ from shapegcode.results.table import Column, Table
 if TYPE_CHECKING:
     import xarray as xr
 
-_PERCENT = (5, 25, 50, 75, 95, 99)
+PERCENT = (5, 25, 50, 75, 95, 99)
 _UNITS = {"_um": "µm", "_s": "s"}
 
 
@@ -322,11 +322,11 @@ class MachineStudy(Result):
         if what == "quantities":
             rows = {
                 each.name: xr.DataArray(
-                    [getattr(each, f"p{percent}") for percent in _PERCENT], dims=["percent"], attrs={"units": each.unit}
+                    [getattr(each, f"p{percent}") for percent in PERCENT], dims=["percent"], attrs={"units": each.unit}
                 )
                 for each in self.quantities
             }
-            return xr.Dataset(rows, coords={"percent": [float(percent) for percent in _PERCENT]}, attrs=about)
+            return xr.Dataset(rows, coords={"percent": [float(percent) for percent in PERCENT]}, attrs=about)
         if what not in ("", "draws"):
             raise ArgumentError(f"{what}: must be draws or quantities")
         if not self.draws:

@@ -1,4 +1,4 @@
-"""A study: one text, many sampled machines, what that does to the verdict."""
+"""A Monte Carlo study: one program on many sampled machines, and their verdicts."""
 
 from __future__ import annotations
 
@@ -18,11 +18,37 @@ from shapegcode.errors import ArgumentError, DesignError, MachineError
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.program.computer import cores
 from shapegcode.settings.keys import toml
-from shapegcode.studies.replay import CONTOURS, DEFAULT_MEASURES, SHARE, DrawsJob, Replay, checked_measures, play_all
-from shapegcode.studies.result import BinQuantiles, Bins, Decides, MachineStudy, Quantity, RefusedDraws, VariedKey
-from shapegcode.studies.varied import Columns, Listed, Varied, Vary, drawn, drawn_machine, index_problem, varied_values
-from shapegcode.verdict.ahead import cores
+from shapegcode.studies.replay import (
+    CONTOURS,
+    DEFAULT_MEASURES,
+    SHARE,
+    Replay,
+    SamplesJob,
+    checked_measures,
+    simulate_all,
+)
+from shapegcode.studies.result import (
+    PERCENT,
+    BinQuantiles,
+    Bins,
+    Decides,
+    MachineStudy,
+    Quantity,
+    RefusedDraws,
+    VariedKey,
+)
+from shapegcode.studies.varied import (
+    Columns,
+    Listed,
+    Varied,
+    Vary,
+    index_problem,
+    sampled_columns,
+    sampled_machine,
+    varied_values,
+)
 
 Progress = Callable[[str, float], None]
 
@@ -42,7 +68,7 @@ def study(
     scheduler: Cluster | str | None = None,
     on_progress: Progress = lambda _stage, _share: None,
 ) -> MachineStudy:
-    """Simulate a program on machines whose values are drawn, and say how likely it stays within tolerance.
+    """Simulate a program on machines whose values are sampled, and compute how likely it stays within tolerance.
 
     The program is converted once, for the machine file. A mode, a drive, a filter, a time of `vary` is that of the
     machine on which it is simulated. A value that only the converter reads, or one that is `known`,
@@ -53,7 +79,7 @@ def study(
     Args:
         program: what is simulated, or its file.
         machine: as its file has it.
-        vary: what each key is drawn from: `normal`, `lognormal`, `uniform`, or a list of values. Modes count from 1.
+        vary: what each key is sampled from: `normal`, `lognormal`, `uniform`, or a list of values. Modes count from 1.
         n: how many draws.
         sampling: "sobol", "lhs" (latin hypercube) or "grid".
         measure: what is measured, see `shapegcode.studies.replay.MEASURES`.
@@ -77,7 +103,7 @@ def study(
     check_probability("at_least", at_least)
     wanted = checked_measures(measure)
     varied = varied_values(machine, vary)
-    columns = drawn(varied, n, sampling, seed, indices=indices)
+    columns = sampled_columns(varied, n, sampling, seed, indices=indices)
     check_ends(machine, varied, columns)
     if isinstance(program, Program):
         program.require_machine(machine)
@@ -86,7 +112,7 @@ def study(
     with contextlib.ExitStack() as stack:
         pool = None if cluster is None else stack.enter_context(cluster_executor(cluster, cores()))[0]
         run = _StudyRun(source, machine, varied, columns, wanted, pool, shape_all, on_progress)
-        texts = run.play()
+        texts = run.simulate()
     return _result(run, texts, sampling, seed, at_least, indices=indices)
 
 
@@ -100,7 +126,7 @@ def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> 
             ends = {"low": int(numbers.argmin()), "high": int(numbers.argmax())}.values()
         for index in ends:
             row = {one.key: values[index] for one, values in zip(varied, columns, strict=True)}
-            drawn_machine(machine, row, f"{machine.name}, draw {index + 1}")
+            sampled_machine(machine, row, f"{machine.name}, draw {index + 1}")
 
 
 @dataclass(frozen=True)
@@ -126,13 +152,8 @@ class _StudyRun:
         self.measured = np.full((self.count, len(wanted)), np.nan)
         self.nominal: dict[str, float] = {}
 
-    @property
-    def name(self) -> str:
-        """Of the program."""
-        return self.program.source if isinstance(self.program, Program) else self.program
-
-    def play(self) -> list[_Text]:
-        """Convert each text and play its draws."""
+    def simulate(self) -> list[_Text]:
+        """Convert each program and simulate its samples."""
         groups: dict[str, list[int]] = {}
         rows = [self._row(index, known=True) for index in range(self.count)]
         for index, row in enumerate(rows):
@@ -142,10 +163,10 @@ class _StudyRun:
             self.on_progress("converting", done / self.count)
             text = self._text(tuple(draws), rows[draws[0]])
             if text.replay is not None:
-                self._play(text, done)
+                self._simulate(text, done)
             done += len(draws)
             texts.append(text)
-        self._play_nominal(texts)
+        self._simulate_nominal(texts)
         return texts
 
     def _row(self, index: int, *, known: bool) -> dict[str, object]:
@@ -156,7 +177,7 @@ class _StudyRun:
         }
 
     def _text(self, draws: tuple[int, ...], values: Mapping[str, object]) -> _Text:
-        machine = drawn_machine(self.machine, values, f"{self.machine.name}, draw {draws[0] + 1}")
+        machine = sampled_machine(self.machine, values, f"{self.machine.name}, draw {draws[0] + 1}")
         try:
             return _Text(draws, values, Replay.of(self.program, machine, shape_all=self.shape_all))
         except (ArgumentError, DesignError) as error:
@@ -164,9 +185,9 @@ class _StudyRun:
                 raise  # there is no other text
             return _Text(draws, values, None, str(error))
 
-    def _play(self, text: _Text, before: int) -> None:
+    def _simulate(self, text: _Text, before: int) -> None:
         assert text.replay is not None
-        job = DrawsJob(
+        job = SamplesJob(
             self.machine.name,
             tuple(self._row(index, known=False) for index in text.draws),
             tuple(index + 1 for index in text.draws),
@@ -178,11 +199,11 @@ class _StudyRun:
         def tell(more: int) -> None:
             nonlocal done
             done += more
-            self.on_progress("playing", done / self.count)
+            self.on_progress("simulating", done / self.count)
 
-        self.measured[list(text.draws)] = play_all(text.replay, job, self.pool, tell)
+        self.measured[list(text.draws)] = simulate_all(text.replay, job, self.pool, tell)
 
-    def _play_nominal(self, texts: Sequence[_Text]) -> None:
+    def _simulate_nominal(self, texts: Sequence[_Text]) -> None:
         """The text for the machine file on that machine."""
         try:
             held = next((text.replay for text in texts if not text.values), None)
@@ -190,7 +211,7 @@ class _StudyRun:
         except (ArgumentError, DesignError, MachineError):
             self.nominal = dict.fromkeys(self.wanted, float("nan"))
             return
-        self.nominal = replay.play(self.machine, self.wanted, times=False)
+        self.nominal = replay.simulate(self.machine, self.wanted, times=False)
 
 
 def _result(
@@ -209,10 +230,10 @@ def _result(
     warnings = [f"{run.count - len(kept)} of {run.count} draws have no text: they count as out of tolerance"]
     warnings += ["no Sobol indices: they need every draw"] if indices else []
     alone = CONTOURS.isdisjoint(run.wanted)
-    said = ["no contour is measured: within tolerance means its residual vibration alone"] if alone else []
+    alone_warnings = ["no contour is measured: within tolerance means its residual vibration alone"] if alone else []
     replays = [text.replay for text in texts if text.replay is not None]
     return MachineStudy(
-        program=run.name,
+        program=run.program.source if isinstance(run.program, Program) else run.program,
         machine=run.machine.name,
         sampling=sampling,
         seed=seed,
@@ -225,14 +246,14 @@ def _result(
         within_interval=interval_of(good, run.count),
         at_least=at_least,
         quantities=tuple(quantity(name, values, run.nominal[name]) for name, values in measured.items()),
-        decides=decides(run.varied, columns, measured, indices=whole, seed=seed),
+        decides=decides(run.varied, columns, shares, indices=whole, seed=seed),
         curves=tuple(
             Bins(each.key, name, bins_of(each, column, values), not isinstance(each.distribution, Listed))
             for each, column in zip(run.varied, columns, strict=True)
             for name, values in measured.items()
         ),
         refused=tuple(RefusedDraws(toml(dict(text.values)), len(text.draws), text.why) for text in refused),
-        warnings=(*said, *(warnings if refused else ())),
+        warnings=(*alone_warnings, *(warnings if refused else ())),
         limits_um={
             "residual_um": min(replay.residual_limit_um for replay in replays),
             "contour_um": min(replay.contour_limit_um for replay in replays),
@@ -241,7 +262,6 @@ def _result(
     )
 
 
-PERCENT = (5.0, 25.0, 50.0, 75.0, 95.0, 99.0)
 _BINS = 10
 _MIN_IN_BIN = 5
 _WITHIN = 1.0 + 1e-9
@@ -298,13 +318,12 @@ def _bin(at: float, name: str, values: FloatArray) -> BinQuantiles:
 def decides(
     varied: Sequence[Varied],
     columns: Sequence[Sequence[object]],
-    measured: Mapping[str, FloatArray],
+    shares: FloatArray,
     *,
     indices: bool,
     seed: int,
 ) -> tuple[Decides, ...]:
     """Which value moves the share of the limit most."""
-    shares = measured[SHARE]
     found = _indices(varied, shares, seed) if indices else {}
     rows = []
     for each, column in zip(varied, columns, strict=True):

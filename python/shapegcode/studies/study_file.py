@@ -65,7 +65,7 @@ def _as_table(value: object) -> object:
 
 
 class DrawnValue(InlineTable):
-    """What a value is drawn from."""
+    """What a value is sampled from."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -189,16 +189,19 @@ class StudyFile(TomlTable):
         return self._draws() | {name: getattr(self, name) for name in names} | {"probability": self.at_least}
 
     def _draws(self) -> dict[str, Any]:
-        drawn = {name: value.distribution() for name, value in self.vary.items()}
-        return {"vary": drawn} | ({} if self.n is None else {"n": self.n})
+        sampled = {name: value.distribution() for name, value in self.vary.items()}
+        return {"vary": sampled} | ({} if self.n is None else {"n": self.n})
 
 
 def study_schema(title: str) -> dict[str, Any]:
-    """JSON Schema of the file, for editors: keys of the machine file are looked into, limits of values are not."""
+    """JSON Schema of the file, for editors: it checks the keys of the machine file, not the limits of values."""
     found = toml_schema(StudyFile, title)
     choices: dict[str, Any] = {"type": "array", "minItems": 1}
-    said: dict[str, dict[str, Any]] = {"vary": {"anyOf": [choices, {"$ref": "#/$defs/DrawnValue"}]}, "choose": choices}
-    for table, value in said.items():
+    schemas: dict[str, dict[str, Any]] = {
+        "vary": {"anyOf": [choices, {"$ref": "#/$defs/DrawnValue"}]},
+        "choose": choices,
+    }
+    for table, value in schemas.items():
         meaning = found["properties"][table]["description"]
         found["properties"][table] = keys_schema(Machine, value, table, found["$defs"]) | {"description": meaning}
     return found

@@ -1,4 +1,4 @@
-"""Which values are varied: what each is drawn from, and whether the converter knows of it.
+"""Which values are varied: what each is sampled from, and whether the converter knows of it.
 
 A program is converted for the machine file. What is varied then is the machine on which it is simulated: its modes,
 drives, filters, times. A value that only the converter reads, such as `shaping.family`, needs another program.
@@ -10,113 +10,46 @@ import itertools
 import math
 import re
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine import Machine
-from shapegcode.settings.edit import missing_row
 from shapegcode.settings.keys import toml
+from shapegcode.settings.load import missing_row
 
 Unit = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Distribution:
-    """What a value is drawn from."""
+    """What a value is sampled from."""
 
+    words: str  # for people
+    quantile: Callable[[Unit], Unit] = field(compare=False)  # the values below which these shares of all lie
     # the program is converted for each value; False: it is converted for the value of the machine file, and only
     # the machine that simulates it has the other one; None: False where a machine may differ from its file
     known: bool | None = None
 
     def at(self, shares: Unit) -> list[object]:
         """The values below which these shares of all lie."""
-        raise NotImplementedError
-
-    def levels(self, most: int) -> list[object]:
-        """A few values that stand for all, for a grid."""
-        return self.at((np.arange(most) + 0.5) / most)
-
-    @property
-    def words(self) -> str:
-        """For people."""
-        raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class Normal(Distribution):
-    """Mean and standard deviation, both in the unit of the value."""
-
-    mean: float
-    sd: float
-
-    def at(self, shares: Unit) -> list[object]:
-        """See `Distribution`."""
-        return list(map(float, self.mean + self.sd * _normal_quantile(shares)))
-
-    @property
-    def words(self) -> str:
-        """For people."""
-        return f"normal, {self.mean:g} ± {self.sd:g}"
-
-
-@dataclass(frozen=True)
-class Lognormal(Distribution):
-    """Median, and the standard deviation of the natural logarithm; never below zero."""
-
-    median: float
-    log_sd: float
-
-    def at(self, shares: Unit) -> list[object]:
-        """See `Distribution`."""
-        return list(map(float, self.median * np.exp(self.log_sd * _normal_quantile(shares))))
-
-    @property
-    def words(self) -> str:
-        """For people."""
-        return f"lognormal, {self.median:g} × or ÷ {math.exp(self.log_sd):.4g}"
-
-
-@dataclass(frozen=True)
-class Uniform(Distribution):
-    """Every value between two is as likely."""
-
-    low: float
-    high: float
-
-    def at(self, shares: Unit) -> list[object]:
-        """See `Distribution`."""
-        return list(map(float, self.low + (self.high - self.low) * shares))
-
-    @property
-    def words(self) -> str:
-        """For people."""
-        return f"{self.low:g} to {self.high:g}"
+        return list(map(float, self.quantile(shares)))
 
 
 @dataclass(frozen=True)
 class Listed(Distribution):
     """One of some values, each as likely."""
 
-    values: tuple[object, ...]
+    values: tuple[object, ...] = ()
 
     def at(self, shares: Unit) -> list[object]:
-        """See `Distribution`."""
+        """The values below which these shares of all lie."""
         count = len(self.values)
         return [self.values[min(int(share * count), count - 1)] for share in shares]
-
-    def levels(self, most: int) -> list[object]:
-        """All of them, whatever is asked."""
-        return list(self.values)
-
-    @property
-    def words(self) -> str:
-        """For people."""
-        return " or ".join(toml(value) for value in self.values)
 
 
 def _normal_quantile(shares: Unit) -> Unit:
@@ -127,7 +60,9 @@ def _normal_quantile(shares: Unit) -> Unit:
     return np.asarray(ndtri(np.clip(shares, tiny, 1.0 - tiny)))
 
 
-def normal(mean: float, sd: float | None = None, *, percent: float | None = None, known: bool | None = None) -> Normal:
+def normal(
+    mean: float, sd: float | None = None, *, percent: float | None = None, known: bool | None = None
+) -> Distribution:
     """A value that is known with a standard deviation.
 
     >>> sg.normal(46, 2)             # 46 ± 2 Hz
@@ -146,10 +81,13 @@ def normal(mean: float, sd: float | None = None, *, percent: float | None = None
         ArgumentError: not one of the two spreads, or one that is not above 0.
     """
     mean = _number("mean", mean)
-    return Normal(mean, _spread(sd, percent, abs(mean)), known=known)
+    spread = _spread(sd, percent, abs(mean))
+    return Distribution(
+        f"normal, {mean:g} ± {spread:g}", lambda shares: mean + spread * _normal_quantile(shares), known
+    )
 
 
-def lognormal(median: float, percent: float, *, known: bool | None = None) -> Lognormal:
+def lognormal(median: float, percent: float, *, known: bool | None = None) -> Distribution:
     """A value above zero that is known to a factor, such as a damping ratio.
 
     Args:
@@ -166,10 +104,15 @@ def lognormal(median: float, percent: float, *, known: bool | None = None) -> Lo
     """
     if _number("median", median) <= 0.0:
         raise ArgumentError(f"lognormal: median = {median:g}: must be > 0")
-    return Lognormal(float(median), math.log1p(_spread(None, percent, 100.0) / 100.0), known=known)
+    log_sd = math.log1p(_spread(None, percent, 100.0) / 100.0)
+    return Distribution(
+        f"lognormal, {median:g} × or ÷ {math.exp(log_sd):.4g}",
+        lambda shares: median * np.exp(log_sd * _normal_quantile(shares)),
+        known,
+    )
 
 
-def uniform(low: float, high: float, *, known: bool | None = None) -> Uniform:
+def uniform(low: float, high: float, *, known: bool | None = None) -> Distribution:
     """A value of which nothing is known but its limits.
 
     Args:
@@ -185,11 +128,11 @@ def uniform(low: float, high: float, *, known: bool | None = None) -> Uniform:
     """
     if not _number("low", low) < _number("high", high):
         raise ArgumentError(f"uniform: high = {high:g}: must be above low = {low:g}")
-    return Uniform(float(low), float(high), known=known)
+    return Distribution(f"{low:g} to {high:g}", lambda shares: low + (high - low) * shares, known)
 
 
 def listed(values: Sequence[object] | npt.NDArray[Any], *, known: bool | None = None) -> Listed:
-    """One of some values; a plain list says the same.
+    """One of some values, each as likely; a plain list means the same.
 
     Args:
         values: as a machine file may have them.
@@ -206,8 +149,8 @@ def listed(values: Sequence[object] | npt.NDArray[Any], *, known: bool | None = 
     if len(values) == 0:
         raise ArgumentError("a list of values is empty: give two or more")
     # A machine file has Python's numbers.
-    plain = (each.tolist() if isinstance(each, np.generic | np.ndarray) else each for each in values)
-    return Listed(tuple(plain), known=known)
+    plain = tuple(each.tolist() if isinstance(each, np.generic | np.ndarray) else each for each in values)
+    return Listed(" or ".join(map(toml, plain)), np.asarray, known, plain)
 
 
 def _number(name: str, value: object) -> float:
@@ -228,7 +171,7 @@ def _spread(sd: float | None, percent: float | None, whole: float) -> float:
 
 
 Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]
-"""What each key is drawn from."""
+"""What each key is sampled from."""
 
 # A machine may differ from its file in these, and they are read when blocks are simulated.
 _SIMULATED = re.compile(
@@ -246,7 +189,7 @@ _TICK = "controller.interpolation_period_s"
 
 @dataclass(frozen=True)
 class Varied:
-    """A key of the machine file and what its values are drawn from."""
+    """A key of the machine file and what its values are sampled from."""
 
     key: str  # dotted name
     distribution: Distribution  # of the values
@@ -263,8 +206,8 @@ class Varied:
 def check_keys(name: str, given: object) -> None:
     """Refuse what does not go by keys of the machine file."""
     if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
-        said = f"{name} = {given!r}: must go by keys of the machine file"
-        raise ArgumentError(f'{said}, such as {{"axes.x.modes.1.frequency_hz": ...}}')
+        problem = f"{name} = {given!r}: must go by keys of the machine file"
+        raise ArgumentError(f'{problem}, such as {{"axes.x.modes.1.frequency_hz": ...}}')
 
 
 def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
@@ -277,22 +220,22 @@ def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
     for key, given in vary.items():
         if isinstance(given, str) or not isinstance(given, Distribution | Sequence | np.ndarray):
             raise ArgumentError(f"vary: {key} = {given!r}: must be a distribution or a list of values")
-        drawn = given if isinstance(given, Distribution) else listed(given)
+        distribution = given if isinstance(given, Distribution) else listed(given)
         # Tables such as controller.in_position_s can be varied axis by axis.
         at = held.get(key) or held.get(key.rpartition(".")[0])
         wrong = missing_row(machine, key) or ("" if at or _OPTIONAL.match(key) else "no such key")
         if wrong:
             raise MachineError(machine.name, (Problem(key, "", wrong),))
         simulated = _SIMULATED.fullmatch(key) is not None
-        if drawn.known is False and not simulated:
+        if distribution.known is False and not simulated:
             raise ArgumentError(f"vary: {key}: known = false: only the converter reads it, so that it must be known")
-        known = not simulated if drawn.known is None else drawn.known
-        found.append(Varied(key, drawn, known, at.value if at else "not set", at.unit if at else ""))
+        known = not simulated if distribution.known is None else distribution.known
+        found.append(Varied(key, distribution, known, at.value if at else "not set", at.unit if at else ""))
     return tuple(found)
 
 
-def drawn_machine(machine: Machine, values: Mapping[str, object], source: str) -> Machine:
-    """A machine with drawn values."""
+def sampled_machine(machine: Machine, values: Mapping[str, object], source: str) -> Machine:
+    """A machine with sampled values."""
     if not values:
         return machine
     # A control of another period executes the same blocks; that their period is a multiple is the converter's care.
@@ -300,15 +243,14 @@ def drawn_machine(machine: Machine, values: Mapping[str, object], source: str) -
     return machine.with_values({**freed, **values}, source=source)
 
 
-Sampling = Literal["sobol", "lhs", "grid"]
-SAMPLINGS: tuple[Sampling, ...] = ("sobol", "lhs", "grid")
+SAMPLINGS = ("sobol", "lhs", "grid")
 
 MAX_DRAWS = 1_000_000  # Of a study: further ones say nothing more, and fill the memory
 
 Columns = list[list[object]]
 
 
-def drawn(varied: Sequence[Varied], n: int, sampling: str, seed: int, *, indices: bool) -> Columns:
+def sampled_columns(varied: Sequence[Varied], n: int, sampling: str, seed: int, *, indices: bool) -> Columns:
     """The values of all draws."""
     if sampling not in SAMPLINGS:
         raise ArgumentError(f"sampling = {sampling!r}: must be one of {', '.join(SAMPLINGS)}")
@@ -343,7 +285,13 @@ def _grid(varied: Sequence[Varied], n: int) -> Columns:
     level = 1
     while free and listed * (level + 1) ** free <= n:
         level += 1
-    rows = itertools.product(*(each.distribution.levels(level) for each in varied))
+    middles = (np.arange(level) + 0.5) / level
+    rows = itertools.product(
+        *(
+            each.values if isinstance(each, Listed) else each.at(middles)
+            for each in (one.distribution for one in varied)
+        )
+    )
     return [list(column) for column in zip(*rows, strict=True)]
 
 

@@ -282,8 +282,8 @@ def read_test_cut(path: str | Path) -> TestCut:
         cut = TypeAdapter(TestCut).validate_python(data)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise ArgumentError(f"{path}: {place}: {first['msg']}: write the test cut again") from error
+        where = ".".join(map(str, first["loc"]))
+        raise ArgumentError(f"{path}: {where}: {first['msg']}: write the test cut again") from error
     if type(cut.about) is not FIGURES[cut.kind]:
         raise ArgumentError(f"{path}: the figures in 'about' are not those of a {cut.kind}: write the test cut again")
     for number, each in enumerate(cut.passes, start=1):
@@ -392,9 +392,9 @@ def reduced(line: Edge, chord_mm: float = _CHORD_MM) -> Edge:
         low, high = open_.pop()
         if high - low < 2:
             continue
-        way, rise = x[high] - x[low], y[high] - y[low]
+        run, rise = x[high] - x[low], y[high] - y[low]
         inner = slice(low + 1, high)
-        away = np.abs((y[inner] - y[low]) * way - (x[inner] - x[low]) * rise) / np.hypot(way, rise)
+        away = np.abs((y[inner] - y[low]) * run - (x[inner] - x[low]) * rise) / np.hypot(run, rise)
         worst = int(np.argmax(away))
         if away[worst] > chord_mm:
             middle = low + 1 + worst

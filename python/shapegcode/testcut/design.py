@@ -1,4 +1,4 @@
-"""Draws up test cuts: which edge, which passes, which feeds; and writes them as FANUC programs with instructions.
+"""Designs test cuts: which edge, which passes, which feeds; and writes them as FANUC programs with instructions.
 
 Source: Y.-H. Kim, S.-L. Ko: Improvement of the Accuracy in Cornering Cut Using End Mill, 2001 (paper 001).
 """
@@ -18,7 +18,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_text
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
-from shapegcode.program.operating import OVERRIDE
+from shapegcode.program.stamp import OVERRIDE
 from shapegcode.results.json import to_text
 from shapegcode.testcut.cut import (
     FIGURES,
@@ -50,7 +50,7 @@ _MAX_DEPTH_RATIO = 0.95  # of the radius, up to which a radial depth is taken
 
 @dataclass(frozen=True)
 class CutConditions:
-    """What every test cut needs to know; what machine and tool cannot do is refused when a cut is drawn up.
+    """What every test cut needs to know; what machine and tool cannot do is refused when a cut is designed.
 
     Attributes:
         machine: whose controller runs the program.
@@ -173,7 +173,7 @@ def taper_cut(
         )
     edge = Edge(np.array([0.0, length_mm]), np.array([round(low, 3), round(high, 3)]))
     passes = [(f"F{feed:g}", [(None, feed)]) for feed in feeds]
-    return _drawn(given, edge, length_mm, passes, TaperDetails((low, high), length_mm))
+    return _design(given, edge, length_mm, passes, TaperDetails((low, high), length_mm))
 
 
 def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval_mm: float | None = None) -> CutDesign:
@@ -223,7 +223,7 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     )
     modified = [(begin, given.feed_mm_per_min), *blocks, constant]
     passes = [("CONSTANT FEED", [constant]), ("MODIFIED FEED", modified)]
-    return _drawn(given, wanted_edge, stock, passes, about, met=edge)
+    return _design(given, wanted_edge, stock, passes, about, met=edge)
 
 
 def interval_cut(
@@ -263,10 +263,10 @@ def interval_cut(
     for feeds, step in zip(sequences, intervals_mm, strict=True):
         steps = [(round(straight + (k + 1) * step, 3), round(each, 1)) for k, each in enumerate(feeds)]
         passes.append((f"FEED CHANGES EVERY {step:g} MM", [(straight, feed), *steps, (None, feed)]))
-    return _drawn(given, edge, stock, passes, IntervalDetails(depth, tuple(intervals_mm), straight))
+    return _design(given, edge, stock, passes, IntervalDetails(depth, tuple(intervals_mm), straight))
 
 
-def _drawn(
+def _design(
     given: CutConditions,
     edge: Edge,
     stock_mm: float,

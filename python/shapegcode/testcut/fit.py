@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import lambertw
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.record import FloatArray
@@ -30,7 +30,7 @@ from shapegcode.testcut.record import (
     ForceRecord,
     PlacedRecord,
     Revolutions,
-    placed,
+    place_samples,
     read_forces,
     revolutions,
     turned,
@@ -60,7 +60,7 @@ def fit_test_cut(
     chip_thickness: Thickness = "mean",
     edge_forces: bool = False,
 ) -> TaperResult | CornerResult | IntervalResult:
-    """What the measured forces of a test cut tell.
+    """Fit cutting-force parameters to the measured forces of a test cut.
 
     Args:
         cut: the test cut, or its side file.
@@ -96,31 +96,9 @@ def fit_test_cut(
 _BINS_PER_PASS = 60
 _MIN_TURNS = 4
 _ROUNDS = 2
+_ONE_FILE = np.zeros(0, dtype=np.intp)  # its number is given where files are joined
 _PLACE = 0.25  # Standard error of the place of the tool, found from entry and exit, in feeds per revolution
 _PER_MINUTE = 60.0
-
-
-@dataclass(eq=False)
-class _TaperRows:
-    """Mean forces of one file."""
-
-    met: Engagement
-    displaced: Engagement
-    feed: float | FloatArray
-    speed: float
-    force_n: FloatArray
-    torque_nm: FloatArray | None
-    revolutions: float
-
-
-@dataclass
-class _Reduced:
-    """The records of all passes."""
-
-    rows: list[_TaperRows] = field(default_factory=list)
-    passes: list[TaperPass] = field(default_factory=list)
-    left_out: list[LeftOut] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
 
 
 def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: Thickness, edge: bool) -> TaperResult:
@@ -128,14 +106,12 @@ def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: 
     sampled = any(_samples(cut, number, record) >= MIN_SAMPLES for number, record in measured.items())
     for _ in range(_ROUNDS if sampled else 1):
         # Where entry and exit lie in the record depends a little on the law.
-        reduced = _reduced(cut, measured, law)
-        data = _joined(reduced.rows)
+        rows, passes, left_out, warnings = _reduced(cut, measured, law)
+        data = _joined(rows)
         fit = fit_coefficients(data, cut.tool, cut.axial_depth_mm, thickness=thickness, edge=edge)
         law = fit.law
-    warnings = reduced.warnings
     if fit.outlier.any():
-        count = int(fit.outlier.sum())
-        warnings = [*warnings, f"{count} of {len(fit.outlier)} mean forces do not fit the others: left out"]
+        warnings.append(f"{fit.outlier.sum()} of {len(fit.outlier)} mean forces do not fit the others: left out")
     return TaperResult(
         program=cut.program,
         machine=cut.machine,
@@ -148,8 +124,8 @@ def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: 
         rms_n=(float(fit.rms_n[0]), float(fit.rms_n[1])),
         rms_percent=fit.rms_percent,
         neighbour_correlation=fit.correlation,
-        passes=tuple(reduced.passes),
-        left_out=tuple(reduced.left_out),
+        passes=tuple(passes),
+        left_out=tuple(left_out),
         poor=tuple(_poor(fit)),
         warnings=tuple(warnings),
         cut=cut,
@@ -178,37 +154,42 @@ def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
     if record.time_s is not None:
         return float(turn / np.mean(np.diff(record.time_s)))
     assert record.position_mm is not None
-    way = float(np.ptp(record.position_mm)) / (len(record) - 1)
-    return cut.passes[number - 1].feed_mm_per_min / cut.spindle_rev_per_min / max(way, 1e-12)
+    travel = float(np.ptp(record.position_mm)) / (len(record) - 1)
+    return cut.passes[number - 1].feed_mm_per_min / cut.spindle_rev_per_min / max(travel, 1e-12)
 
 
-def _reduced(cut: TestCut, measured: Mapping[int, ForceRecord], law: CuttingLaw) -> _Reduced:
-    """The records as mean forces: as they are, or of the revolutions in full engagement without chatter."""
-    out = _Reduced()
+def _reduced(
+    cut: TestCut, measured: Mapping[int, ForceRecord], law: CuttingLaw
+) -> tuple[list[MeanForces], list[TaperPass], list[LeftOut], list[str]]:
+    """The records as mean forces (as they are, or of the revolutions in full engagement without chatter), warnings."""
+    rows: list[MeanForces] = []
+    passes: list[TaperPass] = []
+    left_out: list[LeftOut] = []
+    warnings: list[str] = []
     for number, record in measured.items():
         measuring = cut.passes[number - 1]
         if _samples(cut, number, record) <= 1.0 + 1e-6:
-            out.rows.append(_of_means(cut, measuring, record))
+            rows.append(_of_means(cut, measuring, record))
             continue
-        found = revolutions(placed(record, cut, measuring, expected(cut, measuring, law)))
+        found = revolutions(place_samples(record, cut, measuring, expected(cut, measuring, law)))
         shown = found.record
         offset, drift = ((float(along), float(left)) for along, left in (shown.offset_n, shown.drift_n))
-        out.passes.append(TaperPass(shown.file, found.feed_mm_per_min, shown.spindle_rev_per_min, offset, drift))
-        out.warnings += shown.notes
-        out.rows.append(_of_revolutions(cut, measuring, found))
+        passes.append(TaperPass(shown.file, found.feed_mm_per_min, shown.spindle_rev_per_min, offset, drift))
+        warnings += shown.notes
+        rows.append(_of_revolutions(cut, measuring, found))
         marks = np.flatnonzero(np.diff(np.concatenate([[0], found.chatter.astype(int), [0]])))
         for first, behind in zip(marks[::2], marks[1::2], strict=True):
             low, high = float(found.x_mm[first]), float(found.x_mm[behind - 1])
-            out.left_out.append(LeftOut(number, low, high))
-            out.warnings.append(
-                f"{shown.file}: X {low:.1f} to {high:.1f} mm left out: the force swings far more there than in the "
+            left_out.append(LeftOut(number, low, high))
+            warnings.append(
+                f"{shown.file}: X {low:.1f} to {high:.1f} mm left out: the force oscillates far more there than in the "
                 "rest of the pass (chatter?)"
             )
-    return out
+    return rows, passes, left_out, warnings
 
 
-def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> _TaperRows:
-    """Rows that are means already: at the radial depth that the file tells, or at its positions."""
+def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> MeanForces:
+    """Rows that are means already: at the radial depth that the file states, or at its positions."""
     if record.radial_depth_mm is not None:
         depth = record.radial_depth_mm
         wrong = np.flatnonzero((depth <= 0.0) | (depth >= 2.0 * cut.tool.radius_mm))
@@ -227,12 +208,14 @@ def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> _T
             )
         row = fully_engaged(cut, measuring, record.position_mm)
         met = engagement(cut.tool, measuring, record.position_mm[row], up=cut.up)
-    feed = measuring.feed_mm_per_min if record.feed_mm_per_min is None else record.feed_mm_per_min[row]
     torque = None if record.torque_nm is None else np.abs(record.torque_nm[row])
-    return _TaperRows(met, met, feed, cut.spindle_rev_per_min, record.force_n[row], torque, 1.0)
+    one = np.ones(int(row.sum()))
+    feed = measuring.feed_mm_per_min * one if record.feed_mm_per_min is None else record.feed_mm_per_min[row]
+    speed = cut.spindle_rev_per_min * one
+    return MeanForces(met, feed, speed, record.force_n[row], one, _ONE_FILE, torque_nm=torque)
 
 
-def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) -> _TaperRows:
+def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) -> MeanForces:
     """Means over some revolutions each, chatter left out."""
     margin = 2.0 * found.feed_mm_per_min / found.record.spindle_rev_per_min
     kept = np.flatnonzero(fully_engaged(cut, measuring, found.x_mm, margin) & ~found.chatter)
@@ -248,23 +231,25 @@ def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) 
     displaced = engagement(cut.tool, measuring, x + _PLACE * found.feed_mm_per_min / speed, up=cut.up)
     force = found.mean_n[bins].mean(axis=1)
     torque = None if found.torque_nm is None else found.torque_nm[bins].mean(axis=1)
-    return _TaperRows(met, displaced, found.feed_mm_per_min, speed, force, torque, float(many))
+    one = np.ones(len(x))
+    feed = found.feed_mm_per_min * one
+    return MeanForces(met, feed, speed * one, force, many * one, _ONE_FILE, displaced, torque)
 
 
-def _joined(rows: Sequence[_TaperRows]) -> MeanForces:
-    def repeated(values: Sequence[float | FloatArray]) -> FloatArray:
-        return np.concatenate([np.broadcast_to(v, len(each.force_n)) for v, each in zip(values, rows, strict=True)])
+def _joined(rows: Sequence[MeanForces]) -> MeanForces:
+    def column(name: str) -> FloatArray:
+        return np.concatenate([getattr(each, name) for each in rows])
 
     # A torque that only some of the files have does not help the others.
     torques = [each.torque_nm for each in rows if each.torque_nm is not None]
     return MeanForces(
         Engagement.joined([each.met for each in rows]),
-        repeated([each.feed for each in rows]),
-        repeated([each.speed for each in rows]),
-        np.concatenate([each.force_n for each in rows]),
-        repeated([each.revolutions for each in rows]),
+        column("feed_mm_per_min"),
+        column("spindle_rev_per_min"),
+        column("force_n"),
+        column("revolutions"),
         np.repeat(np.arange(len(rows)), [len(each.force_n) for each in rows]),
-        Engagement.joined([each.displaced for each in rows]),
+        Engagement.joined([each.displaced or each.met for each in rows]),
         np.concatenate(torques) if len(torques) == len(rows) else None,
     )
 
@@ -278,7 +263,7 @@ def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResu
     passes = {number: _pass(cut, number, record) for number, record in measured.items()}
     first = passes[min(passes)]
     seen = _inside(cut, first.number, first.record.x_mm) & ~first.record.chatter
-    there = np.interp(first.record.x_mm[seen], first.hoped.x_mm, first.hoped.mean_resultant_n)
+    there = np.interp(first.record.x_mm[seen], first.forecast.x_mm, first.forecast.mean_resultant_n)
     ratio = None
     if {1, 2} <= set(passes):
         before, after = passes[1], passes[2]
@@ -297,18 +282,18 @@ def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResu
 
 def _pass(cut: TestCut, number: int, record: ForceRecord) -> CornerPass:
     measuring = cut.passes[number - 1]
-    hoped = expected(cut, measuring)
-    found = revolutions(placed(record, cut, measuring, hoped))
+    forecast = expected(cut, measuring)
+    found = revolutions(place_samples(record, cut, measuring, forecast))
     seen = _inside(cut, number, found.x_mm) & ~found.chatter
-    far = _inside(cut, number, hoped.x_mm)
+    far = _inside(cut, number, forecast.x_mm)
     return CornerPass(
         number=number,
         measured_mean_n=float(found.resultant_n[seen].max()),
         measured_peak_n=float(found.peak_n[seen].max()),
-        expected_mean_n=float(hoped.mean_resultant_n[far].max()),
-        expected_peak_n=float(hoped.peak_resultant_n[far].max()),
+        expected_mean_n=float(forecast.mean_resultant_n[far].max()),
+        expected_peak_n=float(forecast.peak_resultant_n[far].max()),
         record=found,
-        hoped=hoped,
+        forecast=forecast,
     )
 
 
@@ -330,7 +315,7 @@ def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> Interval
     records = {}
     for number, record in measured.items():
         measuring = cut.passes[number - 1]
-        records[number] = placed(record, cut, measuring, expected(cut, measuring))
+        records[number] = place_samples(record, cut, measuring, expected(cut, measuring))
     found = sorted((_followed(cut, number, record) for number, record in records.items()), key=lambda p: p.interval_mm)
     good: float | None = None
     for each in reversed(found):
@@ -413,10 +398,10 @@ def _speeds(measuring: MeasuringPass, time_s: FloatArray, lag: float) -> FloatAr
     begins, starts = [0.0], [measuring.feeds[0][1]]
     commands: list[float] = []
     length = np.diff([end for end, _ in measuring.feeds])
-    for way, (_, feed) in zip(length, measuring.feeds[1:], strict=True):
+    for travel, (_, feed) in zip(length, measuring.feeds[1:], strict=True):
         speed, command = starts[-1] / _PER_MINUTE, feed / _PER_MINUTE
         commands.append(feed)
-        duration = _block_time(float(way), speed, command, lag)
+        duration = _block_time(float(travel), speed, command, lag)
         begins.append(begins[-1] + duration)
         left = math.exp(-duration / lag) if lag > 0.0 else 0.0
         starts.append((command + (speed - command) * left) * _PER_MINUTE)
@@ -427,33 +412,27 @@ def _speeds(measuring: MeasuringPass, time_s: FloatArray, lag: float) -> FloatAr
     return np.where(time_s < 0.0, measuring.feeds[0][1], wanted + (speed_then - wanted) * share)
 
 
-def _block_time(way: float, speed: float, command: float, lag: float) -> float:
-    """Time for a way at a speed that approaches the commanded one: way = c t + (v - c) lag (1 - exp(-t / lag))."""
-    time = way / command
+def _block_time(travel: float, speed: float, command: float, lag: float) -> float:
+    """Time of travel at a speed v that approaches the commanded c: travel = c t + (v - c) lag (1 - exp(-t / lag))."""
     if lag <= 0.0:
-        return time
-    for _ in range(60):
-        decay = math.exp(-time / lag)
-        off = command * time + (speed - command) * lag * (1.0 - decay) - way
-        step = off / (command + (speed - command) * decay)
-        time = max(time - step, 0.5 * time)
-        if abs(step) < 1e-12:
-            break
-    return time
+        return travel / command
+    change = (speed - command) / command
+    rest = travel / (command * lag) - change
+    return lag * (rest + float(lambertw(change * math.exp(-rest)).real))
 
 
 def _speeds_at(measuring: MeasuringPass, x_mm: FloatArray, lag: float) -> FloatArray:
-    """The same where the record tells the position: at the X of each sample."""
+    """The same where the record has the position: at the X of each sample."""
     first, last = measuring.feeds[0][0], measuring.feeds[-1][0]
     fine = np.linspace(0.0, 1.5 * (last - first) / min(feed for _, feed in measuring.feeds) * _PER_MINUTE, 20000)
     speed = _speeds(measuring, fine, lag)
-    way = first + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))]) / _PER_MINUTE
-    return np.where(x_mm < first, measuring.feeds[0][1], np.interp(x_mm, way, speed))
+    travel = first + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))]) / _PER_MINUTE
+    return np.where(x_mm < first, measuring.feeds[0][1], np.interp(x_mm, travel, speed))
 
 
-def _noise(x: FloatArray, force: FloatArray, way: float) -> float:
-    """Standard deviation of means over a way, as a share of the mean."""
-    place = ((x - x[0]) / way).astype(int)
-    sums, counts = np.bincount(place, force), np.bincount(place)
+def _noise(x: FloatArray, force: FloatArray, travel: float) -> float:
+    """Standard deviation of means over a travel, as a share of the mean."""
+    interval_of = ((x - x[0]) / travel).astype(int)
+    sums, counts = np.bincount(interval_of, force), np.bincount(interval_of)
     means = sums[counts > 0] / counts[counts > 0]
     return float(np.std(means) / np.mean(means)) if len(means) > 2 else 0.0

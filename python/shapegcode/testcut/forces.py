@@ -135,7 +135,7 @@ def mean_chip_mm(
 ) -> FloatArray:
     """Mean chip thickness that the force law gives each engagement its coefficients by.
 
-    The law itself tells it: with the exponent 1 the force is the mean chip thickness times the force with exponent 0.
+    The law itself gives it: with the exponent 1 the force is the mean chip thickness times the force with exponent 0.
     """
     once, twice = (
         ForceLaw(tool, CuttingLaw(1.0, exponent), spindle_rev_per_min, axial_depth_mm)
@@ -167,8 +167,6 @@ def expected(cut: TestCut, measuring: MeasuringPass, law: CuttingLaw | None = No
 
 
 Thickness = Literal["mean", "local"]
-_STEP = 1e-5  # of the logarithms and exponents, for slopes
-_EDGE_STEP = 0.1  # N/mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +179,7 @@ class MeanForces:
     force_n: FloatArray  # (n, 2) along the feed and to its left
     revolutions: FloatArray  # (n,) how many each is the mean of
     group: npt.NDArray[np.intp]  # (n,) number of the pass or file, in the order in which it was cut
-    # n engagements if the place of the tool were off by its standard error, the same way for all rows of a group;
+    # n engagements if the position of the tool were off by its standard error, alike for all rows of a group;
     # None: the engagements are exact
     displaced: Engagement | None = None
     torque_nm: FloatArray | None = None  # (n,) mean torque of the spindle; None: not measured
@@ -236,30 +234,20 @@ class ForceModel:
             found[at, 2:] = self.at_radius * forces.mean_torque_nm[:, None]
         return found
 
-    def slopes(self, parameters: FloatArray, at: FloatArray) -> FloatArray:
-        """(all measured values, p) change of the forces with each parameter; the edge forces act as they are."""
-        columns = []
-        for k in range(len(parameters)):
-            moved = parameters.copy()
-            step = _STEP if k < 4 else _EDGE_STEP
-            moved[k] += step
-            columns.append((self.forces(moved) - at).ravel() / step)
-        return np.column_stack(columns)
-
 
 # --- the coefficients: power laws about the middle of the chips, where factor and exponent do not disturb each other --
 
-MIN_CHIP_RATIO = 1.5  # The thickest mean chip over the thinnest; below it exponents are not told apart from factors
+MIN_CHIP_RATIO = 1.5  # The thickest mean chip over the thinnest; below it exponents are not distinguished from factors
 MIN_FEED_RATIO = 1.3  # The same of the feeds, for edge forces
 _ROUNDS = 6
 _HUBER = 2.5
 _OUTLIER = 4.0
 _MIN_OUTLIER = 0.02
 _LARGEST_SHARE_OUT = 0.25
-_DONE = 1e-7
 _SETTLED = 1e-4
 _MAX_STEPS = 40
-_LARGEST_STEPS = np.array([1.0, 0.5, 1.0, 0.5, 1e3, 1e3])
+# Of ln k1, its exponent, ln k2, the exponent of k1 k2, and the edge forces.
+_LOWEST, _HIGHEST = np.array([-50.0, -0.9, -50.0, -0.95, 0.0, 0.0]), np.array([50.0, 5.0, 50.0, 5.0, 1e6, 1e6])
 
 _UNITS = ("N/mm²", "", "", "", "N/mm", "N/mm")  # of COEFFICIENTS
 
@@ -318,7 +306,7 @@ def fit_coefficients(
     noise, robust = np.ones(model.measured.shape), np.ones(model.measured.shape)
     for _ in range(_ROUNDS):
         before = parameters
-        parameters, left, slopes = _solved(model, parameters, robust / noise**2)
+        parameters, left, _ = _solved(model, parameters, robust / noise**2)
         noise = noise_of(left, model.forces(parameters), data.revolutions, robust)
         scaled = np.abs(left) / noise
         robust = np.minimum(1.0, _HUBER / np.maximum(scaled, 1e-12))
@@ -326,10 +314,10 @@ def fit_coefficients(
             break
     outlier = _outliers(model.measured, left, noise)
     weights = np.where(outlier[:, None], 0.0, 1.0 / noise**2)
-    parameters, left, slopes = _solved(model, parameters, weights)
+    parameters, left, weighted = _solved(model, parameters, weights)
     correlation = neighbour_correlation(left / noise, data.group, outlier)
     predicted = data.force_n - left[:, :2]
-    covariance = _covariance(slopes, left, weights, correlation) + _of_place(model, parameters, slopes, weights)
+    covariance = _covariance(weighted, left, weights, correlation) + _of_position(model, parameters, weighted, weights)
     kept = left[~outlier, :2]
     size = np.linalg.norm(data.force_n[~outlier], axis=1)
     free = int((weights > 0.0).sum()) - count
@@ -370,14 +358,14 @@ def _check(data: MeanForces, chip: FloatArray, count: int, edge: bool) -> None:
     feeds = np.unique(np.round(data.feed_mm_per_min, 3))
     if high / low < MIN_CHIP_RATIO:
         raise ArgumentError(
-            f"the exponents cannot be told: the mean chip is {low * 1e3:.2f} to {high * 1e3:.2f} um thick, a ratio of "
-            f"{high / low:.2f}, and must have one of {MIN_CHIP_RATIO:g} or more: let the radial depth grow from "
-            "0.05 D to 0.35 D (ratio 2.7), or add passes with other feeds"
+            f"the exponents cannot be determined: the mean chip is {low * 1e3:.2f} to {high * 1e3:.2f} um thick, a "
+            f"ratio of {high / low:.2f}, and must have one of {MIN_CHIP_RATIO:g} or more: let the radial depth grow "
+            "from 0.05 D to 0.35 D (ratio 2.7), or add passes with other feeds"
         )
     if edge and feeds.max() / feeds.min() < MIN_FEED_RATIO:
         raise ArgumentError(
-            f"edge forces cannot be told from the exponents at feeds from {feeds.min():g} to {feeds.max():g} mm/min: "
-            f"measure with feeds of a ratio of {MIN_FEED_RATIO:g} or more, better 3"
+            f"edge forces cannot be distinguished from the exponents at feeds from {feeds.min():g} to {feeds.max():g} "
+            f"mm/min: measure with feeds of a ratio of {MIN_FEED_RATIO:g} or more, better 3"
         )
 
 
@@ -400,54 +388,33 @@ def _start(model: ForceModel, data: MeanForces, count: int) -> FloatArray:
 
 
 def _solved(model: ForceModel, start: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Levenberg-Marquardt steps to the weighted least squares: parameters, what they leave, slopes."""
-    root = np.sqrt(weights).ravel()
-    parameters = start
-    predicted = model.forces(parameters)
-    left = model.measured - predicted
-    error = float(np.sum((root * left.ravel()) ** 2))
-    damping, largest = 1e-3, _LARGEST_STEPS[: len(start)]
-    slopes = model.slopes(parameters, predicted)
-    for _ in range(_MAX_STEPS):
-        weighted = slopes * root[:, None]
-        scale = np.linalg.norm(weighted, axis=0)
-        matrix = np.vstack([weighted, np.diag(math.sqrt(damping) * scale)])
-        step, *_ = np.linalg.lstsq(matrix, np.concatenate([root * left.ravel(), np.zeros(len(start))]), rcond=None)
-        # A law whose force does not grow with the chip is none.
-        moved = parameters + np.clip(step, -largest, largest)
-        moved[1], moved[3] = max(moved[1], -0.9), max(moved[3], -0.95 - moved[1])
-        moved[4:] = np.maximum(moved[4:], 0.0)
-        new = model.forces(moved)
-        new_error = float(np.sum((root * (model.measured - new).ravel()) ** 2))
-        if new_error > error * (1.0 + 1e-12):
-            damping = max(damping, 1e-9) * 10.0
-            if damping > 1e9:
-                break
-            continue
-        gained = error - new_error
-        change = float(np.max(np.abs(moved - parameters)))
-        parameters, predicted, error, damping = moved, new, new_error, damping * 0.1
-        left = model.measured - predicted
-        slopes = model.slopes(parameters, predicted)
-        if gained <= _DONE * error or change < _DONE:
-            break
-    return parameters, left, slopes
+    """Weighted least squares: parameters, what they leave, weighted slopes (all measured values, parameters)."""
+    from scipy.optimize import least_squares
+
+    root = np.sqrt(weights)
+    # A law whose force does not grow with the chip is none: the exponent of k1 k2 has a limit too, and stands for k2's.
+    to_law = np.eye(len(start))
+    to_law[3, 1] = -1.0
+    to_limited = np.linalg.inv(to_law)
+
+    def misfit(limited: FloatArray) -> FloatArray:
+        return np.asarray((root * (model.measured - model.forces(to_law @ limited))).ravel())
+
+    bounds = _LOWEST[: len(start)], _HIGHEST[: len(start)]
+    found = least_squares(misfit, to_limited @ start, bounds=bounds, x_scale="jac", max_nfev=_MAX_STEPS)
+    parameters = to_law @ found.x
+    return parameters, model.measured - model.forces(parameters), np.asarray(found.jac @ to_limited)
 
 
-def _largest_step(count: int) -> FloatArray:
-    return np.array([1.0, 0.5, 1.0, 0.5, 1e3, 1e3])[:count]
-
-
-def _covariance(slopes: FloatArray, left: FloatArray, weights: FloatArray, correlation: float) -> FloatArray:
-    weighted = slopes * np.sqrt(weights).ravel()[:, None]
-    free = int((weights > 0.0).sum()) - slopes.shape[1]
+def _covariance(weighted: FloatArray, left: FloatArray, weights: FloatArray, correlation: float) -> FloatArray:
+    free = int((weights > 0.0).sum()) - weighted.shape[1]
     square = float(np.sum(weights * left**2)) / max(free, 1)
     scale = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
     inner = np.linalg.pinv((weighted / scale).T @ (weighted / scale))
     return np.asarray(inner / np.outer(scale, scale) * square * (1.0 + correlation) / (1.0 - correlation))
 
 
-def _of_place(model: ForceModel, parameters: FloatArray, slopes: FloatArray, weights: FloatArray) -> FloatArray:
+def _of_position(model: ForceModel, parameters: FloatArray, weighted: FloatArray, weights: FloatArray) -> FloatArray:
     """Covariance that comes from not knowing exactly where the tool was in each group."""
     data, count = model.data, len(parameters)
     found = np.zeros((count, count))
@@ -457,7 +424,7 @@ def _of_place(model: ForceModel, parameters: FloatArray, slopes: FloatArray, wei
     moved = ForceModel(model.tool, model.depth, there, model.thickness, model.reference)
     change = moved.forces(parameters) - model.forces(parameters)
     root = np.sqrt(weights)
-    inverse = np.linalg.pinv(slopes * root.ravel()[:, None])
+    inverse = np.linalg.pinv(weighted)
     for group in np.unique(data.group):
         effect = inverse @ (root * np.where((data.group == group)[:, None], change, 0.0)).ravel()
         found += np.outer(effect, effect)
@@ -471,14 +438,14 @@ def _with_intervals(
     from scipy.stats import t as student
 
     quantile = float(student.ppf(0.975, max(free, 1)))
-    way = math.log(chip_mm / model.reference)
+    distance = math.log(chip_mm / model.reference)
     found = []
     for k, (name, unit) in enumerate(zip(COEFFICIENTS[: len(parameters)], _UNITS, strict=False)):
         factor = k in (0, 2)
         direction = np.zeros(len(parameters))
         direction[k] = 1.0
         if factor:
-            direction[k + 1] = way
+            direction[k + 1] = distance
         value = float(direction @ parameters)
         half = quantile * math.sqrt(max(float(direction @ covariance @ direction), 0.0))
         ends = (value, value - half, value + half)

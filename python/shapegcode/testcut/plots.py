@@ -32,10 +32,10 @@ def plots_of(result: TaperResult | CornerResult | IntervalResult) -> Mapping[str
 
 def _column(ax: Axes | None, rows: int, height: float, title: str, width: float = 8.0) -> list[Axes]:
     """Panels above each other that share their X axis."""
-    grid = plot.grid(ax, rows, 1, size_inch=(width, height), title=title, sharex="col")
-    for row in grid:
-        row[0].margins(x=0.01)
-    return [row[0] for row in grid]
+    panels = plot.column(ax, rows, size_inch=(width, height), title=title)
+    for panel in panels:
+        panel.margins(x=0.01)
+    return panels
 
 
 def plot_taper(result: TaperResult, ax: Axes | None = None) -> Axes:
@@ -107,11 +107,11 @@ def plot_corner(result: CornerResult, ax: Axes | None = None) -> Axes:
     """
     panels = _column(ax, len(result.peaks), 1.4 + 2.4 * len(result.peaks), "Resultant in the unrolled corner")
     for panel, each in zip(panels, result.peaks, strict=True):
-        record, hoped = each.record, each.hoped
+        record, forecast = each.record, each.forecast
         panel.plot(record.x_mm, record.resultant_n, color=_MEASURED, linewidth=2.0, label="measured, mean")
         panel.plot(record.x_mm, record.peak_n, color=_MEASURED, linewidth=0.8, label="measured, peak")
-        panel.plot(hoped.x_mm, hoped.mean_resultant_n, color=_EXPECTED, linewidth=1.4, label="expected, mean")
-        panel.plot(hoped.x_mm, hoped.peak_resultant_n, color=_EXPECTED, linewidth=0.8, label="expected, peak")
+        panel.plot(forecast.x_mm, forecast.mean_resultant_n, color=_EXPECTED, linewidth=1.4, label="expected, mean")
+        panel.plot(forecast.x_mm, forecast.peak_resultant_n, color=_EXPECTED, linewidth=0.8, label="expected, peak")
         panel.set_ylabel(f"pass {each.number} in N")
     panels[-1].set_xlabel("X of the tool's axis in mm")
     plot.legend_above(panels[0])

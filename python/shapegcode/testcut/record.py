@@ -44,9 +44,9 @@ class ForceRecord:
     time_s: FloatArray | None = None  # (n,), evenly spaced; None: not recorded
     position_mm: FloatArray | None = None  # (n,) X of the tool's axis in the program's coordinates; None: not recorded
     radial_depth_mm: FloatArray | None = (
-        None  # (n,) of means at known depths; None: the test cut's description tells it
+        None  # (n,) of means at known depths; None: the test cut's description states it
     )
-    feed_mm_per_min: FloatArray | None = None  # (n,) where the file tells it
+    feed_mm_per_min: FloatArray | None = None  # (n,) where the file states it
 
     def __len__(self) -> int:
         return len(self.force_n)
@@ -145,9 +145,9 @@ class PlacedRecord:
     notes: tuple[str, ...]  # what else the user should know, with the name of the file
 
 
-def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, hoped: Expected) -> PlacedRecord:
+def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, forecast: Expected) -> PlacedRecord:
     """Take offset and drift off a sampled record of one pass, and find the place of each sample."""
-    time, moved = _clock(record, measuring, cut.kind)
+    time, moved = _times_and_travel(record, measuring, cut.kind)
     period = float(time[-1] - time[0]) / (len(time) - 1)
     turn = _PER_MINUTE / cut.spindle_rev_per_min
     if turn / period < MIN_SAMPLES:
@@ -172,16 +172,16 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, hoped: E
     if record.torque_nm is not None:
         torque = _without_offset(record.torque_nm[:, None], begin, end, round(_GUARD_REVS * samples))[0]
     size = np.linalg.norm(turned(force, samples), axis=1)
-    x = _placed(record, measuring, hoped, size, time, moved, (begin, end), notes)
-    told = tuple(f"{record.file}: {note}" for note in notes)
+    x = _positions(record, measuring, forecast, size, time, moved, (begin, end), notes)
+    named = tuple(f"{record.file}: {note}" for note in notes)
     by_time = record.position_mm is None
     return PlacedRecord(
-        record.file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, by_time, told
+        record.file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, by_time, named
     )
 
 
-def _clock(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
-    """Time of each sample, and the way gone since the first one at the commanded feeds (or as measured)."""
+def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
+    """Time of each sample, and the travel since the first one at the commanded feeds (or as measured)."""
     if record.position_mm is not None:
         x = record.position_mm
         if record.time_s is not None:
@@ -273,10 +273,10 @@ def _without_offset(force: FloatArray, begin: int, end: int, guard: int) -> tupl
     return force - (levels[0] * (1.0 - share) + levels[1] * share), levels[0], levels[1] - levels[0]
 
 
-def _placed(
+def _positions(
     record: ForceRecord,
     measuring: MeasuringPass,
-    hoped: Expected,
+    forecast: Expected,
     size: FloatArray,
     time: FloatArray,
     moved: FloatArray,
@@ -284,11 +284,11 @@ def _placed(
     notes: list[str],
 ) -> FloatArray:
     """X of the axis at each sample: entry and exit of the record laid over those that are expected."""
-    seen = np.flatnonzero(hoped.mean_n > _ABOVE_SHARE * hoped.mean_n.max())
-    wanted = hoped.x_mm[seen[0]], hoped.x_mm[seen[-1]]
+    seen = np.flatnonzero(forecast.mean_n > _ABOVE_SHARE * forecast.mean_n.max())
+    wanted = forecast.x_mm[seen[0]], forecast.x_mm[seen[-1]]
     if record.position_mm is None and not measuring.constant_feed:
-        # The way over time is that of the blocks; only where it begins is looked for.
-        moved = _way_of_blocks(measuring, time - time[contact[0]], wanted[0])
+        # The travel over time is that of the blocks; only where it begins is looked for.
+        moved = _travel_of_blocks(measuring, time - time[contact[0]], wanted[0])
     scale = (wanted[1] - wanted[0]) / (moved[contact[1]] - moved[contact[0]])
     free = record.position_mm is None and measuring.constant_feed
     if abs(scale - 1.0) > (_OTHER_FEED if free else _OTHER_LENGTH):
@@ -297,7 +297,7 @@ def _placed(
             f"{wanted[1] - wanted[0]:.2f} mm: is it the right pass, and was the feed override 100 %?"
         )
     x = wanted[0] + (moved - moved[contact[0]]) * (scale if free else 1.0)
-    ends = [_shift(hoped, x, size, side) for side in wanted]
+    ends = [_shift(forecast, x, size, side) for side in wanted]
     if free:
         # Both ends: offset and rate.
         share = (x - wanted[0]) / (wanted[1] - wanted[0])
@@ -310,7 +310,7 @@ def _placed(
     return np.asarray(x)
 
 
-def _way_of_blocks(measuring: MeasuringPass, time_s: FloatArray, entry_mm: float) -> FloatArray:
+def _travel_of_blocks(measuring: MeasuringPass, time_s: FloatArray, entry_mm: float) -> FloatArray:
     """X over time at the commanded feeds, at `entry_mm` at time 0."""
     ends = np.array([measuring.start_mm, *(end for end, _ in measuring.feeds)])
     pace = _PER_MINUTE / np.array([feed for _, feed in measuring.feeds])
@@ -318,14 +318,14 @@ def _way_of_blocks(measuring: MeasuringPass, time_s: FloatArray, entry_mm: float
     return np.asarray(np.interp(time_s + np.interp(entry_mm, ends, at), at, ends))
 
 
-def _shift(hoped: Expected, x: FloatArray, size: FloatArray, side: float) -> float:
+def _shift(forecast: Expected, x: FloatArray, size: FloatArray, side: float) -> float:
     """By how much X must be moved so that the course at one end of the cut is the expected one, whatever its scale."""
     near = np.flatnonzero(np.abs(x - side) < 3.0 * _MAX_SHIFT_MM)
     near = near[:: max(1, len(near) // 400)]
     measured, place = size[near], x[near]
 
     def misfit(shift: float) -> float:
-        expected = np.interp(place + shift, hoped.x_mm, hoped.mean_n)
+        expected = np.interp(place + shift, forecast.x_mm, forecast.mean_n)
         factor = float(expected @ measured) / max(float(expected @ expected), 1e-300)
         return float(np.sum((measured - factor * expected) ** 2))
 

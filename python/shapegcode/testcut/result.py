@@ -1,4 +1,4 @@
-"""Test cuts as they were drawn up, and what their records tell: coefficients, forces, the feed that is followed."""
+"""Designs of test cuts, and what their records show: coefficients, forces, the feed that is followed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from shapegcode.testcut.record import Revolutions
 
 @dataclass(frozen=True, repr=False, eq=False)
 class CutDesign(Result):
-    """A test cut as it was drawn up.
+    """A designed test cut, before it is run.
 
     Attributes:
         cut: what the side file holds.
@@ -114,7 +114,7 @@ class TaperPass:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A stretch with chatter.
+    """A part of a pass with chatter.
 
     Attributes:
         number: of the pass, from 1.
@@ -144,7 +144,7 @@ class TaperResult(Result):
         rms_percent: the same, of both, as a share of the resultant.
         neighbour_correlation: how far neighbours share what the fit leaves, 0 to 1; the intervals allow for it.
         passes: what the sampled records showed; empty for files with means.
-        left_out: stretches with chatter.
+        left_out: parts with chatter.
         poor: coefficients of the power laws that are not known well, in words.
         warnings: what else the user should know.
         cut: the test cut.
@@ -184,12 +184,12 @@ class TaperResult(Result):
         """k1 and k2 in the middle of the chips, and what the law leaves."""
         k1, k2 = (each.value for each in self.at_chip)
         chip = self.chip_mm
-        said = (
+        sentence = (
             f"k1 {k1:.4g} N/mm² and k2 {k2:.3g} at a chip of {1e3 * chip.middle:.2f} um; {self.mean_forces} mean "
             f"forces, chips {1e3 * chip.min:.2f} to {1e3 * chip.max:.2f} um thick on average; the law leaves "
             f"{self.rms_percent:.1f} % of the force"
         )
-        return "; poor: ".join([said, *self.poor])
+        return "; poor: ".join([sentence, *self.poor])
 
     @property
     def next_step(self) -> str:
@@ -252,7 +252,7 @@ class CornerPass:
         expected_mean_n: largest mean of the force law.
         expected_peak_n: largest magnitude of the force law.
         record: what was recorded, by revolution.
-        hoped: what the force law lets expect.
+        forecast: what the force law lets expect.
     """
 
     number: int
@@ -261,7 +261,7 @@ class CornerPass:
     expected_mean_n: float
     expected_peak_n: float
     record: Revolutions = field(metadata=hidden())
-    hoped: Expected = field(metadata=hidden())
+    forecast: Expected = field(metadata=hidden())
 
 
 @dataclass(frozen=True)
@@ -308,17 +308,17 @@ class CornerResult(Result):
     @property
     def answer(self) -> str:
         """Scale and ratio."""
-        said = f"the measured resultant is {self.scale:.2f} times the expected one where the feed is constant"
+        sentence = f"the measured resultant is {self.scale:.2f} times the expected one where the feed is constant"
         if self.ratio is None:
-            return said
+            return sentence
         return (
-            f"{said}; largest mean resultant after over before: measured {self.ratio.measured:.2f}, expected "
+            f"{sentence}; largest mean resultant after over before: measured {self.ratio.measured:.2f}, expected "
             f"{self.ratio.expected:.2f}"
         )
 
     @property
     def next_step(self) -> str:
-        """The test cut that tells more."""
+        """The next test cut to run."""
         if abs(self.scale - 1.0) > RATIO_LIMIT:
             return "shapegcode testcut taper measures the coefficients"
         return "shapegcode testcut interval shows how often the feed may change"
@@ -378,7 +378,7 @@ class IntervalResult(Result):
         program: of the test cut.
         machine: name of the machine.
         interval_mm: shortest interval from which on all measured ones are followed; None: none is.
-        lag_interval_mm: way in which 90 % of a step are done with the median lag, at the largest feed.
+        lag_interval_mm: travel in which 90 % of a step are done with the median lag, at the largest feed.
         passes: of the measured ones, by interval.
         warnings: what else the user should know.
         kind: of the test cut.

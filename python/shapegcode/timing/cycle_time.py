@@ -17,10 +17,9 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
-from shapegcode.model.playable import SimulatedPrograms
-from shapegcode.model.shaped_program import shaped_warnings
+from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program, given_program
-from shapegcode.program.operating import OVERRIDE_LOCKED
+from shapegcode.program.stamp import OVERRIDE_LOCKED
 from shapegcode.timing.result import PARTS, BlockTime, CycleTime, RegionTime, ToolTime
 
 _KINDS = {kind.value: name for name, kind in _core.BlockKind.__members__.items()}

@@ -46,11 +46,11 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
     tools = [tool for tool in time.tools if tool in longest]
     regions = time.slowest_regions(_REGIONS)
     heights = [max(len(tools), 1), *([len(regions)] if regions else [])]
-    rows = plot.grid(
-        ax, len(heights), 1, size_inch=(9.0, 1.8 + 0.32 * sum(heights) + 0.5 * len(heights)), height_ratios=heights,
+    panels = plot.column(
+        ax, len(heights), sharex=False, height_ratios=heights,
+        size_inch=(9.0, 1.8 + 0.32 * sum(heights) + 0.5 * len(heights)),
         title=f"Where the time goes: {time.cycle_time_s:.1f} s on {time.machine}", part=Path(time.program).name,
     )  # fmt: skip
-    panels = [row[0] for row in rows]
     used = [part for part in PARTS if getattr(time, part) > 0.0]
     _bars(panels[0], [tool_name(tool.tool) for tool in tools], [vars(tool) for tool in tools], used)
     plot.legend_below(panels[-1], of=panels[0])
@@ -66,15 +66,17 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
 
 def _bars(panel: Axes, names: Sequence[str], rows: Sequence[Mapping[str, float]], parts: Sequence[str]) -> None:
     """One lying bar per row, longest part first in the order of the parts; its length stands behind it."""
-    places = range(len(names))
+    positions = range(len(names))
     ends = [0.0] * len(names)
     for part in parts:
         widths = [float(row.get(part, 0.0)) for row in rows]
-        panel.barh(places, widths, left=ends, color=_COLOUR[part], label=LABELS[part], height=0.7)
+        panel.barh(positions, widths, left=ends, color=_COLOUR[part], label=LABELS[part], height=0.7)
         ends = [end + width for end, width in zip(ends, widths, strict=True)]
-    for place, end in zip(places, ends, strict=True):
-        panel.annotate(f"{end:.1f}", (end, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8)
-    panel.set_yticks(list(places), names, fontsize=8)
+    for position, end in zip(positions, ends, strict=True):
+        panel.annotate(
+            f"{end:.1f}", (end, position), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8
+        )
+    panel.set_yticks(list(positions), names, fontsize=8)
     panel.invert_yaxis()
     panel.grid(False, axis="y")
     panel.margins(x=0.08)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from shapegcode.model.playable import SimulatedPrograms
+from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.json import hidden
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result
@@ -19,7 +19,7 @@ AGREEMENT_PERCENT = 0.5  # Closed form and full interpolation agree if they diff
 
 @dataclass(frozen=True, repr=False)
 class TimeParts:
-    """Where a stretch of time goes; the parts add up to the whole.
+    """Parts of a duration; they add up to the whole.
 
     Attributes:
         cutting_s: cutting blocks at their feed.
@@ -189,11 +189,11 @@ class CycleTime(TimeParts, Result):
     @property
     def answer(self) -> str:
         """The whole time, and whether the check agrees."""
-        said = f"{self.program} takes {self.cycle_time_s:.3f} s ({_clock(self.cycle_time_s)}) on {self.machine}"
+        sentence = f"{self.program} takes {self.cycle_time_s:.3f} s ({_clock(self.cycle_time_s)}) on {self.machine}"
         if self.difference_percent is None:
-            return said
+            return sentence
         agrees = "agrees" if self.ok else "DIFFERS"
-        return f"{said}; full interpolation {agrees} ({self.difference_percent:+.3f} %)"
+        return f"{sentence}; full interpolation {agrees} ({self.difference_percent:+.3f} %)"
 
     @property
     def next_step(self) -> str:

@@ -34,27 +34,17 @@ _QUANTITIES = {"command": "contour error of the command", "response": "contour e
 
 @dataclass(frozen=True)
 class Case:
-    """One operating condition of the emitted program.
+    """One operating condition of the emitted program."""
 
-    Attributes:
-        name: in words, unique.
-        block_end: "ceil" or "carry"; None where look-ahead plans the blocks anew.
-        counts: it lies in the stated band.
-        override: feed override, 1 = 100 %.
-        mode: the mode that is off its frequency ("x.1": first of the X axis, as in the machine file), "all", or None.
-        shift: by how many of its stated uncertainties, -1 or +1.
-        look_ahead: the controller's look-ahead stays on.
-        starved_s: time for which the block buffer is empty once; 0: never.
-    """
-
-    name: str
-    block_end: str | None
-    counts: bool
-    override: float = 1.0
+    name: str  # in words, unique
+    block_end: str | None  # "ceil" or "carry"; None where look-ahead plans the blocks anew
+    counts: bool  # it lies in the stated band
+    override: float = 1.0  # feed override, 1 = 100 %
+    # the mode that is off its frequency ("x.1": first of the X axis, as in the machine file), "all", or None
     mode: str | None = None
-    shift: float = 0.0
-    look_ahead: bool = False
-    starved_s: float = 0.0
+    shift: float = 0.0  # by how many of its stated uncertainties, -1 or +1
+    look_ahead: bool = False  # the controller's look-ahead stays on
+    starved_s: float = 0.0  # time for which the block buffer is empty once; 0: never
 
     @property
     def nominal(self) -> bool:
@@ -73,51 +63,31 @@ class Case:
 
 @dataclass(frozen=True)
 class CaseFigures:
-    """One region simulated in one operating condition.
+    """One region simulated in one operating condition."""
 
-    Attributes:
-        residual_mm: largest |table - command| while the set-points rest, (3,).
-        command: deviation of the command; None: not measured.
-        response: deviation of the table; None: not measured.
-        time_s: until the set-points rest.
-    """
-
-    residual_mm: Vector
-    command: Deviation | None
-    response: Deviation | None
-    time_s: float
+    residual_mm: Vector  # largest |table - command| while the set-points rest, (3,)
+    command: Deviation | None  # deviation of the command; None: not measured
+    response: Deviation | None  # deviation of the table; None: not measured
+    time_s: float  # until the set-points rest
 
 
 @dataclass(frozen=True)
 class RegionLimits:
-    """What a region is judged by.
+    """What a region is judged by."""
 
-    Attributes:
-        residual_um: per axis, (3,).
-        contour_um: of the targeted deviation.
-        target: which deviation: of the command, or of the table (response).
-    """
-
-    residual_um: Vector
-    contour_um: float
-    target: Target = "command"
+    residual_um: Vector  # per axis, (3,)
+    contour_um: float  # of the targeted deviation
+    target: Target = "command"  # which deviation: of the command, or of the table (response)
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A figure of a case beside its limit, missed or not.
+class LimitCheck:
+    """A figure of a case beside its limit, missed or not."""
 
-    Attributes:
-        figure: what it is.
-        value_um: how much.
-        limit_um: how much is allowed.
-        decimals: digits that are worth reading.
-    """
-
-    figure: str
-    value_um: float
-    limit_um: float
-    decimals: int = 2
+    figure: str  # what it is
+    value_um: float  # how much
+    limit_um: float  # how much is allowed
+    decimals: int = 2  # digits that are worth reading
 
     @property
     def share(self) -> float:
@@ -144,12 +114,12 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
             name, damping = f"{axis} {mode.frequency_hz:.4g} Hz", mode.damping_uncertainty_percent
             less = f", damping {-damping:.3g} %" if damping else ""
             if percent := mode.frequency_uncertainty_percent:
-                ways = [(f"{name} {shift * percent:+.3g} %{less}", shift) for shift in (-1.0, 1.0)]
+                variants = [(f"{name} {shift * percent:+.3g} %{less}", shift) for shift in (-1.0, 1.0)]
             elif damping:
-                ways = [(f"{name}{less}", -1.0)]
+                variants = [(f"{name}{less}", -1.0)]
             else:
                 continue
-            found.append((f"{axis.lower()}.{number}", ways))
+            found.append((f"{axis.lower()}.{number}", variants))
     return found
 
 
@@ -173,11 +143,11 @@ def stated_cases(machine: Machine) -> list[Case]:
     ends = sorted({low, high} - {100.0}) if turns else []
     cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, *ends} - {100.0}) if turns]
     modes = _uncertain_modes(machine)
-    for mode, ways in modes:
-        cases += [Case(words, own, band.mode_uncertainty, mode=mode, shift=shift) for words, shift in ways]
+    for mode, variants in modes:
+        cases += [Case(words, own, band.mode_uncertainty, mode=mode, shift=shift) for words, shift in variants]
     if modes:
         together = [(-1.0, "all modes low")]
-        if any(len(ways) > 1 for _, ways in modes):
+        if any(len(variants) > 1 for _, variants in modes):
             together.append((1.0, "all modes high"))
         cases += [Case(words, own, band.mode_uncertainty, mode=ALL_MODES, shift=shift) for shift, words in together]
         cases += [
@@ -191,31 +161,31 @@ def stated_cases(machine: Machine) -> list[Case]:
     return cases
 
 
-def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[Judged]:
+def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[LimitCheck]:
     """Every judged figure of a region in one case, beside its limit: residuals, and the targeted deviation."""
-    judged = [
-        Judged(f"residual vibration {axis}", float(now), float(limit))
+    check = [
+        LimitCheck(f"residual vibration {axis}", float(now), float(limit))
         for axis, now, limit in zip("XYZ", figures.residual_mm * 1e3, limits.residual_um, strict=True)
     ]
     deviation = figures.command if limits.target == "command" else figures.response
     if deviation is not None:
-        judged.append(Judged(_QUANTITIES[limits.target], deviation.largest_mm * 1e3, limits.contour_um, decimals=1))
-    return judged
+        check.append(LimitCheck(_QUANTITIES[limits.target], deviation.largest_mm * 1e3, limits.contour_um, decimals=1))
+    return check
 
 
 def region_misses(
     cases: Sequence[Case], figures: Sequence[CaseFigures | None], limits: RegionLimits
-) -> list[tuple[str, Judged]]:
+) -> list[tuple[str, LimitCheck]]:
     """Every figure of a cut that leaves its limit in a condition that counts: the worst condition of each, in words."""
-    worst: dict[str, tuple[Judged, Case]] = {}
+    worst: dict[str, tuple[LimitCheck, Case]] = {}
     for case, simulated in zip(cases, figures, strict=True):
-        for judged in judge_region(simulated, limits) if case.counts and simulated is not None else ():
-            if judged.figure not in worst or judged.value_um > worst[judged.figure][0].value_um:
-                worst[judged.figure] = (judged, case)
+        for check in judge_region(simulated, limits) if case.counts and simulated is not None else ():
+            if check.figure not in worst or check.value_um > worst[check.figure][0].value_um:
+                worst[check.figure] = (check, case)
     return [
-        (str(judged) if case.nominal else f"{judged} ({case.name})", judged)
-        for judged, case in worst.values()
-        if judged.is_missed
+        (str(check) if case.nominal else f"{check} ({case.name})", check)
+        for check, case in worst.values()
+        if check.is_missed
     ]
 
 
@@ -281,41 +251,25 @@ BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 
 @dataclass(frozen=True)
 class SimulatedCase:
-    """An operating condition that was simulated.
+    """An operating condition that was simulated."""
 
-    Attributes:
-        run: its figures.
-        cut_s: how much longer all blocks take in it than at 100 %, before any filter, where only their end was
-            simulated; else 0.
-    """
-
-    run: _core.PlaybackFigures
+    run: _core.PlaybackFigures  # its figures
+    # how much longer all blocks take in it than at 100 %, before any filter, where only their end was simulated; else 0
     cut_s: float
 
 
 @dataclass(frozen=True)
 class CaseSimulation:
-    """Simulates one emitted region; every method is a task of its own.
+    """Simulates one emitted region; every method is a task of its own."""
 
-    Attributes:
-        blocks: what was emitted.
-        path: what was programmed.
-        model: the machine for the core.
-        cases: in which it is simulated.
-        target: what the contour tolerance is about.
-        offset: from the region's positions to the machine's.
-        tracker: of the programmed path.
-        increment_mm: least increment of the text.
-    """
-
-    blocks: _core.Path
-    path: _core.Path
-    model: MachineModel
-    cases: Sequence[Case]
-    target: Target
-    offset: Offset
-    tracker: _core.ContourTracker
-    increment_mm: float
+    blocks: _core.Path  # what was emitted
+    path: _core.Path  # what was programmed
+    model: MachineModel  # the machine for the core
+    cases: Sequence[Case]  # in which it is simulated
+    target: Target  # what the contour tolerance is about
+    offset: Offset  # from the region's positions to the machine's
+    tracker: _core.ContourTracker  # of the programmed path
+    increment_mm: float  # least increment of the text
 
     def nominal(self, rule: _core.BlockEnd) -> _core.PlaybackFigures:
         """Blocks at 100 %; under the controller's own rule also with an empty buffer where a stop excites most."""
@@ -339,7 +293,7 @@ class CaseSimulation:
         return case.override != 1.0 and case.mode is None and self.model.bounds_deviations
 
     def _whole(self, case: Case) -> bool:
-        """Whether the whole region is simulated for a case alone."""
+        """Whether a case needs a simulation of the whole region for itself."""
         # Behind feed drives each would take a quarter of a conversion: what is only shown makes do with the residual.
         spared = case.override != 1.0 and not case.counts and self.model.machine.verdict.plant != "modal"
         return case.needs_contour(self.target) and not spared and not self._beside(case)

@@ -15,19 +15,12 @@ from shapegcode.results.result import Pair, Xyz
 
 @dataclass(frozen=True)
 class Placed:
-    """A region and where its shaped blocks stand in the emitted text.
+    """A region and where its shaped blocks stand in the emitted text."""
 
-    Attributes:
-        region: of the original program.
-        first_line: first emitted line, from 1.
-        last_line: last emitted line.
-        path: the shaped blocks; None: those of these lines.
-    """
-
-    region: _core.Region
-    first_line: int
-    last_line: int
-    path: _core.Path | None = None
+    region: _core.Region  # of the original program
+    first_line: int  # first emitted line, from 1
+    last_line: int  # last emitted line
+    path: _core.Path | None = None  # the shaped blocks; None: those of these lines
 
     @property
     def original_lines(self) -> tuple[int, int]:
@@ -221,10 +214,10 @@ def _share(case: CaseVerdict) -> float:
 
 @dataclass(frozen=True)
 class FeedExcess:
-    """Where the emitted blocks are fastest against the feed that is programmed at the same place of the path.
+    """Where the emitted blocks are fastest against the feed that is programmed at the same position of the path.
 
-    The speed is that of the set-points along their own way, over one, four or sixteen shortest blocks, less two
-    increments by which rounding may lengthen it; places are matched by the way travelled, not by time.
+    The speed is that of the set-points along their own path, over one, four or sixteen shortest blocks, less two
+    increments by which rounding may lengthen it; positions are matched by path length, not by time.
 
     Attributes:
         ratio: speed over programmed feed; 1: as programmed.

@@ -18,10 +18,9 @@ from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
-from shapegcode.program.compensation import paired_regions
+from shapegcode.program.computer import cores
 from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_xyz_um
 from shapegcode.results.result import Pair, Xyz
-from shapegcode.verdict.ahead import cores
 from shapegcode.verdict.cases import (
     ALL_MODES,
     BLOCK_ENDS,
@@ -57,21 +56,15 @@ Step = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class RegionFigures:
-    """One cut simulated: as programmed, and as emitted in every operating condition of the verdict.
+    """One cut simulated: as programmed, and as emitted in every operating condition of the verdict."""
 
-    Attributes:
-        original: the programmed path under the controller's own motion.
-        emitted: shaped blocks under both rules of block end (ceil, carry); a cut left unchanged once.
-        cases: one entry per operating condition; None: not simulated for a cut left unchanged.
-        slowed_blocks: emitted blocks that the controller's look-ahead limits would slow.
-        is_shaped: False: the cut was left unchanged.
-    """
-
-    original: _core.PlaybackFigures
+    original: _core.PlaybackFigures  # the programmed path under the controller's own motion
+    # shaped blocks under both rules of block end (ceil, carry); a cut left unchanged once
     emitted: tuple[_core.PlaybackFigures, ...]
+    # one entry per operating condition; None: not simulated for a cut left unchanged
     cases: tuple[CaseFigures | None, ...]
-    slowed_blocks: int
-    is_shaped: bool = True
+    slowed_blocks: int  # emitted blocks that the controller's look-ahead limits would slow
+    is_shaped: bool = True  # False: the cut was left unchanged
 
     @property
     def feed_excess(self) -> FeedExcess | None:
@@ -89,30 +82,17 @@ class RegionFigures:
 
 @dataclass(frozen=True)
 class PendingSimulations:
-    """The simulations of one emitted region under way.
+    """The simulations of one emitted region under way."""
 
-    Attributes:
-        player: whose tasks they are.
-        nominal: under both rules of block end.
-        planned: with the look-ahead left on.
-        others: the other cases, in groups.
-        slowed: blocks that the look-ahead limits would slow.
-    """
-
-    player: CaseSimulation
-    nominal: Sequence[Future[_core.PlaybackFigures]]
-    planned: Future[_core.PlaybackFigures | None]
-    others: Sequence[Future[dict[str, SimulatedCase]]]
-    slowed: Future[int]
+    simulation: CaseSimulation  # whose tasks they are
+    nominal: Sequence[Future[_core.PlaybackFigures]]  # under both rules of block end
+    planned: Future[_core.PlaybackFigures | None]  # with the look-ahead left on
+    others: Sequence[Future[dict[str, SimulatedCase]]]  # the other cases, in groups
+    slowed: Future[int]  # blocks that the look-ahead limits would slow
 
 
 class Judge:
-    """Simulates emitted regions in every case and holds them against the machine's tolerances.
-
-    Args:
-        model: of the machine; its file states tolerances, and the band in which a program must be good.
-        cases: operating conditions; None: those of the machine file.
-    """
+    """Simulates emitted regions in every case and holds them against the machine's tolerances."""
 
     def __init__(self, model: MachineModel, cases: Sequence[Case] | None = None) -> None:
         self._machine = model.machine
@@ -139,23 +119,23 @@ class Judge:
     def begin(
         self, emitted: Program, placed: Sequence[Placed], trackers: Iterable[_core.ContourTracker], pool: Executor
     ) -> list[PendingSimulations]:
-        """Begin to play every emitted region."""
+        """Start the simulation of every emitted region."""
         limits = self._model.limits()
         running = []
         for place, tracker in zip(placed, trackers, strict=True):
-            player = CaseSimulation(
+            simulation = CaseSimulation(
                 place.blocks(emitted), place.region.path, self._model, self.cases, self.target,
                 self._model.offset(place.region), tracker,
                 least_increment_mm(self._machine, place.region.exit.units),
             )  # fmt: skip
-            planned = pool.submit(player.planned)  # takes longest
-            runs = [pool.submit(player.nominal, rule) for rule in BLOCK_ENDS]
-            rest = [pool.submit(player.others, group) for group in player.groups()]
+            planned = pool.submit(simulation.planned)  # takes longest
+            runs = [pool.submit(simulation.nominal, rule) for rule in BLOCK_ENDS]
+            rest = [pool.submit(simulation.others, group) for group in simulation.groups()]
             slowed = pool.submit(
-                _core.count_slowed_blocks, player.blocks, limits.corner_speed_difference_mm_per_s,
+                _core.count_slowed_blocks, simulation.blocks, limits.corner_speed_difference_mm_per_s,
                 limits.max_feed_mm_per_s,
             )  # fmt: skip
-            running.append(PendingSimulations(player, runs, planned, rest, slowed))
+            running.append(PendingSimulations(simulation, runs, planned, rest, slowed))
         return running
 
     def figures(
@@ -178,7 +158,7 @@ class Judge:
         for original, each in zip(originals, running, strict=True):
             nominal = tuple(result(run) for run in each.nominal)
             others = {name: run for part in each.others for name, run in result(part).items()}
-            cases: tuple[CaseFigures | None, ...] = each.player.figures(nominal, result(each.planned), others)
+            cases: tuple[CaseFigures | None, ...] = each.simulation.figures(nominal, result(each.planned), others)
             results.append(RegionFigures(result(original), nominal, cases, result(each.slowed)))
         return results
 
@@ -271,9 +251,7 @@ class Judge:
 
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
         """What a region is judged by: its residual beside that of the original as programmed, in whatever case."""
-        tolerance = self._machine.tolerance
-        increment_um = least_increment_mm(self._machine, place.region.exit.units) * 1e3
-        floor_um = max(tolerance.residual_floor_um, tolerance.residual_floor_increments * increment_um)
+        tolerance, floor_um = self._machine.tolerance, residual_floor_um(place.region, self._machine)
         before_um = figures.original.residual_mm * 1e3
         return RegionLimits(
             np.maximum(tolerance.residual_ratio * before_um, floor_um), tolerance.contour_um, self.target
@@ -288,7 +266,7 @@ class Judge:
         excess, allowed = figures.feed_excess, self._machine.tolerance.feed_excess_ratio
         if excess is not None:
             before = {each.figure: each.value_um for each in judge_region(case_figures(figures.original), limits)}
-            worse = [miss for miss, judged in found if judged.value_um > before[judged.figure] * _WORSE + _WORSE_UM]
+            worse = [miss for miss, checks in found if checks.value_um > before[checks.figure] * _WORSE + _WORSE_UM]
             too_fast = _haste(figures, place, block_period_s)
             if excess.ratio > 1.0 + allowed:
                 too_fast.append(f"{excess}, limit {allowed * 100.0:g} %")
@@ -324,6 +302,12 @@ class Judge:
         return tuple(verdicts)
 
 
+def residual_floor_um(region: _core.Region, machine: Machine) -> float:
+    """Residual vibration that passes whatever the original has."""
+    increment_um = least_increment_mm(machine, region.exit.units) * 1e3
+    return max(machine.tolerance.residual_floor_um, machine.tolerance.residual_floor_increments * increment_um)
+
+
 def case_verdict(
     case: Case,
     simulated: Sequence[CaseFigures],
@@ -332,12 +316,12 @@ def case_verdict(
     material_side: str | None,
 ) -> CaseVerdict:
     """All regions in one case."""
-    judged = [
+    checks = [
         (each, where)
         for where, run, limit in zip(lines, simulated, limits, strict=True)
         for each in judge_region(run, limit)
     ]
-    worst, where = max(judged, key=lambda pair: pair[0].share)
+    worst, where = max(checks, key=lambda pair: pair[0].share)
     tracks = _largest(run.command for run in simulated), _largest(run.response for run in simulated)
     sides: dict[str, Tracks[float | None]] = {}
     if material_side is not None:
@@ -395,12 +379,16 @@ Vector = npt.NDArray[np.float64]
 
 
 def judge_program(
-    emitted: Program, original: Program, machine: Machine, *, shaped: bool | None = None
+    emitted: Program,
+    original: Program,
+    pairs: Sequence[tuple[_core.Region, _core.Region]],
+    model: MachineModel,
+    *,
+    shaped: bool | None = None,
 ) -> ProgramFigures:
-    """An emitted program judged in the operating conditions that count, as `convert` judges its own."""
-    model = MachineModel(machine)
+    """Judge an emitted program, its cuts paired with the original's, in the operating conditions that count."""
+    machine = model.machine
     judge = Judge(model, [case for case in stated_cases(machine) if case.counts or case.nominal])
-    pairs = list(paired_regions(emitted, original))
     is_shaped = [mine.shaped if shaped is None else shaped for mine, _ in pairs]
     placed = [Placed(region, mine.first_line, mine.last_line, mine.path) for mine, region in pairs]
     with ThreadPoolExecutor(max_workers=cores()) as pool:
@@ -463,7 +451,7 @@ def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
         model.simulate_emitted(region.path, region.path, rule, contour=False, offset=model.offset(region)).residual_mm
         for region in program.regions
         if region.was_rapid
-        for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry)
+        for rule in BLOCK_ENDS
     ]
     return largest_xyz_um([*found.values(), *shaped])
 

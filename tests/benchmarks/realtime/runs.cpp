@@ -252,7 +252,7 @@ Periodic periodic(double minutes) {
 
 Simulated simulated(std::uint64_t steps) {
   constexpr std::uint64_t between_stops = 1'000'000;
-  constexpr std::uint64_t most_to_rest = 1'000'000;
+  constexpr std::uint64_t max_to_rest = 1'000'000;
   Simulated found;
   MotionController control(settings_with(128));
   Feeder feeder(control);
@@ -272,7 +272,7 @@ Simulated simulated(std::uint64_t steps) {
       step();
     }
     while (!feeder.push_last()) step();
-    std::uint64_t left = most_to_rest;
+    std::uint64_t left = max_to_rest;
     do {
       step();
     } while (activity != Activity::idle && activity != Activity::starved && --left > 0);

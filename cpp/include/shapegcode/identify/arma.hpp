@@ -39,7 +39,7 @@ struct Arma {
   std::vector<std::complex<double>> poles;  ///< roots lambda
   std::vector<double> residual_rms;         ///< per record: response minus B/A force, in the response's unit
   int iterations = 0;
-  bool converged = false;  ///< phi settled; if not, the best of all iterations is given
+  bool converged = false;  ///< phi converged; if not, the best of all iterations is given
 };
 
 /// Joint model of several taps of the same point, from rest at the first sample: iterated least squares, in which force

@@ -52,7 +52,7 @@ struct FitQuality {
   std::string reason;  ///< why it has not converged; empty if it has
 };
 
-/// Result of fit_modes. Entry r belongs to the r-th start; a mode may have passed another one on the way.
+/// Result of fit_modes. Entry r belongs to the r-th start; a mode may have passed another one.
 struct ModalFit {
   std::vector<double> omega_rad_s;    ///< undamped natural frequencies
   std::vector<double> damping_ratio;  ///< no unit
@@ -75,7 +75,7 @@ struct ModalFit {
 /// noise on the force adds, to first order, what it does to the modelled response.
 ///
 /// Throws Error(argument) on signals that arma_driven refuses, a period or start outside its range, or too few samples
-/// for the parameters. Not converging is told in the result. Source: L. Ljung, System Identification, ch. 7.
+/// for the parameters. The result reports whether it converged. Source: L. Ljung, System Identification, ch. 7.
 [[nodiscard]] ModalFit fit_modes(std::span<const TapSignals> taps, double period_s, const NaturalModes& start,
                                  const ModalFitOptions& options);
 

@@ -245,8 +245,8 @@ class CornerReach {
     std::uint32_t tag = 0;  // of the sample at the end of the nearest segment of track
   };
 
-  /// Corners are junctions at which the direction changes by `least_angle_rad` or more, and the path's end.
-  explicit CornerReach(const Path& path, double least_angle_rad = 0.1745);
+  /// Corners are junctions at which the direction changes by `min_angle_rad` or more, and the path's end.
+  explicit CornerReach(const Path& path, double min_angle_rad = 0.1745);
   /// Forgets the track; the next sample has its foot near `foot_mm`. Corners whose window lies before it, or about it
   /// unless it is the path's start, no longer count.
   void begin_at(double foot_mm, bool from_start) noexcept;

@@ -92,7 +92,7 @@ enum class SectionKind : std::uint8_t {
   curve,  ///< anything else
 };
 
-/// A stretch of a path that is measured by itself.
+/// A section of a path that is measured by itself.
 struct PathSection {
   std::size_t first = 0;  ///< index of its first segment
   std::size_t last = 0;   ///< inclusive
@@ -146,10 +146,10 @@ class SweptWalls {
   };
 
   /// `spacing_mm` is the largest distance of two stations; it becomes wider where the path would need more than
-  /// `most_stations`. Throws Error(argument) on a tool radius or spacing that is not > 0, or a path of more than 1e8
+  /// `max_stations`. Throws Error(argument) on a tool radius or spacing that is not > 0, or a path of more than 1e8
   /// tool radii.
   SweptWalls(const Path& path, const std::vector<PathSection>& sections, double tool_radius_mm, double spacing_mm,
-             std::size_t most_stations = 500'000);
+             std::size_t max_stations = 500'000);
 
   /// The tool's centre goes from one point to another; the arc lengths are those of their feet on the path, the
   /// deviation that of the further one from the path.
@@ -180,8 +180,8 @@ class SweptWalls {
 
   double radius_;
   double spacing_ = 0.0;
-  double deviation_ = 0.0;   // largest so far
-  double least_fall_ = 0.0;  // 1/mm, see sweep()
+  double deviation_ = 0.0;  // largest so far
+  double min_fall_ = 0.0;   // 1/mm, see sweep()
   std::vector<Station> stations_;
   std::vector<Reference> reference_;
   std::vector<std::size_t> first_of_;  // per section, and the end
@@ -245,7 +245,7 @@ struct SectionFigures {
   WallFigures left;  ///< deviation from what the programmed path cuts, positive to the left
   WallFigures right;
   WallFigures width;                        ///< left less right wall, with the tool's diameter
-  std::optional<Roughness> left_roughness;  ///< of the longest stretch of wall without a gap
+  std::optional<Roughness> left_roughness;  ///< of the longest section of wall without a gap
   std::optional<Roughness> right_roughness;
 };
 
@@ -254,7 +254,7 @@ struct TrackFigures {
   std::vector<SectionFigures> sections;
   double duration_s = 0.0;  ///< until the command rests for the last time
   RestVibration rest;       ///< the stop at the end
-  DeviationStats command;   ///< as PlaybackFigures has them: corners that were missed count
+  DeviationStats command;   ///< as SimulationFigures has them: corners that were missed count
   DeviationStats response;
   SideFigures command_sides;
   SideFigures response_sides;

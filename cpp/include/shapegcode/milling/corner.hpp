@@ -34,7 +34,7 @@ enum class CornerSection : std::uint8_t {
   s4,  ///< on the straight behind it
 };
 
-/// What the tool meets at one place of the corner, in closed form.
+/// What the tool meets at one position of the corner, in closed form.
 struct CornerEngagement {
   CornerSection section = CornerSection::s1;
   double x_mm = 0.0;  ///< of the tool's axis
@@ -63,7 +63,7 @@ struct CornerEngagement {
 [[nodiscard]] Ring corner_stock(const CornerCut& cut, double beyond_mm);
 
 /// The corner as a track, so that whoever takes tracks can take the closed form: samples at most `step_mm` apart and
-/// at the ends of lines and arc; at a sharp vertex two samples share one place, before and after the turn.
+/// at the ends of lines and arc; at a sharp vertex two samples share one position, before and after the turn.
 [[nodiscard]] EngagementTrack corner_track(const CornerCut& cut, double axial_depth_mm, double step_mm);
 
 }  // namespace shapegcode

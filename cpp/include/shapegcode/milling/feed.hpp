@@ -55,7 +55,7 @@ struct LimitedFeed {
 [[nodiscard]] std::vector<LimitedFeed> largest_feeds(MillingForce& force, const EngagementTrack& track,
                                                      const FeedLimits& limits, double lowest, double highest);
 
-/// How fast a path may be run: `feed_mm_per_min[i]` holds on the stretch that ends at `s_mm[i]` and begins at the
+/// How fast a path may be run: `feed_mm_per_min[i]` holds on the section that ends at `s_mm[i]` and begins at the
 /// station before it (0 before the first). Ascending; the last one is the path's end.
 struct FeedStations {
   std::vector<double> s_mm;
@@ -76,34 +76,34 @@ struct FeedScheduleOptions {
   double resolution_mm_per_min = 0.1;  ///< feeds are whole multiples, rounded down
 };
 
-/// A stretch of one feed.
+/// A section of one feed.
 struct FeedStretch {
   double begin_mm = 0.0;
   double end_mm = 0.0;
   double feed_mm_per_min = 0.0;
 };
 
-/// Feeds of a path in the shortest time that the stations allow: stretches that begin and end where a block does or
+/// Feeds of a path in the shortest time that the stations allow: sections that begin and end where a block does or
 /// within a divisible one, none shorter than the least length (but where kept blocks leave no more room), each at the
 /// lowest feed of its stations. The borders are chosen together (dynamic programming), with a charge for each of one
-/// percent of the shortest stretch's time, so that none is made for nothing. O(stations + length).
+/// percent of the shortest section's time, so that none is made for nothing. O(stations + length).
 ///
 /// Throws Error(argument) on stations or blocks that do not ascend to one end above 0, a feed that is not above 0, or
 /// options outside their range.
 [[nodiscard]] std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const FeedStations& stations,
                                                      const FeedScheduleOptions& options);
 
-/// The path with other feeds: segments are divided where a stretch ends within one. Throws Error(argument) if the
-/// stretches do not cover the path.
-[[nodiscard]] Path with_feeds(const Path& path, std::span<const FeedStretch> stretches);
+/// The path with other feeds: segments are divided where a section ends within one. Throws Error(argument) if the
+/// sections do not cover the path.
+[[nodiscard]] Path with_feeds(const Path& path, std::span<const FeedStretch> sections);
 
 /// Lowers the feeds around each station that the load holds, because the travel lags behind a change of feed: a change
 /// down must be commanded so early that the travel has followed, `before_s` times the feed that the load allows, and a
 /// change up not before the travel has left, `behind_s` times it. `load_mm_per_min`: the largest feed that the load at
 /// a station allows, which may be above what is wanted there. One entry of each per station.
 ///
-/// Behind a filter of mean delay m and length d a change commanded at a place begins m times the slower feed before it
-/// and has ended d - m times the slower feed behind it.
+/// Behind a filter of mean delay m and length d a change commanded at a position begins m times the slower feed before
+/// it and has ended d - m times the slower feed behind it.
 void look_ahead_on_load(FeedStations& stations, std::span<const double> load_mm_per_min,
                         std::span<const double> before_s, std::span<const double> behind_s);
 

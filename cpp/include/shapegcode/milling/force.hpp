@@ -32,7 +32,7 @@ struct EndMill {
 /// a runout that is not one finite number per flute or reaches the radius; also on more than 1000 flutes.
 void check(const EndMill& tool);
 
-/// A stretch of the tool's circumference that is in material, over a stretch of its length. Azimuths in rad from the
+/// A section of the tool's circumference that is in material, over a section of its length. Azimuths in rad from the
 /// direction of feed, positive to its left (counter-clockwise seen from +Z); only the front half cuts, so
 /// -pi/2 <= from < to <= pi/2. With a clockwise spindle a tooth passes from +pi/2 (left, up milling) to -pi/2 (right,
 /// down milling), and its chip is feed per tooth times cos(azimuth) thick.
@@ -210,8 +210,8 @@ inline constexpr int force_columns = 9;
 [[nodiscard]] Eigen::MatrixXd figures_of(MillingForce& force, const EngagementTrack& track,
                                          std::span<const double> feed_mm_per_min, const ToolBeam* beam = nullptr);
 
-/// The wall that a tool finishes beside its way, seen along the feed. With a clockwise spindle the right one is made by
-/// down milling, the left one by up milling.
+/// The wall that a tool finishes beside its path, seen along the feed. With a clockwise spindle the right one is made
+/// by down milling, the left one by up milling.
 enum class WallSide : std::uint8_t {
   right,
   left,

@@ -54,7 +54,7 @@ class Material {
   /// tip; size() if it is above all of them.
   [[nodiscard]] std::size_t lowest_cut(double tip_mm) const noexcept;
 
-  /// Whether there is material at a place; false outside of the stock.
+  /// Whether there is material at a point; false outside of the stock.
   [[nodiscard]] bool is_material(double x_mm, double y_mm, double z_mm) const noexcept;
 
   /// What is left, mm3.

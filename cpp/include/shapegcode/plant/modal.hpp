@@ -79,9 +79,9 @@ class ModalPlant {
   /// peak() restarts from the present deflection.
   void reset_peak() noexcept { peak_ = deflection_.cwiseAbs(); }
   /// Largest |deflection| per axis that follows, if the command rests from now on (continuous time, not only at
-  /// samples; searched over the time in which the slowest mode of the axis makes `n_periods` swings, in steps of 1/64
-  /// period of the fastest; ends early when no larger one can follow, and after 1e6 steps). The stop itself counts: the
-  /// command's last velocity falls to zero at the last set-point. Throws Error(argument) on n_periods < 1.
+  /// samples; searched over the time in which the slowest mode of the axis makes `n_periods` oscillations, in steps of
+  /// 1/64 period of the fastest; ends early when no larger one can follow, and after 1e6 steps). The stop itself
+  /// counts: the command's last velocity falls to zero at the last set-point. Throws Error(argument) on n_periods < 1.
   [[nodiscard]] Vector3 residual_peak(int n_periods = 5) const;
 
  private:

@@ -42,7 +42,7 @@ class FeedDriveEquations {
     double damping = 0.0;    ///< 2 zeta omega
     double participation = 1.0;
   };
-  static constexpr int most_drive_states = 7;  ///< before the modes
+  static constexpr int max_drive_states = 7;  ///< before the modes
 
   FeedDriveEquations(FeedDriveParameters parameters, double period_s);
 

@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr int most_substeps = 1000;
+constexpr int max_substeps = 1000;
 
 // Rodas3 in the form that needs no product with the Jacobian: (1/(gamma h) - J) k_i = f(y + sum a_ij k_j)
 // + sum c_ij/h k_j + h gamma_i df/dt, y_next = y + sum m_i k_i.
@@ -37,7 +37,7 @@ constexpr std::size_t error_stage = 3;  // its k is the difference to the embedd
 
 // A step whose error is past this share of the motion, or these amounts, is taken again in parts; what a machine can
 // follow stays far below. Twice at most, so that the work is bounded.
-constexpr std::size_t most_divisions = 2;
+constexpr std::size_t max_divisions = 2;
 constexpr int parts = 4;
 constexpr double error_share = 0.01;
 constexpr double error_length_m = 1e-6;
@@ -47,7 +47,7 @@ constexpr double error_bristle_m = 1e-6;
 }  // namespace
 
 struct FeedDriveRealTime::Impl {
-  static constexpr int most = FeedDriveEquations::most_drive_states;
+  static constexpr int most = FeedDriveEquations::max_drive_states;
   using DriveMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most, most>;
 
   FeedDriveEquations equations;
@@ -61,7 +61,7 @@ struct FeedDriveRealTime::Impl {
   VectorXd rate = y;
   VectorXd rate_by_time = y;
   std::array<VectorXd, stages> k{y, y, y, y};
-  std::array<VectorXd, most_divisions> before{y, y};
+  std::array<VectorXd, max_divisions> before{y, y};
   VectorXd allowed = y;  // error of a step beside its share of the motion
   DriveMatrix jacobian = DriveMatrix::Zero(equations.layout().modes, equations.layout().modes);
   Eigen::PartialPivLU<DriveMatrix> lu{jacobian};
@@ -117,9 +117,9 @@ struct FeedDriveRealTime::Impl {
   }
 
   void advance(double step_s, std::size_t divisions) noexcept {
-    if (divisions < most_divisions) before[divisions] = y;
+    if (divisions < max_divisions) before[divisions] = y;
     substep(step_s);
-    if (divisions == most_divisions || is_good()) {
+    if (divisions == max_divisions || is_good()) {
       since_s += step_s;
       return;
     }
@@ -157,8 +157,8 @@ struct FeedDriveRealTime::Impl {
 
 FeedDriveRealTime::FeedDriveRealTime(FeedDriveParameters parameters, double period_s, int substeps) {
   require_period(period_s);
-  if (substeps < 1 || substeps > most_substeps) {
-    throw Error(ErrorKind::argument, fmt::format("{} substeps in a period, must be 1 ... {}", substeps, most_substeps));
+  if (substeps < 1 || substeps > max_substeps) {
+    throw Error(ErrorKind::argument, fmt::format("{} substeps in a period, must be 1 ... {}", substeps, max_substeps));
   }
   impl_ = std::make_unique<Impl>(std::move(parameters), period_s, substeps);
 }

@@ -24,7 +24,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr long most_steps_per_advance = 1'000'000;
+constexpr long max_steps_per_advance = 1'000'000;
 constexpr double no_stop = std::numeric_limits<double>::max();
 constexpr int recoverable = 1;
 constexpr int unrecoverable = -1;
@@ -224,7 +224,7 @@ void OdeSolver::Impl::open(const VectorXd& y0, double t0, double relative, const
   check(CVodeWFtolerances(memory, &Impl::call_weights), "CVodeWFtolerances");
   check(CVodeSetLinearSolver(memory, linear_solver.get(), matrix.get()), "CVodeSetLinearSolver");
   check(CVodeSetJacFn(memory, &Impl::call_jacobian), "CVodeSetJacFn");
-  check(CVodeSetMaxNumSteps(memory, most_steps_per_advance), "CVodeSetMaxNumSteps");
+  check(CVodeSetMaxNumSteps(memory, max_steps_per_advance), "CVodeSetMaxNumSteps");
 }
 
 OdeSolver::~OdeSolver() = default;

@@ -147,7 +147,7 @@ double cuts_per_hole(const CannedCycle& cycle) noexcept {
   return cuts_in_steps(cycle) ? std::ceil(depth_mm(cycle) / cycle.peck_mm) : 1.0;
 }
 
-double most_moves_per_cut(const CannedCycle& cycle) noexcept {
+double max_moves_per_cut(const CannedCycle& cycle) noexcept {
   // Down and back; G83 goes all the way up, so it has to come down again.
   return !cuts_in_steps(cycle) ? 1.0 : cycle.code == 73 ? 2.0 : 3.0;
 }

@@ -23,10 +23,10 @@ struct CannedCycle {
 /// How often the tool feeds down in one hole: the pecks of G73 and G83, else 1.
 [[nodiscard]] double cuts_per_hole(const CannedCycle& cycle) noexcept;
 
-/// Moves of each of them, the way back included.
-[[nodiscard]] double most_moves_per_cut(const CannedCycle& cycle) noexcept;
+/// Moves of each of them, the return included.
+[[nodiscard]] double max_moves_per_cut(const CannedCycle& cycle) noexcept;
 
-/// Expands one hole into rapid and feed moves along `axis` from `position` (already over the hole), for clock and
+/// Expands one hole into rapid and feed moves along `axis` from `position` (already over the hole), for cycle time and
 /// picture; the text itself stays a cycle. A shallow peck makes for millions
 /// of moves: ask `cuts_per_hole` first. Returns the tool's position after it.
 Vector3 expand_cycle(const CannedCycle& cycle, const Vector3& position, int axis, double feed_mm_per_s,

@@ -16,13 +16,13 @@ inline constexpr double mm_per_inch = 25.4;
 [[nodiscard]] constexpr double unit_mm(int units) noexcept { return units == 20 ? mm_per_inch : 1.0; }
 
 /// Least increment of coordinates in G20 or G21, in inch or mm.
-[[nodiscard]] constexpr double least_increment(const ReaderOptions& options, int units) noexcept {
+[[nodiscard]] constexpr double min_increment(const ReaderOptions& options, int units) noexcept {
   return units == 20 ? options.least_increment_inch : options.least_increment_mm;
 }
 
 /// Digits behind the decimal point that the least increment of G20 or G21 leaves to a coordinate.
 [[nodiscard]] inline int length_decimals(const ReaderOptions& options, int units) noexcept {
-  return static_cast<int>(std::lround(-std::log10(least_increment(options, units))));
+  return static_cast<int>(std::lround(-std::log10(min_increment(options, units))));
 }
 
 /// Whether the blocks of skip switch 1 ... 9 are left out; empty: not known.

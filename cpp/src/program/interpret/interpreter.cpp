@@ -10,7 +10,7 @@
 namespace shapegcode::detail {
 namespace {
 
-constexpr std::size_t most_warnings_of_one_kind = 100;
+constexpr std::size_t max_warnings_of_one_kind = 100;
 // Comments of a shaped program: its header begins so, and each shaped region has the mark before it.
 constexpr std::string_view shaped_header = "(SHAPEGCODE ";
 constexpr std::string_view shaped_mark = "(SHAPED)";
@@ -31,7 +31,7 @@ void Interpreter::warn_at(const LineOrigin& origin, const std::string& message) 
   if (warned.lines.contains({origin.file, origin.line})) {
     return;
   }
-  if (warned.lines.size() >= most_warnings_of_one_kind) {
+  if (warned.lines.size() >= max_warnings_of_one_kind) {
     ++warned.further;
     warned.last = origin;
     return;
@@ -59,7 +59,7 @@ void Interpreter::warn_once(std::uint32_t& seen, const std::string& message) {
 
 double Interpreter::length_mm(const Word& word) const noexcept {
   const bool counts_increments = !word.has_point && !options_.calculator_decimal_point;
-  const double length = counts_increments ? word.value * least_increment(options_, state_.units) : word.value;
+  const double length = counts_increments ? word.value * min_increment(options_, state_.units) : word.value;
   return length * unit_mm(state_.units);
 }
 
@@ -82,13 +82,13 @@ void Interpreter::forget_axes(std::uint32_t letters) noexcept {
   }
 }
 
-void Interpreter::unknown_way(std::uint32_t letters, bool from_unknown) {
+void Interpreter::unknown_move(std::uint32_t letters, bool from_unknown) {
   MachineFunction function;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const bool named = ((letters >> (static_cast<std::size_t>('X' - 'A') + axis)) & 1U) != 0;
-    function.unknown_way[axis] = named && !(from_unknown && state_.known[axis]);
+    function.unknown_move[axis] = named && !(from_unknown && state_.known[axis]);
   }
-  if (std::ranges::find(function.unknown_way, true) != function.unknown_way.end()) {
+  if (std::ranges::find(function.unknown_move, true) != function.unknown_move.end()) {
     close_region();
     add_step(StepKind::function, program_.functions.size());
     program_.functions.push_back(function);

@@ -125,7 +125,7 @@ void Interpreter::reference_code(int g_tenths) {
     refuse_in_cycle(g_tenths);
   }
   one_shot_axes_ = true;
-  unknown_way(words().has_any(axis_letters) ? words().present : axis_letters, false);
+  unknown_move(words().has_any(axis_letters) ? words().present : axis_letters, false);
   if (words().has_any(axis_letters)) {
     forget_axes(words().present);
   } else {
@@ -306,7 +306,7 @@ void Interpreter::foreign_switch(int g_tenths) {
   foreign_ = on ? foreign_ | mode : foreign_ & ~mode;
 }
 
-// G05.1 Q1, G08 P1 and G05 P10000 switch modes on that plan short blocks anew.
+// G05.1 Q1, G08 P1 and G05 P10000 switch modes on that plan short blocks again.
 void Interpreter::look_ahead_switch(int g_tenths) {
   if (g_tenths == 51 && words().has('Q')) {
     look_ahead_ = words()['Q'].value != 0.0;

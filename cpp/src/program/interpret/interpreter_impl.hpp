@@ -125,9 +125,9 @@ class Interpreter {
   [[nodiscard]] bool target(Vector3& end, std::array<bool, 3>& known_after, bool& relative) const noexcept;
   [[nodiscard]] Segment cutting_segment(const Vector3& end) const;
   void forget_axes(std::uint32_t letters) noexcept;
-  /// Notes a rapid of the axes that are named on a way of which start or end is not known, for the clock;
+  /// Notes a rapid of the axes that are named whose start or end is not known, for the cycle time;
   /// `from_unknown`: only of those whose position is not known now.
-  void unknown_way(std::uint32_t letters, bool from_unknown);
+  void unknown_move(std::uint32_t letters, bool from_unknown);
 
   const ReaderOptions& options_;
   Program& program_;

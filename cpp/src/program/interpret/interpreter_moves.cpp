@@ -112,7 +112,7 @@ void Interpreter::rapid() {
   bool relative = false;
   const bool measurable = target(to, known_after, relative);
   if (foreign_ == 0) {
-    unknown_way(words().present, true);
+    unknown_move(words().present, true);
     OtherMove rapid{make_line(measurable ? state_.position_mm : to, to, 0.0, line_number_), 0.0};
     rapid.segment.kind = SegmentKind::rapid;
     add_move(rapid);
@@ -340,7 +340,7 @@ void Interpreter::require_cycle_data() const {
 // Before a single hole is expanded: a thousandth of a millimetre for Q fills the memory.
 void Interpreter::require_room_for_holes(int holes) {
   const double cuts = cuts_per_hole(cycle_);
-  const double moves = holes * cuts * most_moves_per_cut(cycle_);
+  const double moves = holes * cuts * max_moves_per_cut(cycle_);
   const double whole = static_cast<double>(work_.moves()) + moves;
   if (const auto passed = work_.passed(whole)) {
     ended_ = true;

@@ -124,8 +124,8 @@ std::optional<double>* ControlVariables::tool_field(int number, ToolOffset& offs
   }
 }
 
-// What the program itself has said last.
-bool ControlVariables::last_said(int number, MacroValue& value) const {
+// What the program itself has reported last.
+bool ControlVariables::last_reported(int number, MacroValue& value) const {
   const ModalState& state = rewriter_.programmed();
   switch (number >= 4200 && number < 4400 ? 4100 + number % 100 : number) {
     case 4107:
@@ -189,7 +189,7 @@ bool ControlVariables::read(int number, MacroValue& value) {
   if ((number >= 4001 && number <= 4030) || (number >= 4201 && number <= 4230) || (number >= 4301 && number <= 4330)) {
     return modal(number, value);
   }
-  if (last_said(number, value)) {
+  if (last_reported(number, value)) {
     return true;
   }
   const auto written = written_.find(number);

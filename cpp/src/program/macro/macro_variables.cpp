@@ -84,8 +84,8 @@ void MacroVariables::write(int number, MacroValue value, std::uint32_t line, std
   if (number == 0) {
     throw alarm_error(116, "variable #0 is always vacant and cannot be written", line, column);
   }
-  if (MacroValue* place = find(number)) {
-    *place = value;
+  if (MacroValue* found = find(number)) {
+    *found = value;
     if (is_common(number)) {
       common_forgotten_[static_cast<std::size_t>(number - first_common)] = false;
     }

@@ -11,16 +11,16 @@
 namespace shapegcode::detail {
 namespace {
 
-constexpr std::size_t most_alarms = 200;  // collected in one reading
-constexpr std::size_t most_names = 20;    // of programs, in one message
+constexpr std::size_t max_alarms = 200;  // collected in one reading
+constexpr std::size_t max_names = 20;    // of programs, in one message
 
 // "O1, O2, O3"
 std::string program_names(std::span<const std::int64_t> numbers) {
   std::string names;
-  for (const std::int64_t number : numbers.first(std::min(numbers.size(), most_names))) {
+  for (const std::int64_t number : numbers.first(std::min(numbers.size(), max_names))) {
     names += fmt::format("{}O{}", names.empty() ? "" : ", ", number);
   }
-  return numbers.size() > most_names ? fmt::format("{} and {} more", names, numbers.size() - most_names) : names;
+  return numbers.size() > max_names ? fmt::format("{} and {} more", names, numbers.size() - max_names) : names;
 }
 
 std::string line_end_of(const std::string& text) {
@@ -114,7 +114,7 @@ void Reader::load_main() {
   }
 }
 
-// From here on the text is written anew; so far it is as handed over.
+// From here on the text is rewritten; so far it is as handed over.
 void Reader::expand_from(std::size_t begin) {
   if (program_.expanded) {
     return;
@@ -171,10 +171,10 @@ Error Reader::located(const Error& error) const {
 }
 
 std::string Reader::call_stack() const {
-  constexpr std::size_t most_callers = 3;
+  constexpr std::size_t max_callers = 3;
   std::string stack;
   for (std::size_t k = frames_.size(); k-- > 1;) {
-    if (frames_.size() - k > most_callers) {
+    if (frames_.size() - k > max_callers) {
       return fmt::format("{}; and {} more", stack, k);
     }
     const Frame& caller = frames_[k - 1];
@@ -192,7 +192,7 @@ bool Reader::record(const Error& error) {
   }
   const Error at = located(error);
   program_.alarms.push_back({at.line(), at.what(), at.column(), at.alarm(), at.file()});
-  return program_.alarms.size() < most_alarms;
+  return program_.alarms.size() < max_alarms;
 }
 
 Program Reader::run() {
@@ -438,12 +438,12 @@ void Reader::finish() {
   });
   if (!others.empty() && options_.program_index < 0) {
     program_.warnings.push_back({1,
-                                 fmt::format("O{} is played; the file also holds {} (--program picks another)",
+                                 fmt::format("O{} is used; the file also holds {} (--program picks another)",
                                              program_.program_number, program_names(others)),
                                  0, 0, ""});
   }
   // Behind the last alarm that is collected nothing was read: what is missing there may well be there.
-  const bool read_to_the_end = program_.alarms.size() < most_alarms;
+  const bool read_to_the_end = program_.alarms.size() < max_alarms;
   if (!interpreter_.ended() && !framed_ && read_to_the_end) {
     const Error error(ErrorKind::program, "the program has neither '%' lines nor an end M30 or M02: truncated?",
                       last_of_text, 1);

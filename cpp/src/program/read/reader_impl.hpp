@@ -36,7 +36,7 @@ class ControlVariables : public SystemVariables {
 
  private:
   [[nodiscard]] bool modal(int number, MacroValue& value) const;
-  [[nodiscard]] bool last_said(int number, MacroValue& value) const;
+  [[nodiscard]] bool last_reported(int number, MacroValue& value) const;
   [[nodiscard]] bool offset(int number, MacroValue& value) const;
   [[nodiscard]] std::optional<double>* tool_field(int number, ToolOffset& offset, int& tool) const;
   [[nodiscard]] bool work_slot(int number, int& system, int& extra, int& axis) const;

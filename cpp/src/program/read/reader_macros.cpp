@@ -66,7 +66,7 @@ std::array<double, 26> Reader::argument_scale() const {
   std::array<double, 26> scale;
   scale.fill(1.0);
   if (!options_.calculator_decimal_point) {
-    const double increment = least_increment(options_, rewriter_.programmed().units);
+    const double increment = min_increment(options_, rewriter_.programmed().units);
     for (const char letter : {'A', 'B', 'C', 'I', 'J', 'K', 'Q', 'R', 'U', 'V', 'W', 'X', 'Y', 'Z'}) {
       scale[static_cast<std::size_t>(letter - 'A')] = increment;
     }

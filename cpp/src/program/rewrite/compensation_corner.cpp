@@ -88,8 +88,8 @@ Corner inner_corner(const OffsetCurve& before, const OffsetCurve& after, const E
 // The tool changes sides: through the intersection nearest to the corner that leaves both blocks their direction. A
 // line may be prolonged, by no more than the other block is long; an arc ends where it ends.
 Corner crossover(const OffsetCurve& before, const OffsetCurve& after, const Ends& ends) {
-  const auto allowed = [](const Locus& locus, const Curve& curve, const Curve& other, double way) {
-    return locus.circle ? way <= std::abs(curve.sweep_rad) : way <= curve.length_mm && way >= -other.length_mm;
+  const auto allowed = [](const Locus& locus, const Curve& curve, const Curve& other, double along) {
+    return locus.circle ? along <= std::abs(curve.sweep_rad) : along <= curve.length_mm && along >= -other.length_mm;
   };
   Corner best;
   double nearest = 0.0;

@@ -15,7 +15,7 @@ bool CoordinateModes::acts_on(int axis) const noexcept {
   return mixes(axis) || mirror[static_cast<std::size_t>(axis)] || (scaling && scale[axis] != 1.0);
 }
 
-Vector3 CoordinateModes::stretch(const Vector3& programmed) const noexcept {
+Vector3 CoordinateModes::scaled_and_mirrored(const Vector3& programmed) const noexcept {
   Vector3 point = programmed;
   for (int axis = 0; axis < axis_count; ++axis) {
     if (mirror[static_cast<std::size_t>(axis)]) {
@@ -36,10 +36,10 @@ Vector3 CoordinateModes::rotate(const Vector3& point, double sense) const noexce
   const double c = std::cos(rotation_rad);
   // Where the plane is mirrored, clockwise and counter-clockwise change places, for an angle as for an arc.
   const double s = (flips(rotation_normal) ? -sense : sense) * std::sin(rotation_rad);
-  const Eigen::Vector2d way = plane.way(rotation_centre, point);
+  const Eigen::Vector2d arm = plane.offset(rotation_centre, point);
   Vector3 turned = point;
-  turned[plane.a] = rotation_centre[plane.a] + c * way.x() - s * way.y();
-  turned[plane.b] = rotation_centre[plane.b] + s * way.x() + c * way.y();
+  turned[plane.a] = rotation_centre[plane.a] + c * arm.x() - s * arm.y();
+  turned[plane.b] = rotation_centre[plane.b] + s * arm.x() + c * arm.y();
   return turned;
 }
 

@@ -24,10 +24,12 @@ struct CoordinateModes {
   [[nodiscard]] bool acts_on(int axis) const noexcept;
   /// Whether the axis is mixed with another one.
   [[nodiscard]] bool mixes(int axis) const noexcept { return rotation && axis != rotation_normal; }
-  [[nodiscard]] Vector3 apply(const Vector3& programmed) const noexcept { return rotate(stretch(programmed), 1.0); }
+  [[nodiscard]] Vector3 apply(const Vector3& programmed) const noexcept {
+    return rotate(scaled_and_mirrored(programmed), 1.0);
+  }
   [[nodiscard]] Vector3 undo(const Vector3& work) const noexcept;
   /// Mirror and scaling alone.
-  [[nodiscard]] Vector3 stretch(const Vector3& programmed) const noexcept;
+  [[nodiscard]] Vector3 scaled_and_mirrored(const Vector3& programmed) const noexcept;
   /// Factor of a length along an axis, signed, without the rotation.
   [[nodiscard]] double factor(int axis) const noexcept;
   /// Whether the sense of turning in a plane is reversed.

@@ -129,7 +129,7 @@ void MoveRewriter::block(const ParsedBlock& block, const LineOrigin& origin) {
   }
 }
 
-// Each hole gets a block of its own: its place may be anything but a multiple of the first step.
+// Each hole gets a block of its own: its position may be anything but a multiple of the first step.
 void MoveRewriter::drill_holes(Item item) {
   const BlockWords& words = *words_;
   const int repeats = words.has('K')   ? static_cast<int>(words['K'].value)
@@ -141,13 +141,13 @@ void MoveRewriter::drill_holes(Item item) {
     read_cycle(hole, data_only);
     item.head.clear();
     item.tail.clear();
-    const Vector3 place = hole_;
+    const Vector3 programmed_hole = hole_;
     enqueue(std::move(hole));
     synchronise();
-    // Of several holes in G91 each is a step from where the one before should be, not from its rounded place.
+    // Of several holes in G91 each is a step from where the one before should be, not from its rounded position.
     const ArcFrame plane(plane_normal(programmed_.plane));
     for (const int axis : {plane.a, plane.b}) {
-      programmed_point_[axis] = place[axis];
+      programmed_point_[axis] = programmed_hole[axis];
     }
   }
 }
@@ -378,7 +378,7 @@ void MoveRewriter::read_cycle(Item& item, bool data_only) {
     }
     Vector3 point = programmed_point_;
     point[normal] = value;
-    return modes_.stretch(point)[normal];
+    return modes_.scaled_and_mirrored(point)[normal];
   };
   const char depth = static_cast<char>('X' + normal);
   for (const char letter : {depth, 'R'}) {

@@ -29,7 +29,7 @@ class MoveRewriter {
   void pass(const BlockWords& words) noexcept {
     d_number_ = words.has('D') ? static_cast<int>(words['D'].value) : d_number_;
   }
-  /// Writes a comment in its place among the blocks that wait.
+  /// Writes a comment at its position among the blocks that wait.
   void comment(std::string_view text, const LineOrigin& origin);
   /// Writes all that waits: before anything that is more than a block.
   void flush();
@@ -95,7 +95,7 @@ class MoveRewriter {
   Put put_;
 
   ModalState programmed_;                       // position in work coordinates, exact
-  Vector3 hole_ = Vector3::Zero();              ///< place of the last hole, as programmed
+  Vector3 hole_ = Vector3::Zero();              ///< position of the last hole, as programmed
   Vector3 programmed_point_ = Vector3::Zero();  // the same before the coordinate modes
   CoordinateModes modes_;
   bool polar_ = false;

@@ -139,7 +139,7 @@ double travel(const Locus& locus, const Vector2& p, double sense) {
 }
 
 std::optional<Crossing> inner_crossing(const Locus& a, const Locus& b) {
-  const auto in_mm = [](const Locus& locus, double way) { return locus.circle ? way * locus.radius_mm : way; };
+  const auto in_mm = [](const Locus& locus, double along) { return locus.circle ? along * locus.radius_mm : along; };
   std::optional<Crossing> best;
   double shortest = 0.0;
   for (const Vector2& point : intersections(a, b)) {

@@ -148,7 +148,7 @@ void MoveRewriter::set_rotation(int g_tenths) {
       fail(std::string("G68 without ") + letter + " turns about the present position, which is not known");
     }
   }
-  modes_.rotation_centre = modes_.stretch(centre);
+  modes_.rotation_centre = modes_.scaled_and_mirrored(centre);
   modes_.rotation = true;
   modes_.rotation_normal = normal;
   modes_.rotation_rad = programmed_.distance == 91 ? before + angle : angle;

@@ -15,7 +15,7 @@ namespace shapegcode::detail {
 namespace {
 
 // A chord below so many increments is written as a line: rounding could turn the arc into a full circle.
-constexpr double least_chord_increments = 4.0;
+constexpr double min_chord_increments = 4.0;
 
 bool in_plane(const Segment& segment, int normal) noexcept {
   return segment.kind == SegmentKind::arc || ArcFrame(normal).radius(segment.end_mm, segment.start_mm) > 1e-9;
@@ -23,9 +23,7 @@ bool in_plane(const Segment& segment, int normal) noexcept {
 
 }  // namespace
 
-double MoveRewriter::increment_mm(int units) const noexcept {
-  return least_increment(options_, units) * unit_mm(units);
-}
+double MoveRewriter::increment_mm(int units) const noexcept { return min_increment(options_, units) * unit_mm(units); }
 
 void MoveRewriter::append_length(std::string& text, char letter, double value_mm, int units) const {
   text += letter;
@@ -106,7 +104,7 @@ void MoveRewriter::write(const Item& item, const Segment* segment, bool with_wor
     const double chord = (segment->end_mm - segment->start_mm).norm();
     const bool full = std::abs(segment->sweep_rad) > 1.0;
     const bool arc =
-        segment->kind == SegmentKind::arc && (full || chord >= least_chord_increments * increment_mm(item.units));
+        segment->kind == SegmentKind::arc && (full || chord >= min_chord_increments * increment_mm(item.units));
     for (int axis = 0; axis < axis_count; ++axis) {
       const bool asked = with_words && item.axes[static_cast<std::size_t>(axis)] && !span_open_;
       append_axis(axes, item, axis, segment->end_mm[axis], asked || (arc && axis != segment->normal));

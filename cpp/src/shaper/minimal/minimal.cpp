@@ -141,10 +141,10 @@ class TwoModeSearch {
     // by its gradient and a second-order rest.
     for (std::size_t i = 0; i < 2; ++i) {
       const double reach = 2.0 * std::abs(poles_[i]) * half;
-      const double least_abs_sum = v[i].value.cwiseAbs().sum() - 3.0 * reach;
+      const double min_abs_sum = v[i].value.cwiseAbs().sum() - 3.0 * reach;
       const double largest_sum = std::abs(v[i].value.sum()) +
                                  half * (std::abs(v[i].by_t2.sum()) + std::abs(v[i].by_t3.sum())) + 1.5 * reach * reach;
-      if (least_abs_sum > max_abs_sum_ * largest_sum) {
+      if (min_abs_sum > max_abs_sum_ * largest_sum) {
         return true;
       }
     }

@@ -37,7 +37,7 @@ BoxCounts BoxSearch::run() {
       break;
     }
     if (counts_.unresolved == 0) {
-      counts_.settled = high;
+      counts_.decided_up_to = high;
     }
   }
   return counts_;
@@ -168,11 +168,11 @@ bool BoxSearch::bound(const Box& box, const Vector& x, const Square& magnitude, 
       const double rest = 0.5 * speed * speed * std::min(spread, most);
       reach += rest * (magnitude.col(2 * i) + magnitude.col(2 * i + 1));
     }
-    double least_sum = 0.0;
+    double min_sum = 0.0;
     for (int k = 0; k <= n; ++k) {
-      least_sum += std::max(std::abs(x(k)) - reach(k), 0.0);
+      min_sum += std::max(std::abs(x(k)) - reach(k), 0.0);
     }
-    if (least_sum > region_.max_abs_sum) {
+    if (min_sum > region_.max_abs_sum) {
       return false;
     }
     for (int k = 0; k < n; ++k) {

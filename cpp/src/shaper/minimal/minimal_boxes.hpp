@@ -14,11 +14,11 @@
 
 namespace shapegcode::minimal {
 
-/// What the boxes settled.
+/// What the boxes decided.
 struct BoxCounts {
   std::int64_t boxes = 0;       ///< looked at
   std::int64_t unresolved = 0;  ///< too small to halve on, neither empty nor shrunk onto a solution
-  double settled = 0.0;         ///< last phase (rad) up to which every box was settled
+  double decided_up_to = 0.0;   ///< last phase (rad) up to which every box was decided
 };
 
 class BoxSearch {
@@ -26,7 +26,7 @@ class BoxSearch {
   BoxSearch(const System& system, const Region& region, std::int64_t max_boxes, Collection& collection)
       : system_(system), region_(region), max_boxes_(max_boxes), collection_(collection) {}
 
-  /// Slice after slice of the last phase, so that a search that runs out of boxes has settled the short shapers.
+  /// Slice after slice of the last phase, so that a search that runs out of boxes has decided the short shapers.
   [[nodiscard]] BoxCounts run();
 
  private:
@@ -43,7 +43,7 @@ class BoxSearch {
     double high;
     bool moves;  ///< false: the first tap alone, which stays at zero
   };
-  using Clusters = std::array<Cluster, most_modes + 1>;
+  using Clusters = std::array<Cluster, max_modes + 1>;
 
   [[nodiscard]] bool settle(double low, double high);
   void halve(const Box& box);

@@ -28,7 +28,7 @@ constexpr double smallest_gap = 1e-3;   // rad between two taps
 constexpr double phase_step = 0.02;     // rad by which the second mode may turn within a shaper from step to step
 constexpr double smallest_step = 1e-4;  // of the ratio
 constexpr double farthest = 0.1;        // rad from where the curve is expected
-constexpr int most_failures = 3;        // times in turn that not even the smallest step has an answer of Newton
+constexpr int max_failures = 3;         // times in turn that not even the smallest step has an answer of Newton
 
 /// Times of the second and third tap, s.
 using Times = Eigen::Vector2d;
@@ -136,7 +136,7 @@ class Tracer {
       } else if (step > shortest) {
         step *= 0.5;
       } else {  // no answer here: try behind it
-        curve.ended = ++curve.failures > most_failures;
+        curve.ended = ++curve.failures > max_failures;
         reached += longest;
         step = longest;
       }

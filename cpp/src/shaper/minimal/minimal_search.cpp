@@ -20,7 +20,7 @@ namespace {
 
 using detail::refuse;
 using minimal::duration_slack;
-using minimal::most_modes;
+using minimal::max_modes;
 using minimal::most_periods;
 using minimal::same_pole;
 
@@ -48,8 +48,8 @@ void check_apart(std::span<const Mode> modes, const Poles& poles) {
 }
 
 Poles checked_poles(std::span<const Mode> modes, double max_duration_s, const MinimalOptions& options) {
-  if (modes.empty() || modes.size() > most_modes) {
-    refuse("minimal shapers are searched for 1 to {} modes: {} given", most_modes, modes.size());
+  if (modes.empty() || modes.size() > max_modes) {
+    refuse("minimal shapers are searched for 1 to {} modes: {} given", max_modes, modes.size());
   }
   Poles poles;
   for (const Mode& mode : modes) {
@@ -119,7 +119,7 @@ void search(std::span<const Mode> modes, const Poles& poles, const MinimalOption
   result.found_once = starts.found_once;
   result.boxes = boxes.boxes;
   result.unresolved = boxes.unresolved;
-  result.complete_up_to_s = std::min(result.max_duration_s, boxes.settled / omega);
+  result.complete_up_to_s = std::min(result.max_duration_s, boxes.decided_up_to / omega);
 }
 
 /// Shapers with fewer taps serve every mode only by the modes' good fortune; they are among those of all modes but one.

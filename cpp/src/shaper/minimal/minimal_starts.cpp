@@ -92,10 +92,10 @@ class StartSequence {
 
  private:
   void spread(Phases& out) const {
-    constexpr double least_gap = 0.35;  // beside the jitter of up to 1
+    constexpr double min_gap = 0.35;  // beside the jitter of up to 1
     double sum = 0.0;
     for (std::size_t k = 0; k < modes_; ++k) {
-      sum += least_gap + point_[k];
+      sum += min_gap + point_[k];
       out(static_cast<Eigen::Index>(k)) = sum;
     }
     out *= limit_ * std::pow(point_[modes_], 1.0 / static_cast<double>(modes_)) / sum;
@@ -115,8 +115,8 @@ class StartSequence {
 
   std::size_t modes_;
   double limit_;
-  std::array<double, most_modes + 1> step_{};
-  std::array<double, most_modes + 1> point_{};
+  std::array<double, max_modes + 1> step_{};
+  std::array<double, max_modes + 1> point_{};
   int count_ = 0;
 };
 

@@ -93,7 +93,7 @@ bool System::isolated(const Taps& taps) const {
 
 /// A tap before the first one only means that the shaper starts there.
 Taps System::sorted(const Phases& phases, const Vector& x) const {
-  std::array<int, most_modes + 1> order{};  // of the taps; the first one's phase is 0
+  std::array<int, max_modes + 1> order{};  // of the taps; the first one's phase is 0
   const auto phase = [&phases](int tap) { return tap == 0 ? 0.0 : phases(tap - 1); };
   for (int k = 1; k <= modes_; ++k) {
     std::size_t at = static_cast<std::size_t>(k);

@@ -18,8 +18,8 @@
 
 namespace shapegcode::minimal {
 
-using Phases = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, most_modes, 1>;
-using Amplitudes = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, most_modes + 1, 1>;
+using Phases = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, max_modes, 1>;
+using Amplitudes = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, max_modes + 1, 1>;
 
 /// A shaper as the searches see it: its n free times t_2 ... t_{n+1} in radians of the fastest mode, and all n+1
 /// amplitudes.
@@ -31,7 +31,7 @@ struct Taps {
 /// The conditions of n modes on n+1 taps, linearised in the times.
 class System {
  public:
-  /// `poles` in rad/s, 1 to most_modes of them; `omega` (rad/s) is the largest magnitude: the unit of every phase.
+  /// `poles` in rad/s, 1 to max_modes of them; `omega` (rad/s) is the largest magnitude: the unit of every phase.
   System(std::span<const std::complex<double>> poles, double omega);
 
   [[nodiscard]] int modes() const noexcept { return modes_; }
@@ -57,8 +57,8 @@ class System {
   [[nodiscard]] Taps sorted(const Phases& phases, const Vector& x) const;
 
   int modes_;
-  std::array<std::complex<double>, most_modes> poles_;
-  std::array<double, most_modes> speeds_{};
+  std::array<std::complex<double>, max_modes> poles_;
+  std::array<double, max_modes> speeds_{};
 };
 
 }  // namespace shapegcode::minimal

@@ -18,7 +18,7 @@ bool usable_pivot(double size) noexcept { return size > 0.0 && size <= std::nume
 bool invert(Square& matrix) noexcept {
   const auto n = static_cast<std::size_t>(matrix.rows());
   double* const values = matrix.data();
-  std::array<std::size_t, most_unknowns> taken{};
+  std::array<std::size_t, max_unknowns> taken{};
   for (std::size_t k = 0; k < n; ++k) {
     std::size_t pivot = k;
     double largest = std::abs(values[k * n + k]);

@@ -7,11 +7,11 @@
 
 namespace shapegcode::minimal {
 
-inline constexpr int most_modes = 6;
-inline constexpr int most_unknowns = 2 * most_modes + 1;
+inline constexpr int max_modes = 6;
+inline constexpr int max_unknowns = 2 * max_modes + 1;
 
-using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most_unknowns, most_unknowns>;
-using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, most_unknowns, 1>;
+using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, max_unknowns, max_unknowns>;
+using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, max_unknowns, 1>;
 
 /// Replaces a matrix by its inverse; false, and the matrix is of no use, where it is singular or not finite.
 [[nodiscard]] bool invert(Square& matrix) noexcept;

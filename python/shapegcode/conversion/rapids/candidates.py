@@ -41,23 +41,14 @@ _UNCHANGED = (
 
 @dataclass(frozen=True, eq=False)
 class Rapid:
-    """One rapid of a text.
+    """One rapid of a text."""
 
-    Attributes:
-        line: in the text, from 1.
-        start_mm: where it starts, (3,), as far as it is known.
-        end_mm: where it ends, (3,).
-        region: the move as something that can be written; None: it must stay.
-        reason: why it must stay.
-        head: its N word and its comments, empty if it has none.
-    """
-
-    line: int
-    start_mm: Vector
-    end_mm: Vector
-    region: _core.Region | None
-    reason: str
-    head: str
+    line: int  # in the text, from 1
+    start_mm: Vector  # where it starts, (3,), as far as it is known
+    end_mm: Vector  # where it ends, (3,)
+    region: _core.Region | None  # the move as something that can be written; None: it must stay
+    reason: str  # why it must stay
+    head: str  # its N word and its comments, empty if it has none
 
     @property
     def travel_mm(self) -> Vector:
@@ -67,15 +58,10 @@ class Rapid:
 
 @dataclass(frozen=True)
 class Gap:
-    """What happens between two cuts, in order.
+    """What happens between two cuts, in order."""
 
-    Attributes:
-        steps: rapids, and the seconds that anything else lasts.
-        cut_follows: a cut follows, so the vibration must have settled at its end.
-    """
-
-    steps: tuple[Rapid | float, ...]
-    cut_follows: bool
+    steps: tuple[Rapid | float, ...]  # rapids, and the seconds that anything else lasts
+    cut_follows: bool  # a cut follows, so the vibration must have settled at its end
 
     @property
     def rapids(self) -> list[Rapid]:
@@ -140,7 +126,7 @@ class _Reader:
             for kind, index, line in core.steps
             if kind == MOVE and moves[index][1] <= 0.0 and moves[index][0].kind == _core.SegmentKind.rapid
         }
-        # The reader gives no move where it does not know the way.
+        # The reader gives no move where it does not know the path.
         taken = {line for kind, _, line in core.steps if kind == MOVE}
         for region in core.regions:
             taken.update(range(region.first_line, region.last_line + 1))

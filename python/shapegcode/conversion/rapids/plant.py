@@ -16,6 +16,7 @@ from shapegcode.conversion.rapids.candidates import Gap, Rapid
 from shapegcode.conversion.write import EmittedRegion
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import NO_OFFSET
+from shapegcode.verdict.cases import BLOCK_ENDS
 from shapegcode.verdict.figures import RegionVerdict
 
 NO_GAIN = "no time gained"
@@ -119,19 +120,12 @@ Vector = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """One step between two cuts, in time.
+    """One step between two cuts, in time."""
 
-    Attributes:
-        motion_s: until the set-points rest, s.
-        arrival_s: wait for in-position behind them, s.
-        settling_s: from the end of the set-points until the table stays within the band, s.
-        command_mm: set-points, one per period, (n, 3); a pause has one.
-    """
-
-    motion_s: float
-    arrival_s: float
-    settling_s: float
-    command_mm: Vector
+    motion_s: float  # until the set-points rest, s
+    arrival_s: float  # wait for in-position behind them, s
+    settling_s: float  # from the end of the set-points until the table stays within the band, s
+    command_mm: Vector  # set-points, one per period, (n, 3); a pause has one
 
     @property
     def clock_s(self) -> float:
@@ -166,15 +160,11 @@ def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_
 
 
 class RapidPlant:
-    """Rapids as the controller and the modes of a machine make them.
-
-    Args:
-        model: of the machine.
-    """
+    """Rapids as the controller and the modes of a machine make them."""
 
     def __init__(self, model: MachineModel) -> None:
         machine = model.machine
-        self._playing = model
+        self._machine_model = model
         self.model = model.ordinary.model
         self.band_mm = machine.tolerance.residual_floor_um * 1e-3
         self._moving = any(mode.frequency_over is not None for axis in machine.axes.as_tuple() for mode in axis.modes)
@@ -192,7 +182,7 @@ class RapidPlant:
         timing = Timing(
             _core.rapid_time_s(travel, self.model),
             _core.in_position_wait_s(travel, self.model),
-            settling_time_s(samples, self._options(rapid.region), self._playing.slowest_decay_per_s, self.band_mm),
+            self._settling_s(samples, rapid.region),
             samples,
         )
         self._known[key] = timing
@@ -200,21 +190,21 @@ class RapidPlant:
 
     def simulate_original(self, rapid: Rapid) -> _core.PlaybackFigures:
         """The rapid's figures beside which those of the replacement stand."""
-        return self._playing.simulate_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
+        return self._machine_model.simulate_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
 
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
         """The replacement as the text has it: the slower of both rules of block end; `stops_s`: dwells before it."""
         period = self.model.period_s
-        offset = self._playing.offset(region)
+        offset = self._machine_model.offset(region)
         runs = []
-        for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry):
+        for rule in BLOCK_ENDS:
             least = 2 + math.ceil(2.0 * blocks.programmed_time_s / period) + self._filter_periods()
-            figures = self._playing.simulate_emitted(
+            figures = self._machine_model.simulate_emitted(
                 blocks, region.path, rule, contour=False, record_samples=least, offset=offset
             )
             count = round(figures.duration_s / period) + 1
             command = np.array(figures.recorded_command[:count])
-            settling = settling_time_s(command, self._options(region), self._playing.slowest_decay_per_s, self.band_mm)
+            settling = self._settling_s(command, region)
             still = np.repeat(command[:1], round(stops_s / period), axis=0)
             runs.append(
                 Timing(
@@ -241,27 +231,31 @@ class RapidPlant:
             if after_s > self.longest_memory_s:
                 break
             wait = round(step.clock_s / period) + 1 - len(step.command_mm)
-            way = np.concatenate([step.command_mm, np.repeat(step.command_mm[-1:], wait, axis=0)])
-            way = way + (end - way[-1])  # where positions are not known, pieces do not join by themselves
-            parts.append(way[:-1] if parts else way)
-            end = way[0]
+            samples = np.concatenate([step.command_mm, np.repeat(step.command_mm[-1:], wait, axis=0)])
+            samples = samples + (end - samples[-1])  # where positions are not known, pieces do not join by themselves
+            parts.append(samples[:-1] if parts else samples)
+            end = samples[0]
             after_s += step.clock_s
         command = np.concatenate(parts[::-1])
-        settling_s = settling_time_s(command, self._options(region), self._playing.slowest_decay_per_s, self.band_mm)
+        settling_s = self._settling_s(command, region)
         moves = np.flatnonzero(np.abs(np.diff(command, axis=0)).max(axis=1))
         still_s = (len(command) - 1 - (moves[-1] + 1 if len(moves) else 0)) * period
         return clock_s + max(0.0, settling_s - still_s)
 
     def _filter_periods(self) -> int:
-        return math.ceil(self._playing.shaped_filter.duration_s / self.model.period_s) + 1
+        return math.ceil(self._machine_model.shaped_filter.duration_s / self.model.period_s) + 1
 
     def _options(self, region: _core.Region | None) -> _core.PlaybackOptions:
-        return self._playing.options(offset=NO_OFFSET if region is None else self._playing.offset(region))
+        return self._machine_model.options(offset=NO_OFFSET if region is None else self._machine_model.offset(region))
+
+    def _settling_s(self, command_mm: Vector, region: _core.Region | None) -> float:
+        slowest_per_s = self._machine_model.slowest_decay_per_s
+        return settling_time_s(command_mm, self._options(region), slowest_per_s, self.band_mm)
 
     def _arrival_s(self, command: Vector) -> float:
         """Wait for in-position behind a command."""
         model = self.model
-        moved = [bool(way) for way in np.ptp(command, axis=0) > 0.0]
+        moved = [bool(travel) for travel in np.ptp(command, axis=0) > 0.0]
         error = np.zeros(3)
         if model.in_position == _core.InPosition.servo_lag:
             lag = _core.ServoLag(model.position_gain_per_s, model.feed_forward_ratio, model.period_s)

@@ -41,21 +41,13 @@ _STOP, _STOP_S = "G04P1", 0.001  # what comes before has stopped, as it has befo
 
 @dataclass(frozen=True)
 class ShapedRapids:
-    """A text with shaped rapids.
+    """A text with shaped rapids."""
 
-    Attributes:
-        emitted: the whole program, read back.
-        placed: the cutting regions and their places in it.
-        outcome: what became of the rapids.
-        warnings: what is different where they became cutting moves.
-        extra_s: what the replacements add to the cycle time (settling not counted), s.
-    """
-
-    emitted: Program
-    placed: list[Placed]
-    outcome: RapidsOutcome
-    warnings: list[str]
-    extra_s: float
+    emitted: Program  # the whole program, read back
+    placed: list[Placed]  # the cutting regions and their places in it
+    outcome: RapidsOutcome  # what became of the rapids
+    warnings: list[str]  # what is different where they became cutting moves
+    extra_s: float  # what the replacements add to the cycle time (settling not counted), s
 
 
 def shape_rapids(
@@ -76,7 +68,7 @@ def shape_rapids(
 
 
 class _RapidShaper:
-    """The rapids of one emitted text on their way to shaped moves."""
+    """Replaces the rapids of one emitted program by shaped moves."""
 
     def __init__(
         self,

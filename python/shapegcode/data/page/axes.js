@@ -28,13 +28,13 @@ function drawBorders(context, camera, colour, ground) {
   for (const value of ticksOf(x(50), x(wide - 20), wide)) {
     const at = middle[0] + (value - camera.centre[0]) * camera.scale;
     context.fillRect(at, tall - 22, 1, 5);
-    context.fillText(said(value), at, tall - 6);
+    context.fillText(rounded(value), at, tall - 6);
   }
   context.textAlign = "left";
   for (const value of ticksOf(y(tall - 40), y(20), tall)) {
     const at = middle[1] - (value - camera.centre[1]) * camera.scale;
     context.fillRect(0, at, 5, 1);
-    context.fillText(said(value), 8, at + 4);
+    context.fillText(rounded(value), 8, at + 4);
   }
   context.fillText("Y mm", 8, 14);
   context.textAlign = "right";
@@ -70,9 +70,9 @@ function drawEdges(context, camera, low, high) {
     const outside = ([x, y], away) => [x + side * across[0] * away, y + side * across[1] * away + 4];
     context.textAlign = "center";
     for (const value of ticksOf(low[axis], high[axis], length)) {
-      const place = edge.at(value);
-      context.fillRect(place[0] - 1.5, place[1] - 1.5, 3, 3);
-      context.fillText(said(value), ...outside(place, 15));
+      const point = edge.at(value);
+      context.fillRect(point[0] - 1.5, point[1] - 1.5, 3, 3);
+      context.fillText(rounded(value), ...outside(point, 15));
     }
     context.fillText(`${"XYZ"[axis]} mm`, ...outside(centre, 48));
   }
@@ -84,7 +84,7 @@ function drawScales(context, camera, magnify, colour, ground) {
   const right = camera.size[0] - 10;
   const bar = (unit, perUnit, y) => {
     const value = roundBelow(Math.max(110 / perUnit, 1e-9));
-    const text = `${said(value)} ${unit}`;
+    const text = `${rounded(value)} ${unit}`;
     const wide = Math.max(context.measureText(text).width, value * perUnit);
     context.fillStyle = ground;
     context.fillRect(right - wide - 5, y - 17, wide + 10, 23);

@@ -19,7 +19,7 @@ async function loadPlotly(name) {
   if (!window.Plotly) throw new Error("The script of the curves does not run in this browser.");
 }
 
-/** Of a stretch of a curve the least and the largest value in each of many buckets: looks the same, draws fast. */
+/** The smallest and the largest value of a section of a curve in each of many buckets: looks the same, draws fast. */
 function thinned(motion, column, low, high) {
   const from = Math.max(lastNotAbove(motion.sample, low / motion.period), 0);
   const to = Math.min(lastNotAbove(motion.sample, high / motion.period) + 1, motion.count - 1);
@@ -98,10 +98,10 @@ class Charts {
 
   /** Rows from top to bottom: what colours the path, then the axes that move. */
   #rows() {
-    const said = this.scene.channels[this.channel];
-    const named = said ? wrapped(`${said.label} ${said.unit}`) : "";
-    const rows = said ? [{ title: named, name: said.label, of: (motion) => motion.channels[this.channel] }] : [];
-    const table = this.kind === "position" ? "place" : "off";
+    const channel = this.scene.channels[this.channel];
+    const named = channel ? wrapped(`${channel.label} ${channel.unit}`) : "";
+    const rows = channel ? [{ title: named, name: channel.label, of: (motion) => motion.channels[this.channel] }] : [];
+    const table = this.kind === "position" ? "position" : "off";
     const unit = this.kind === "position" ? "mm" : "µm";
     for (let k = 0; k < 3; k++) {
       const columns = this.scene.motions.map((motion) => motion[table][k]);

@@ -13,34 +13,34 @@ async function unzipped(base64) {
 }
 
 /** A column: differences modulo 65536 of ranks between two limits, or 32-bit differences. */
-function columnOf(buffer, said) {
-  if (said.kind === "i4d") {
-    const steps = new Int32Array(buffer, said.at, said.count);
-    const found = new Int32Array(said.count);
-    for (let i = 0, sum = 0; i < said.count; i++) found[i] = sum += steps[i];
+function columnOf(buffer, entry) {
+  if (entry.kind === "i4d") {
+    const steps = new Int32Array(buffer, entry.at, entry.count);
+    const found = new Int32Array(entry.count);
+    for (let i = 0, sum = 0; i < entry.count; i++) found[i] = sum += steps[i];
     return found;
   }
-  const steps = new Uint16Array(buffer, said.at, said.count);
-  const found = new Float32Array(said.count);
-  const scale = (said.high - said.low) / 65535;
-  for (let i = 0, rank = 0; i < said.count; i++) {
+  const steps = new Uint16Array(buffer, entry.at, entry.count);
+  const found = new Float32Array(entry.count);
+  const scale = (entry.high - entry.low) / 65535;
+  for (let i = 0, rank = 0; i < entry.count; i++) {
     rank = (rank + steps[i]) & 65535;
-    found[i] = said.low + rank * scale;
+    found[i] = entry.low + rank * scale;
   }
   return found;
 }
 
 /** A program in time: columns, texts, and where its lines and blocks begin. */
 class Motion {
-  constructor(buffer, said, period, channels) {
-    Object.assign(this, { key: said.key, label: said.label, file: said.file, samples: said.samples, period, cuts: said.cuts });
-    const column = (name) => columnOf(buffer, said.columns[name]);
+  constructor(buffer, entry, period, channels) {
+    Object.assign(this, { key: entry.key, label: entry.label, file: entry.file, samples: entry.samples, period, cuts: entry.cuts });
+    const column = (name) => columnOf(buffer, entry.columns[name]);
     [this.sample, this.line, this.block] = ["sample", "line", "block"].map(column);
-    this.place = ["x", "y", "z"].map(column);
+    this.position = ["x", "y", "z"].map(column);
     this.off = ["dx", "dy", "dz"].map(column);
-    const named = channels.filter((name) => said.columns[name]);
+    const named = channels.filter((name) => entry.columns[name]);
     this.channels = Object.fromEntries(named.map((name) => [name, column(name)]));
-    const bytes = new Uint8Array(buffer, said.text.at, said.text.count);
+    const bytes = new Uint8Array(buffer, entry.text.at, entry.text.count);
     this.lines = new TextDecoder().decode(bytes).replace(/\r/g, "").replace(/\n$/, "").split("\n");
     this.count = this.sample.length;
     this.duration = this.count ? this.sample[this.count - 1] * period : 0;
@@ -76,7 +76,7 @@ class Motion {
   }
 
   #lengths() {
-    const [x, y, z] = this.place;
+    const [x, y, z] = this.position;
     const length = new Float64Array(this.count);
     for (let i = 1; i < this.count; i++) {
       length[i] = length[i - 1] + Math.hypot(x[i] - x[i - 1], y[i] - y[i - 1], z[i] - z[i - 1]);
@@ -124,28 +124,28 @@ function lastNotAbove(column, value) {
   return low - 1;
 }
 
-/** Where two programs are at the same place: by lines that stand for each other, and by the length of way in them. */
+/** Where two programs are at the same position: by lines that stand for each other, and by the path length in them. */
 class Links {
   constructor(rows, original, emitted) {
     Object.assign(this, { rows, original, emitted });
   }
 
-  /** The stretch that a line of a program belongs to, as lines of it and of the other one. */
-  stretch(from, line) {
-    const made = from === this.emitted;
+  /** The section that a line of a program belongs to, as lines of it and of the other one. */
+  section(from, line) {
+    const isEmitted = from === this.emitted;
     let before = [0, 0];
     for (const [e0, e1, o0, o1] of this.rows) {
-      const [a0, a1, b0, b1] = made ? [e0, e1, o0, o1] : [o0, o1, e0, e1];
-      if (line < a0) return { kept: true, lines: [before[0], a0], other: [before[1], b0] };
-      if (line <= a1) return { kept: false, lines: [a0, a1], other: [b0, b1] };
+      const [a0, a1, b0, b1] = isEmitted ? [e0, e1, o0, o1] : [o0, o1, e0, e1];
+      if (line < a0) return { unchanged: true, lines: [before[0], a0], other: [before[1], b0] };
+      if (line <= a1) return { unchanged: false, lines: [a0, a1], other: [b0, b1] };
       before = [a1, b1];
     }
     const ends = [from, from === this.original ? this.emitted : this.original].map((one) => one.lines.length + 1);
-    return { kept: true, lines: [before[0], ends[0]], other: [before[1], ends[1]] };
+    return { unchanged: true, lines: [before[0], ends[0]], other: [before[1], ends[1]] };
   }
 
-  /** The same line in the other program, where text was kept between what was shaped; lines may have been put in. */
-  keptLine(from, line, { lines, other }) {
+  /** The same line in the other program, where both are unchanged; lines may have been put in. */
+  unchangedLine(from, line, { lines, other }) {
     const to = from === this.original ? this.emitted : this.original;
     const text = from.lines[line - 1];
     const inside = (one) => one > other[0] && one < other[1];
@@ -162,13 +162,13 @@ class Links {
   time(from, time) {
     const other = from === this.original ? this.emitted : this.original;
     const here = from.at(time);
-    const stretch = this.stretch(from, from.line[here.i]);
-    if (stretch.kept) {
+    const section = this.section(from, from.line[here.i]);
+    if (section.unchanged) {
       const line = from.line[here.i];
-      const begun = time - from.timeOfLine(line, time);
-      return Math.min(other.timeOfLine(this.keptLine(from, line, stretch), time) + begun, other.duration);
+      const elapsed = time - from.timeOfLine(line, time);
+      return Math.min(other.timeOfLine(this.unchangedLine(from, line, section), time) + elapsed, other.duration);
     }
-    const [a, b] = [from, other].map((one, rank) => this.#samples(one, rank ? stretch.other : stretch.lines));
+    const [a, b] = [from, other].map((one, rank) => this.#samples(one, rank ? section.other : section.lines));
     const part = (from.value(from.length, here) - from.length[a[0]]) / (from.length[a[1]] - from.length[a[0]] || 1);
     const wanted = other.length[b[0]] + part * (other.length[b[1]] - other.length[b[0]]);
     return this.#nearest(from, here, other, wanted, b, time);
@@ -181,21 +181,21 @@ class Links {
     return [begin, Math.max(end, begin)];
   }
 
-  /** Shaped corners are shorter: near the wanted length, the place that is nearest. */
+  /** Shaped corners are shorter: near the wanted length, the position that is nearest. */
   #nearest(from, here, other, wanted, [begin, end]) {
-    const p = from.place.map((column) => from.value(column, here));
+    const p = from.position.map((column) => from.value(column, here));
     const reach = Math.max(0.002 * (other.length[end] - other.length[begin]), 1);
     let best = { far: Infinity, time: other.timeOf(begin) };
     let i = Math.max(lastNotAbove(other.length, wanted - reach), begin);
     for (; i < end && other.length[i] <= wanted + reach; i++) {
       let dot = 0, square = 0;
       for (let k = 0; k < 3; k++) {
-        const step = other.place[k][i + 1] - other.place[k][i];
-        dot += step * (p[k] - other.place[k][i]);
+        const step = other.position[k][i + 1] - other.position[k][i];
+        dot += step * (p[k] - other.position[k][i]);
         square += step * step;
       }
       const share = square ? Math.min(Math.max(dot / square, 0), 1) : 0;
-      const far = Math.hypot(...other.place.map((c, k) => c[i] + share * (c[i + 1] - c[i]) - p[k])) +
+      const far = Math.hypot(...other.position.map((c, k) => c[i] + share * (c[i + 1] - c[i]) - p[k])) +
         1e-4 * Math.abs(other.length[i] - wanted);
       if (far < best.far) best = { far, time: other.timeOf(i, share) };
     }
@@ -208,7 +208,7 @@ async function readScene() {
   const head = dataOf("scene-head");
   const buffer = await unzipped(byId("scene-data").textContent);
   const names = Object.keys(head.channels);
-  const motions = head.variants.map((said) => new Motion(buffer, said, head.period_s, names));
+  const motions = head.variants.map((entry) => new Motion(buffer, entry, head.period_s, names));
   const spectra = head.spectra.map((one) => ({
     ...one, frequency: columnOf(buffer, one.frequency_hz), amplitude: columnOf(buffer, one.amplitude),
   }));

@@ -35,7 +35,7 @@ class PixelPainter {
   /** Pixels and depths of all corners of a line. */
   #project({ motion, count, seen }, magnify) {
     const rows = this.camera.rows(this.camera.scale * this.ratio);
-    const [x0, y0, z0] = this.camera.centre, [px, py, pz] = motion.place, [ox, oy, oz] = motion.off;
+    const [x0, y0, z0] = this.camera.centre, [px, py, pz] = motion.position, [ox, oy, oz] = motion.off;
     const [a, b, c] = rows[0], [d, e, f] = rows[1], [g, h, k] = rows[2];
     const right = this.image.width / 2 + this.camera.pan[0] * this.ratio;
     const down = this.image.height / 2 - this.camera.pan[1] * this.ratio;
@@ -73,18 +73,18 @@ class PixelPainter {
       if (from > to) continue;
       const steps = Math.ceil(Math.max(Math.abs(dx), Math.abs(dy)) * (to - from)) || 1;
       const part = (to - from) / steps;
-      // Two pixels wide, across the way.
+      // Two pixels wide, across the path.
       const beside = Math.abs(dx) > Math.abs(dy) ? width : 1;
       let x = x0 + dx * from, y = y0 + dy * from, z = z0 + dz * from;
       const [sx, sy, sz] = [dx * part, dy * part, dz * part];
       const v0 = 255 * values[i - 1], dv = 255 * (values[i] - values[i - 1]);
       for (let step = 0; step <= steps; step++) {
-        const place = (y | 0) * width + (x | 0);
-        if (z >= depths[place]) {
+        const pixel = (y | 0) * width + (x | 0);
+        if (z >= depths[pixel]) {
           const word = flat || ramp[(v0 + dv * (from + part * step)) | 0];
-          depths[place] = z;
-          words[place] = word;
-          words[place + beside] = word;
+          depths[pixel] = z;
+          words[pixel] = word;
+          words[pixel + beside] = word;
         }
         x += sx;
         y += sy;

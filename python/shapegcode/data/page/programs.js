@@ -5,7 +5,7 @@ const LINE_PIXELS = 20;
 class ProgramList {
   /** `onPick(motion, line)` is called when somebody chooses a line. */
   constructor(host, motion, onPick) {
-    Object.assign(this, { motion, onPick, line: 0, stretch: null });
+    Object.assign(this, { motion, onPick, line: 0, section: null });
     this.box = document.createElement("div");
     this.box.className = "program";
     this.box.dataset.program = motion.key;
@@ -44,11 +44,11 @@ class ProgramList {
     this.onPick(this.motion, Math.min(Math.max(this.line + steps[event.key], 1), last));
   }
 
-  /** Mark a line, and the lines that stand for the same stretch. */
-  mark(line, stretch, note) {
+  /** Mark a line, and the lines that stand for the same section. */
+  mark(line, section, note) {
     this.note.textContent = note;
-    if (line === this.line && stretch?.[0] === this.stretch?.[0]) return;
-    Object.assign(this, { line, stretch });
+    if (line === this.line && section?.[0] === this.section?.[0]) return;
+    Object.assign(this, { line, section });
     this.reveal();
   }
 
@@ -65,7 +65,7 @@ class ProgramList {
   render() {
     const first = Math.max(Math.floor(this.list.scrollTop / LINE_PIXELS) - 4, 0);
     const last = Math.min(first + Math.ceil(this.list.clientHeight / LINE_PIXELS) + 8, this.motion.lines.length);
-    const [begin, end] = this.stretch ?? [Infinity, 0];
+    const [begin, end] = this.section ?? [Infinity, 0];
     const rows = [];
     for (let rank = first; rank < last; rank++) {
       const row = document.createElement("div");
@@ -74,7 +74,7 @@ class ProgramList {
       row.dataset.line = rank + 1;
       row.setAttribute("role", "option");
       row.setAttribute("aria-selected", rank + 1 === this.line);
-      row.classList.toggle("of-stretch", rank + 1 >= begin && rank + 1 <= end);
+      row.classList.toggle("of-section", rank + 1 >= begin && rank + 1 <= end);
       row.style.top = `${rank * LINE_PIXELS}px`;
       const count = document.createElement("span");
       count.className = "count";

@@ -105,9 +105,9 @@ class ScenePage {
 
   magnify() {
     this.stage.magnify = MAGNIFY[byId("magnify").value];
-    const said = `×${this.stage.magnify}`;
-    byId("magnify-said").textContent = said;
-    byId("magnify").setAttribute("aria-valuetext", said);
+    const magnification = `×${this.stage.magnify}`;
+    byId("magnify-said").textContent = magnification;
+    byId("magnify").setAttribute("aria-valuetext", magnification);
     this.stage.draw();
   }
 
@@ -143,14 +143,14 @@ class ScenePage {
   #legend() {
     const legend = byId("colours");
     const span = (text, kind, style = "") => {
-      const made = Object.assign(document.createElement("span"), { textContent: text, className: kind });
-      made.style.background = style;
-      return made;
+      const span = Object.assign(document.createElement("span"), { textContent: text, className: kind });
+      span.style.background = style;
+      return span;
     };
     if (this.stage.flat) {
       legend.replaceChildren(...this.shown.flatMap((motion) => [
         span("", "sample", PROGRAM_COLOURS[this.motions.indexOf(motion)]), span(motion.label, "")]));
-      byId("colour-how").textContent = "Each program has its colour; the markers stand at the same place of the part.";
+      byId("colour-how").textContent = "Each program has its colour; the markers stand at the same position on the part.";
       return;
     }
     const { label, unit, how } = this.scene.channels[this.colour];
@@ -162,7 +162,7 @@ class ScenePage {
     byId("colour-how").textContent = how;
   }
 
-  /** Go to a time of a program; the others go to the same place. */
+  /** Go to a time of a program; the others go to the same position. */
   seek(motion, time, line = null) {
     const links = this.scene.links;
     const timeOf = (one) => (one === motion || !links ? time : links.time(motion, time));
@@ -180,13 +180,13 @@ class ScenePage {
   #mark(motion, line) {
     const list = this.lists[this.motions.indexOf(motion)];
     const links = this.scene.links;
-    const stretch = links?.stretch(motion, line);
+    const section = links?.section(motion, line);
     let note = `line ${line} of ${motion.lines.length}`;
-    if (stretch && !stretch.kept) {
+    if (section && !section.unchanged) {
       const other = motion === links.emitted ? "the original" : "what was emitted";
-      note += `; lines ${stretch.lines.join("–")} stand for lines ${stretch.other.join("–")} of ${other}`;
-    } else if (stretch) note += "; kept as it was";
-    list.mark(line, stretch && !stretch.kept ? stretch.lines : null, note);
+      note += `; lines ${section.lines.join("–")} stand for lines ${section.other.join("–")} of ${other}`;
+    } else if (section) note += "; left unchanged";
+    list.mark(line, section && !section.unchanged ? section.lines : null, note);
   }
 
   #read() {
@@ -200,21 +200,21 @@ class ScenePage {
       ...Object.values(this.scene.channels).map(({ label, unit }) => `${label} ${unit}`)];
     const rows = this.stage.marks.filter(({ motion }) => this.shown.includes(motion)).map(({ motion, here: at }) => [
       motion.label, motion.timeOf(at.i, at.share).toFixed(3), motion.line[at.i], motion.block[at.i] + 1,
-      ...motion.place.map((column) => motion.value(column, at).toFixed(3)),
+      ...motion.position.map((column) => motion.value(column, at).toFixed(3)),
       ...Object.keys(this.scene.channels).map((name) => {
         const column = motion.channels[name];
         return column ? Number(motion.value(column, at).toPrecision(4)) : "";
       })]);
     const cells = (row, kind) => {
-      const made = document.createElement("tr");
-      made.append(...row.map((text, k) => {
+      const lineRow = document.createElement("tr");
+      lineRow.append(...row.map((text, k) => {
         const cell = document.createElement(kind === "th" && text !== "" ? "th" : k ? "td" : "th");
         if (cell.tagName === "TH") cell.scope = kind === "th" ? "col" : "row";
         cell.textContent = text;
         cell.className = "figure";
         return cell;
       }));
-      return made;
+      return lineRow;
     };
     if (head[0] === "") head[0] = "program";
     byId("reading").replaceChildren(cells(head, "th"), ...rows.map((row) => cells(row, "td")));
@@ -237,15 +237,15 @@ class ScenePage {
     if (this.time >= this.chief.duration) this.seek(this.chief, 0);
     this.playing = true;
     let last = performance.now();
-    const tick = (now) => {
+    const frame = (now) => {
       if (!this.playing) return;
       this.seek(this.chief, this.time + ((now - last) / 1e3) * Number(byId("pace").value));
       last = now;
-      if (this.time >= this.chief.duration) this.stop(); else requestAnimationFrame(tick);
+      if (this.time >= this.chief.duration) this.stop(); else requestAnimationFrame(frame);
     };
     byId("play").textContent = "❚❚ Pause";
     byId("play").setAttribute("aria-pressed", true);
-    requestAnimationFrame((now) => { last = now; tick(now); });
+    requestAnimationFrame((now) => { last = now; frame(now); });
   }
 
   stop() {

@@ -6,7 +6,7 @@ function roundBelow(value) {
   return power * ([5, 2, 1].find((k) => k * power <= value * (1 + 1e-9)) ?? 1);
 }
 
-const said = (value) => String(Number(value.toPrecision(6)));
+const rounded = (value) => String(Number(value.toPrecision(6)));
 
 /** Lines in up to 48 colours on a canvas, smooth, for paper. */
 function paintPath(context, motion, project, magnify, values, ramp, flat) {
@@ -14,11 +14,11 @@ function paintPath(context, motion, project, magnify, values, ramp, flat) {
   const paths = Array.from({ length: bins }, () => new Path2D());
   let [bin, last] = [-1, null];
   for (let i = 0; i < motion.count; i++) {
-    const place = project(...motion.place.map((column, k) => column[i] + 1e-3 * magnify * motion.off[k][i]));
+    const point = project(...motion.position.map((column, k) => column[i] + 1e-3 * magnify * motion.off[k][i]));
     const mine = flat ? 0 : Math.min(Math.floor(values[i] * bins), bins - 1);
     if (last && mine !== bin) paths[mine].moveTo(...last);
-    if (last) paths[mine].lineTo(...place); else paths[mine].moveTo(...place);
-    [bin, last] = [mine, place];
+    if (last) paths[mine].lineTo(...point); else paths[mine].moveTo(...point);
+    [bin, last] = [mine, point];
   }
   paths.forEach((path, k) => {
     const at = 4 * Math.round((255 * (k + 0.5)) / bins);
@@ -33,7 +33,7 @@ class Stage {
     Object.assign(this, { host, motions, onPick, magnify: 1, shown: motions, marks: [], flat: false });
     const ends = [0, 1, 2].map((k) => motions.flatMap((one) => {
       let [low, high] = [Infinity, -Infinity];
-      for (const value of one.place[k]) [low, high] = [Math.min(low, value), Math.max(high, value)];
+      for (const value of one.position[k]) [low, high] = [Math.min(low, value), Math.max(high, value)];
       return [low, high];
     }));
     [this.low, this.high] = [ends.map((both) => Math.min(...both)), ends.map((both) => Math.max(...both))];
@@ -118,7 +118,7 @@ class Stage {
   }
 
   #mark(context, project, { motion, here, chief }) {
-    const drawn = (i, share = 0) => project(...motion.place.map((column, k) => motion.value(column, { i, share }) +
+    const shownAt = (i, share = 0) => project(...motion.position.map((column, k) => motion.value(column, { i, share }) +
       1e-3 * this.magnify * motion.value(motion.off[k], { i, share })));
     context.lineWidth = 3;
     context.strokeStyle = "#ffffff";
@@ -126,11 +126,11 @@ class Stage {
     let [begin, end] = [here.i, here.i];
     while (begin > 0 && motion.block[begin - 1] === motion.block[here.i] && here.i - begin < 5000) begin--;
     while (end < motion.count - 1 && motion.block[end] === motion.block[here.i] && end - here.i < 5000) end++;
-    context.moveTo(...drawn(begin));
-    for (let i = begin + 1; i <= end; i++) context.lineTo(...drawn(i));
+    context.moveTo(...shownAt(begin));
+    for (let i = begin + 1; i <= end; i++) context.lineTo(...shownAt(i));
     context.stroke();
     context.beginPath();
-    context.arc(...drawn(here.i, here.share), chief ? 6.5 : 5, 0, 7);
+    context.arc(...shownAt(here.i, here.share), chief ? 6.5 : 5, 0, 7);
     context.fillStyle = this.motions.length > 1 ? PROGRAM_COLOURS[this.motions.indexOf(motion)] : "#ffffff";
     context.fill();
     context.lineWidth = 2;
@@ -139,16 +139,16 @@ class Stage {
 
   /** Where a marker is on the canvas, in pixels. */
   placeOf(motion, here) {
-    return this.camera.projector()(...motion.place.map((column, k) =>
+    return this.camera.projector()(...motion.position.map((column, k) =>
       motion.value(column, here) + 1e-3 * this.magnify * motion.value(motion.off[k], here)));
   }
 
-  /** The place on a path that is nearest to a pixel, where one is near enough. */
+  /** The point on a path that is nearest to a pixel, where one is near enough. */
   pick(x, y, reach = 24) {
     let best = { far: reach };
     const project = this.camera.projector();
     for (const motion of this.shown) {
-      const [px, py, pz] = motion.place, [ox, oy, oz] = motion.off, m = 1e-3 * this.magnify;
+      const [px, py, pz] = motion.position, [ox, oy, oz] = motion.off, m = 1e-3 * this.magnify;
       let [ax, ay] = [Infinity, Infinity];
       for (let i = 0; i < motion.count; i++) {
         const [bx, by] = project(px[i] + m * ox[i], py[i] + m * oy[i], pz[i] + m * oz[i]);

@@ -1,5 +1,5 @@
 // Before the other scripts, in words that every browser knows. Until they have run, long tables are short: what is taken
-// out again need not be laid out. Where they do not run, everything is shown, and it is said.
+// out again need not be laid out. Where they do not run, everything is shown, with a note.
 document.documentElement.className = "starting";
 window.addEventListener("error", function (event) {
   document.documentElement.className = document.documentElement.className.replace("starting", "");

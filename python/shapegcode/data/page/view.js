@@ -1,6 +1,6 @@
 // Where one looks from, and the colours of amounts.
 
-// Dark to bright, so that amounts can be told apart without seeing hues; on a ground that is always dark.
+// Dark to bright, so that amounts can be distinguished without seeing hues; on a ground that is always dark.
 const RAMP = ["#7f88f0", "#5f9fe0", "#45b0c8", "#3fbfa5", "#4dcb82", "#85d65a", "#b5df3c", "#dce52e", "#fdee60"];
 const RAMP_ON_PAPER = [
   "#1d2b6f", "#2b4f96", "#1f6f9c", "#158491", "#1e967c", "#4a9e52", "#7d9a1c", "#a98a00", "#c07000",
@@ -71,9 +71,9 @@ class Camera {
     this.pan = [this.pan[0] + dx, this.pan[1] - dy];
   }
 
-  /** Nearer by a factor; what is at a place on the canvas stays there. */
-  zoom(factor, place = [this.size[0] / 2, this.size[1] / 2]) {
-    const from = [place[0] - this.size[0] / 2, this.size[1] / 2 - place[1]];
+  /** Nearer by a factor; the point at `point` on the canvas stays there. */
+  zoom(factor, point = [this.size[0] / 2, this.size[1] / 2]) {
+    const from = [point[0] - this.size[0] / 2, this.size[1] / 2 - point[1]];
     this.pan = this.pan.map((pan, k) => from[k] + (pan - from[k]) * factor);
     this.scale *= factor;
   }

@@ -71,10 +71,10 @@ def next_steps(result: Outcome, *further: NextStep) -> Section:
     """What to do next."""
     text = result.next_step
     is_command = text.startswith("shapegcode ")
-    said = text if is_command else text[:1].upper() + text[1:]
+    sentence = text if is_command else text[:1].upper() + text[1:]
     command = text if _is_typed(text) else next(iter(re.findall(r"`(shapegcode [^`]+)`", text)), "")
-    said = "Then:" if command == text else said
-    return Section("next", "What to do next", (NextSteps((NextStep(said, command), *further)),))
+    sentence = "Then:" if command == text else sentence
+    return Section("next", "What to do next", (NextSteps((NextStep(sentence, command), *further)),))
 
 
 def _is_typed(text: str) -> bool:
@@ -101,7 +101,7 @@ def _tables(tables: Sequence[Table]) -> Iterator[Section]:
 
 def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Section]:
     """The pictures, each with a line that says how to read it."""
-    pictures = [Picture(name, plot, how_to_read(name)) for name, plot in result.plots().items()]
+    pictures = [Picture(name, plot, HOW.get(name, UNKNOWN)) for name, plot in result.plots().items()]
     chosen = [each for each in pictures if each.name in printed] or pictures[:_PRINTED_PICTURES]
     if chosen:
         yield Section("pictures", "Pictures", tuple(chosen))
@@ -110,11 +110,6 @@ def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Sectio
     if result.from_json:
         left_out = "Pictures that need the samples of the run are not here: the JSON does not hold them."
         yield Section("no-pictures", "Pictures that are not here", (Text((left_out,)),), printed=False)
-
-
-def how_to_read(name: str) -> str:
-    """How to read a picture."""
-    return HOW.get(name, UNKNOWN)
 
 
 def made_section(made: Made) -> Section:
@@ -238,7 +233,7 @@ HOW: Mapping[str, str] = {
     "identify-traces": "Hammer and response over time; the model should lie on the measurement until both are noise.",
     "identify-decay": "Envelopes of the modes while they die out: a straight line is one mode with constant damping.",
     "identify-spectrum": "Amplitude over frequency: a peak with a label was taken as a mode.",
-    "testcut-forces": "Measured forces beside those of the fitted model, over the way of the tool.",
+    "testcut-forces": "Measured forces beside those of the fitted model, over the travel of the tool.",
     "testcut-coefficients": "Each coefficient with its interval: one that reaches zero is not determined by the cut.",
     "testcut-corner": "Measured load at the corner beside the predicted one.",
     "testcut-interval": "Measured times between feeds beside the fitted ones.",
@@ -260,6 +255,6 @@ HOW: Mapping[str, str] = {
     "paper002-figure8-stage-short": "The stage of the paper, a short move: oscillation after it is residual vibration.",
     "paper002-figure9-stage-long": "The stage of the paper, a long move: oscillation after it is residual vibration.",
     "paper003-figures2-3-acceleration": "Acceleration after a tap, measured and of the fitted modes.",
-    "paper003-deflection": "The way that belongs to the acceleration: what the tool's tip does.",
+    "paper003-deflection": "The displacement that belongs to the acceleration: what the tool's tip does.",
 }
 """By the names that `plots()` has."""

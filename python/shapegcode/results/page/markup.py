@@ -118,9 +118,9 @@ def _card(figure: Figure) -> str:
     if figure.limit is not None:
         within = abs(figure.after) <= figure.limit
         kind = "within" if within else "over"
-        said = "✓ within" if within else "▲ over"
+        word = "✓ within" if within else "▲ over"
         limit = f"{number(figure.limit, figure.digits)} {escape(figure.unit)}"
-        lines.append(f'<p class="limit"><b>{said}</b> the limit of {limit}</p>')
+        lines.append(f'<p class="limit"><b>{word}</b> the limit of {limit}</p>')
     return f'<div class="card {kind}">' + "".join(lines) + "</div>"
 
 
@@ -143,9 +143,9 @@ def _heat_row(row: HeatRow, heat: HeatMap, has_remarks: bool) -> str:
     factors = heat.factors or (1.0,) * len(row.values)
     for value, share, key, factor in zip(row.values, row.shares, keys, factors, strict=True):
         kind, title = _heat(share)
-        said = "–" if value is None else number(value, heat.digits, key=key, factor=factor)
+        word = "–" if value is None else number(value, heat.digits, key=key, factor=factor)
         mark = '<span class="mark">▲</span>' if kind == "heat-over" else ""
-        cells.append(f'<td class="{kind}"{title}>{mark}{said}</td>')
+        cells.append(f'<td class="{kind}"{title}>{mark}{word}</td>')
     if has_remarks:
         cells.append(f'<td class="remark">{prose(row.remark)}</td>')
     name = escape(row.name) if row.counts else f"({escape(row.name)})"

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from shapegcode.results.outcome import Pair, Plot
-from shapegcode.results.page.scene import Scene
 from shapegcode.results.table import Table
+
+if TYPE_CHECKING:
+    from shapegcode.results.page.scene import Scene
 
 Script = Literal["inline", "beside"]
 """Where the script of a page is: in its file, or in one beside it."""

@@ -104,9 +104,9 @@ def packed(scene: Scene) -> tuple[dict[str, Any], str]:
     """
     body = bytearray()
 
-    def add(data: bytes, **said: Any) -> dict[str, Any]:
+    def add(data: bytes, **entry: Any) -> dict[str, Any]:
         body.extend(bytes(-len(body) % 4))
-        place = {"at": len(body)} | said
+        place = {"at": len(body)} | entry
         body.extend(data)
         return place
 
@@ -128,9 +128,9 @@ def packed(scene: Scene) -> tuple[dict[str, Any], str]:
         for name, table in (("", variant.command_mm), ("d", variant.deviation_um)):
             columns |= {name + axis: ranks(table[:, number]) for number, axis in enumerate("xyz")}
         columns |= {name: ranks(values) for name, values in variant.channels.items()}
-        said = {"key": variant.key, "label": variant.label, "file": variant.file, "samples": variant.samples}
-        said["cuts"] = variant.cut_lines
-        variants.append(said | {"columns": columns, "text": add(text, count=len(text))})
+        entry = {"key": variant.key, "label": variant.label, "file": variant.file, "samples": variant.samples}
+        entry["cuts"] = variant.cut_lines
+        variants.append(entry | {"columns": columns, "text": add(text, count=len(text))})
     spectra = [
         {"axis": one.axis, "variant": one.variant}
         | {"frequency_hz": ranks(one.frequency_hz), "amplitude": ranks(one.amplitude)}

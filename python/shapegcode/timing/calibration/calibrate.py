@@ -61,7 +61,7 @@ _CALLS = 2500  # of the misfit that one fit takes, about; for the bar
 
 @dataclass(frozen=True, eq=False)
 class _Learned:
-    """Motion and functions, from some of the runs."""
+    """Motion and function times, calibrated from some of the runs."""
 
     motion: MotionFit
     functions: FunctionFit
@@ -83,15 +83,15 @@ def learn_clock(
     """Calibrate the cycle-time model of a machine from what it did.
 
     Logs are laid beside their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
-    to what stretches between functions took, and the one is taken that says best what programs (or runs, where there
-    is one program) took that it was not fitted to. Tool changes, M codes, spindle and unknown ways follow by least
-    squares.
+    to what the parts between functions took, and the one is taken that predicts best what programs (or runs, where
+    there is one program) took that it was not fitted to. Tool changes, M codes, spindle and unknown travels follow by
+    least squares.
 
     Args:
         runs: pairs of program and log, or the file that lists them (RUNS.toml).
         machine: whose file gets the numbers, and that says how programs are read.
         families: names of the kinds of look-ahead that are tried; None: all.
-        on_progress: told the share of the work done, 0 to 1.
+        on_progress: called with the share of the work done, 0 to 1.
 
     Returns:
         The numbers with 95 % intervals, the machine with them, and each run beside what was predicted.
@@ -105,12 +105,12 @@ def learn_clock(
     file = runs if isinstance(runs, RunsFile) else load_runs(runs)
     tried = _families(families)
     observed = _observed(file, machine)
-    # The rate of the machine is what the runs show that are learned from; of the others it tells the override.
+    # The rate of the machine is what the fitted runs show; of the others it gives the override.
     fitted, others_seen = ([run for run in observed if run.entry.use == use] for use in ("fit", "test"))
     rate, fitted = rapid_rate(fitted)
     observed = [*fitted, *(with_override(run, rate) for run in others_seen)]
     if not fitted:
-        raise ArgumentError(f'{file.path}: no run has use = "fit": there is nothing to learn from')
+        raise ArgumentError(f'{file.path}: no run has use = "fit": there is nothing to calibrate with')
     folds = _folds(fitted)
     meter = _Meter(on_progress, len(tried) * (1 + (len(folds) if len(folds) > 1 else 0)))
     fits, scores = _tried(tried, fitted, folds, machine, rate, meter)
@@ -138,7 +138,7 @@ def learn_clock(
 
 
 class _Meter:
-    """How far the work is: by fits begun, and by steps within one."""
+    """How far the work is: by fits that have started, and by steps within one."""
 
     def __init__(self, on_progress: Callable[[float], None] | None, fits: int) -> None:
         self._on_progress, self._fits, self._done, self._steps = on_progress, fits, 0, 0
@@ -175,7 +175,7 @@ def _observed(file: RunsFile, machine: Machine) -> list[ObservedRun]:
 
 
 def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
-    """Runs that are left out together: those of a program; with one program, which tells less, every other run."""
+    """Runs that are left out together: those of a program; with one program, which shows less, every other run."""
     by_program: dict[int, list[ObservedRun]] = defaultdict(list)
     for run in runs:
         by_program[id(run.timed)].append(run)
@@ -198,7 +198,7 @@ def _tried(
     sections = sections_of(runs)
     if not sections:
         raise ArgumentError(
-            "no log reports lines of a stretch of cuts often enough (10 readings): there is nothing to learn from"
+            "no log reports lines of a section of cuts often enough (10 readings): there is nothing to calibrate with"
         )
     fits, scores = [], []
     for family in tried:
@@ -269,8 +269,9 @@ def _row(run: ObservedRun, learned: _Learned, other: _Learned | None, spread: fl
     holds = _holds_of(run, starts)
     tools, kinds = _shares(run, starts, holds)
     # Half of the 95 % interval of its time: cuts err together, what lies between them by itself.
-    cut = sum(float(starts[stretch.lines[1] + 1] - starts[stretch.lines[0]]) for stretch in run.stretches)
-    between = len(run.stretches) * learned.functions.scatter_s**2
+    lines = (each.lines for each in run.cut_sections)
+    cut = sum(float(starts[last + 1] - starts[first]) for first, last in lines)
+    between = len(run.cut_sections) * learned.functions.scatter_s**2
     reach = 2.0 * math.sqrt((spread * cut) ** 2 + between)
     return LearnedRun(
         program=str(run.entry.program),
@@ -321,10 +322,10 @@ def _predicted_starts(run: ObservedRun, model: _core.FanucModel) -> FloatArray:
     """(line_count + 2,) When each line begins at the overrides of the run, s; the last entry is the end."""
     starts_at = starts_of(model)
     starts = starts_at(run, 1.0).copy()
-    for stretch in sorted(run.stretches, key=lambda each: each.feed_override):
-        if stretch.feed_override != 1.0:
-            other = starts_at(run, stretch.feed_override)
-            first, last = stretch.lines
+    for cut_section in sorted(run.cut_sections, key=lambda each: each.feed_override):
+        if cut_section.feed_override != 1.0:
+            other = starts_at(run, cut_section.feed_override)
+            first, last = cut_section.lines
             gone = (other[first : last + 2] - other[first]) - (starts[first : last + 2] - starts[first])
             starts[first : last + 2] += gone
             starts[last + 2 :] += gone[-1]
@@ -405,8 +406,8 @@ def _shares(
         measured += seen[index + 1] - seen[index] - _held(holds, seen[index], seen[index + 1])
         shares[name] = measured, predicted + expected[index + 1] - expected[index]
     cut_measured = cut_predicted = 0.0
-    for stretch in run.stretches:
-        inside = np.flatnonzero((run.line >= stretch.lines[0]) & (run.line <= stretch.lines[1]))
+    for cut_section in run.cut_sections:
+        inside = np.flatnonzero((run.line >= cut_section.lines[0]) & (run.line <= cut_section.lines[1]))
         if len(inside) >= 2:
             ends = inside[[0, -1]]
             begin_s, until_s = run.time_s[ends].tolist()
@@ -433,18 +434,18 @@ def _held(holds: list[_Hold], begin_s: float, end_s: float) -> float:
 # --- the numbers of the machine file ----------------------------------------------------------------------------------
 
 _USUAL = 0.75  # of the time
-_KNOWN = 4.0  # an interval that reaches so far from its value to both sides tells nothing
+_KNOWN = 4.0  # an interval that reaches so far from its value to both sides determines nothing
 
 
 def _feed_override(run: ObservedRun) -> float:
     """At which most of a run was cut."""
-    return longest((each.feed_override, each.lines[1] - each.lines[0]) for each in run.stretches)[0]
+    return longest((each.feed_override, each.lines[1] - each.lines[0]) for each in run.cut_sections)[0]
 
 
 def learned_machine(
     machine: Machine, motion: MotionFit, functions: FunctionFit, runs: Sequence[ObservedRun]
 ) -> tuple[Machine, dict[str, str], list[LearnedNumber], list[str]]:
-    """The machine with what was learned."""
+    """The machine with the calibrated parameters."""
     source = f"logs of {len(runs)} runs"
     values = motion.file_values()
     values.update(_function_values(functions, runs))
@@ -455,7 +456,7 @@ def learned_machine(
         numbers.append(_number(key, meaning, (rate, 0.99 * rate, 1.01 * rate), "mm/min", True, had))
     numbers += _function_numbers(functions)
     not_told = [
-        f"{number.meaning} ({number.key}): the runs bear {number.low:.3g} to {number.high:.3g} {number.unit}"
+        f"{number.meaning} ({number.key}): the runs allow {number.low:.3g} to {number.high:.3g} {number.unit}"
         for number in numbers
         if not number.told
     ]
@@ -463,7 +464,7 @@ def learned_machine(
         not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
     for key in values:
         remarks.setdefault(key, f"measured ({source})")
-    fitted = machine.with_values(values, source=f"{machine.name} with what was learned")
+    fitted = machine.with_values(values, source=f"{machine.name} with calibrated parameters")
     return fitted.with_remarks(machine.all_remarks() | remarks), remarks, numbers, not_told
 
 
@@ -480,9 +481,9 @@ def _motion_numbers(
         had = _had(machine, parameter.key.format(axis=parameter.axes[:1]))
         numbers.append(_number(key, parameter.meaning, (value, low, high), parameter.unit, told, had))
         for axis in parameter.axes or " ":
-            place = parameter.key.format(axis=axis)
-            place = place.rpartition(".")[0] if place.startswith("controller.corner_speed") else place
-            remarks[place] = f"measured ({source}): {low:.4g} ... {high:.4g} {parameter.unit}"
+            target = parameter.key.format(axis=axis)
+            target = target.rpartition(".")[0] if target.startswith("controller.corner_speed") else target
+            remarks[target] = f"measured ({source}): {low:.4g} ... {high:.4g} {parameter.unit}"
     return numbers, remarks
 
 
@@ -498,8 +499,8 @@ def _number(
 _FUNCTIONS = {
     "start": ("times.program_start_s", "from the start key to the first block", "s"),
     "tool change": ("times.tool_change_s", "tool change", "s"),
-    "way xy": ("times.unknown_move_s.x|y", "rapid of X and Y on a way that is not known", "s"),
-    "way z": ("times.unknown_move_s.z", "rapid of Z on a way that is not known", "s"),
+    "move xy": ("times.unknown_move_s.x|y", "rapid of X and Y over an unknown travel", "s"),
+    "move z": ("times.unknown_move_s.z", "rapid of Z over an unknown travel", "s"),
     "spindle start": ("times.spindle_start", "start of the spindle, per 1000/min", "s"),
     "spindle start from": ("times.spindle_start", "start of the spindle takes time from", "1000/min"),
     "spindle stop": ("times.spindle_stop", "stop of the spindle, per 1000/min", "s"),
@@ -523,18 +524,18 @@ def _usual(overrides: Iterable[tuple[float, float]]) -> float:
 
 
 def _had(machine: Machine, key: str) -> float | None:
-    place: object = machine
+    target: object = machine
     for name in key.split("."):
-        place = getattr(place, name, None)
-    if isinstance(place, int | float):
-        return float(place)
-    return float(place.x) if place is not None and hasattr(place, "x") else None
+        target = getattr(target, name, None)
+    if isinstance(target, int | float):
+        return float(target)
+    return float(target.x) if target is not None and hasattr(target, "x") else None
 
 
 def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dict[str, object]:
     values = functions.values
     codes = {code: round(value, 3) for code, value in m_codes(values).items() if round(value, 3) >= 0.005}
-    way_xy, way_z = (round(values.get(name, 0.0), 3) for name in ("way xy", "way z"))
+    way_xy, way_z = (round(values.get(name, 0.0), 3) for name in ("move xy", "move z"))
     feed = _usual((_feed_override(run), run.duration_s or 0.0) for run in runs)
     rapid = _usual((run.rapid_override, run.duration_s or 0.0) for run in runs)
     found: dict[str, object] = {

@@ -189,10 +189,10 @@ class MotionFit:
 # --- how far a model is off -------------------------------------------------------------------------------------------
 #
 # A control reports its line a few times a second: the time at which one is first seen is late by up to one reading.
-# What a stretch of the log takes is therefore known to a reading or two, whatever its length; the error of the model
+# What a part of the log takes is therefore known to a reading or two, whatever its length; the error of the model
 # grows with it.
 
-#: (length of the stretches in s, error beyond which it counts no more in s, weight).
+#: (length of the windows in s, error beyond which it counts no more in s, weight).
 _SCALES = ((1.0, 0.25, 1.0), (6.0, 0.5, 0.7), (30.0, 1.0, 0.5))
 _SECTION = (2.0, 0.5)  # of whole sections: error per half minute in s beyond which it counts no more, weight
 _MIN_READINGS = 10
@@ -208,8 +208,8 @@ class SeenSection:
     line: IntArray  # (n,) which
 
     @cached_property
-    def stretches(self) -> tuple[tuple[IntArray, IntArray], ...]:
-        """For each length of a stretch: readings at which one begins, and those at which it ends."""
+    def windows(self) -> tuple[tuple[IntArray, IntArray], ...]:
+        """For each length of a window: readings at which one begins, and those at which it ends."""
         found = []
         for length_s, _, _ in _SCALES:
             upto = np.searchsorted(self.time_s, self.time_s + length_s)
@@ -222,10 +222,10 @@ def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
     """The sections of runs of which enough was seen."""
     found = []
     for run in runs:
-        for stretch in run.stretches:
-            inside = (run.line >= stretch.lines[0]) & (run.line <= stretch.lines[1])
+        for cut_section in run.cut_sections:
+            inside = (run.line >= cut_section.lines[0]) & (run.line <= cut_section.lines[1])
             if int(inside.sum()) >= _MIN_READINGS:
-                found.append(SeenSection(run, stretch.feed_override, run.time_s[inside], run.line[inside]))
+                found.append(SeenSection(run, cut_section.feed_override, run.time_s[inside], run.line[inside]))
     return found
 
 
@@ -262,7 +262,7 @@ def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
     for section, residual in zip(sections, section_residuals(sections, model), strict=True):
         sums, counts = square[id(section.run.timed)], count[id(section.run.timed)]
         for scale, (_, limit_s, _) in enumerate(_SCALES):
-            begins, ends = section.stretches[scale]
+            begins, ends = section.windows[scale]
             apart = residual[ends] - residual[begins]
             sums[scale] += np.minimum(apart**2, limit_s**2).sum()
             counts[scale] += len(apart)
@@ -310,34 +310,34 @@ def fit_motion(
     reach = np.array([_SEEN_SPREAD if parameter.name in seen else _TYPICAL_SPREAD for parameter in parameters])
     calls = 0
 
-    def fit(place: FloatArray) -> MotionFit:
-        kept = np.clip(place, low, high)
+    def fit(point: FloatArray) -> MotionFit:
+        kept = np.clip(point, low, high)
         values = {parameter.name: math.exp(value) for parameter, value in zip(parameters, kept, strict=True)}
         return MotionFit(family, values, rapid_mm_per_s)
 
-    def cost(place: FloatArray) -> float:
+    def cost(point: FloatArray) -> float:
         nonlocal calls
         calls += 1
         if on_step is not None and calls % 20 == 0:
             on_step()
-        beyond = float(np.abs(place - np.clip(place, low, high)).sum())
-        usual = _PRIOR * float((((place - typical) / reach) ** 2).sum())
-        return misfit(sections, fit(place).model(machine)) + usual + 10.0 * beyond
+        beyond = float(np.abs(point - np.clip(point, low, high)).sum())
+        usual = _PRIOR * float((((point - typical) / reach) ** 2).sum())
+        return misfit(sections, fit(point).model(machine)) + usual + 10.0 * beyond
 
-    def search(place: FloatArray, most: int) -> tuple[float, FloatArray]:
-        simplex = np.vstack([place, place + _STEP * np.eye(len(parameters))])
+    def search(point: FloatArray, most: int) -> tuple[float, FloatArray]:
+        simplex = np.vstack([point, point + _STEP * np.eye(len(parameters))])
         found = minimize(
-            cost, place, method="Nelder-Mead",
+            cost, point, method="Nelder-Mead",
             options={"maxfev": most, "xatol": 2e-3, "fatol": 1e-4, "initial_simplex": simplex, "adaptive": True},
         )  # fmt: skip
         return float(found.fun), found.x
 
     # The misfit has several valleys: the search begins in the lowest of many places, and again from where it ended.
     generator = np.random.default_rng(1)
-    places, valleys, restarts = (_PLACES, _VALLEYS, 2) if thorough else (_PLACES // 2, _VALLEYS // 2, 1)
-    spread = generator.normal(0.0, _SEARCHED, (places, len(parameters))) * (reach / _TYPICAL_SPREAD)
+    points, valleys, restarts = (_PLACES, _VALLEYS, 2) if thorough else (_PLACES // 2, _VALLEYS // 2, 1)
+    spread = generator.normal(0.0, _SEARCHED, (points, len(parameters))) * (reach / _TYPICAL_SPREAD)
     tried = [typical, *(np.clip(typical + each, low, high) for each in spread)]
-    ranked = sorted(((cost(place), index) for index, place in enumerate(tried)), key=lambda each: each[0])
+    ranked = sorted(((cost(point), index) for index, point in enumerate(tried)), key=lambda each: each[0])
     ends = [search(tried[index], _STEPS // 2) for _, index in ranked[:valleys]]
     best = min(ends, key=lambda end: end[0])
     for _ in range(restarts):
@@ -351,16 +351,16 @@ def parameter_intervals(
 ) -> dict[str, tuple[float, float]]:
     """95 % intervals of the numbers of a fit.
 
-    From the derivatives of what stretches of some seconds take; the scatter is that of the sections, each of which
+    From the derivatives of what windows of some seconds take; the scatter is that of the sections, each of which
     counts as one (a sandwich of clusters), so that an error of the model is in it.
     """
     names = [parameter.name for parameter in fit.family.parameters]
     sections = sections_of(runs)
-    stretches = [_stretches(section) for section in sections]
+    windows = [_windows(section) for section in sections]
 
     def taken(values: dict[str, float]) -> list[FloatArray]:
         residual = section_residuals(sections, replace(fit, values=values).model(machine))
-        return [np.diff(each[places]) for each, places in zip(residual, stretches, strict=True)]
+        return [np.diff(each[points]) for each, points in zip(residual, windows, strict=True)]
 
     centre = taken(fit.values)
     slopes = []
@@ -393,15 +393,15 @@ def parameter_intervals(
     return found
 
 
-def _stretches(section: SeenSection) -> IntArray:
+def _windows(section: SeenSection) -> IntArray:
     """Readings that are some seconds apart."""
-    places = [0]
+    points = [0]
     for index, time_s in enumerate(section.time_s):
-        if time_s - section.time_s[places[-1]] >= _WINDOW_S:
-            places.append(index)
-    if len(places) == 1 and len(section.time_s) > 1:
-        places.append(len(section.time_s) - 1)
-    return np.array(places)
+        if time_s - section.time_s[points[-1]] >= _WINDOW_S:
+            points.append(index)
+    if len(points) == 1 and len(section.time_s) > 1:
+        points.append(len(section.time_s) - 1)
+    return np.array(points)
 
 
 # --- what takes time beside the motion --------------------------------------------------------------------------------
@@ -423,18 +423,18 @@ _TABLE_KRPM = 30.0  # a spindle's table is written up to so far above where its 
 class FunctionFit:
     """Times beside the motion."""
 
-    # by name: "start", "tool change", "M8", "way xy", "way z" in s; "spindle start from" and "spindle stop from" in
+    # by name: "start", "tool change", "M8", "move xy", "move z" in s; "spindle start from" and "spindle stop from" in
     # 1000/min, "spindle start" and "spindle stop" in s per 1000/min above
     values: dict[str, float]
     low: dict[str, float]  # of the 95 % intervals by name
     high: dict[str, float]
     last_tool_in_spindle: bool  # whether the tool that a program ends with is in the spindle when it starts anew
-    scatter_s: float  # root mean square of what a stretch between two cuts took otherwise
+    scatter_s: float  # root mean square of what the time between two cuts was otherwise
 
 
 @dataclass(frozen=True, eq=False)
 class _Span:
-    """A stretch of a run from one reading to another, with functions between."""
+    """A part of a run from one reading to another, with functions between."""
 
     run: ObservedRun
     begin: int  # line; 0: the start key
@@ -452,8 +452,8 @@ def whole_model(
     model.last_tool_in_spindle = last_tool_in_spindle
     model.m_function_s = 0.0
     model.m_code_s = dict(m_codes(values).items())
-    xy = values.get("way xy", 0.0)
-    model.unknown_move_s = [xy, xy, values.get("way z", 0.0)]
+    xy = values.get("move xy", 0.0)
+    model.unknown_move_s = [xy, xy, values.get("move z", 0.0)]
     model.spindle_start_s = spindle_rows(values, "spindle start")
     model.spindle_stop_s = spindle_rows(values, "spindle stop")
     return model
@@ -474,7 +474,7 @@ def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float
 
 
 def fit_functions(runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> FunctionFit:
-    """Least squares over the stretches between cuts, robust against what an operator does there."""
+    """Least squares over the times between cuts, robust against what an operator does there."""
     spans = [span for run in runs for span in _spans(run)]
     names = _names(runs)
     kept = (False, True) if any(map(_returns, runs)) else (False,)
@@ -492,7 +492,7 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
     functions = [each for run in runs for each in run.timed.program.core.functions]
     codes = {code for codes, _, _ in functions for code in codes}
     spins = any(speed > 0.0 for _, _, speed in functions)
-    names = ["start", "way xy", "way z"]
+    names = ["start", "move xy", "move z"]
     names += ["tool change"] if _TOOL_CHANGE in codes else []
     names += [f"M{code}" for code in sorted(codes - {_TOOL_CHANGE})]
     if spins and codes & {3, 4}:
@@ -503,7 +503,7 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
 
 
 def _spans(run: ObservedRun) -> list[_Span]:
-    """Readings next to each other with a function between, and whole ways from cut to cut; start and end of the run."""
+    """Readings next to each other with a function between, and all between two cuts; start and end of the run."""
     line, time_s, function = run.line, run.time_s, run.timed.function
     spans = []
 
@@ -516,7 +516,7 @@ def _spans(run: ObservedRun) -> list[_Span]:
             spans.append(_Span(run, begin, end, until - since))
 
     cuts = np.flatnonzero(np.isfinite(run.timed.feed_mm_per_s[line]))
-    # How the way to the first cut divides differs from run to run: a control reports its first lines late.
+    # How the time to the first cut divides differs from run to run: a control reports its first lines late.
     for index in range(int(cuts[0]) if len(cuts) else -1, len(line)):
         add(index, index + 1)
     if len(cuts):
@@ -536,14 +536,14 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     scale = np.array([_MAX_S if not name.endswith("from") else _SPEEDS_KRPM[1] for name in names])
     pull = np.array([0.0 if name.endswith("from") else _RIDGE for name in names]) / _READING_S
 
-    def errors(place: FloatArray) -> FloatArray:
-        model = whole_model(machine, motion, dict(zip(names, place.tolist(), strict=True)), kept)
+    def errors(point: FloatArray) -> FloatArray:
+        model = whole_model(machine, motion, dict(zip(names, point.tolist(), strict=True)), kept)
         starts = starts_of(model)
         taken = [
             starts(span.run, 1.0)[span.end] - (starts(span.run, 1.0)[span.begin] if span.begin > 0 else 0.0)
             for span in spans
         ]
-        return np.concatenate([(np.array(taken) - seconds) / _READING_S, pull * place])
+        return np.concatenate([(np.array(taken) - seconds) / _READING_S, pull * point])
 
     begin = np.array([4.0 if name.endswith("from") else 0.3 for name in names])
     found = least_squares(
@@ -553,10 +553,10 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     values = dict(zip(names, found.x.tolist(), strict=True))
     error = errors(found.x)[: len(spans)] * _READING_S
     middle = float(np.sqrt(np.mean(np.minimum(error**2, 1.0)))) if len(error) else 0.0
-    # Each stretch is counted about twice: as a whole, and in its readings.
+    # Each span is counted about twice: as a whole, and in its readings.
     slope = np.asarray(found.jac)
     spread = np.linalg.pinv(slope.T @ slope) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
-    # A number that changes nothing is not told.
+    # A parameter that changes nothing is not determined.
     unseen = np.abs(slope[: len(spans)]).sum(axis=0) < _UNSEEN
     reach = np.where(unseen, _MAX_S, 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0)))
     low = {name: max(0.0, values[name] - float(each)) for name, each in zip(names, reach, strict=True)}

@@ -44,8 +44,8 @@ class TimedProgram:
     arc_radius_mm: FloatArray
     free: npt.NDArray[np.bool_]  # (line_count + 2,) whether no machine has to go slower there for the sake of an arc
     rapid: npt.NDArray[np.bool_]  # (line_count + 2,) whether it moves in rapid
-    function: npt.NDArray[np.bool_]  # (line_count + 2,) whether it holds M, S or T words, or a way that is not known
-    sections: tuple[tuple[int, int], ...]  # (first line, last line) of the stretches without functions
+    function: npt.NDArray[np.bool_]  # (line_count + 2,) whether it holds M, S or T words, or an unknown travel
+    sections: tuple[tuple[int, int], ...]  # (first line, last line) of the parts without functions
 
     def starts(self, model: _core.FanucModel) -> FloatArray:
         """When the lines begin on a model."""
@@ -64,11 +64,11 @@ class TimedProgram:
     @cached_property
     def sequence_lines(self) -> dict[int, list[int]]:
         """Lines by their N number, ascending."""
-        places: dict[int, list[int]] = defaultdict(list)
+        positions: dict[int, list[int]] = defaultdict(list)
         for line, text in enumerate(self.text_lines, start=1):
             if number := _SEQUENCE.match(text):
-                places[int(number[1])].append(line)
-        return places
+                positions[int(number[1])].append(line)
+        return positions
 
     @cached_property
     def tools(self) -> IntArray:
@@ -132,7 +132,7 @@ _STEPS = (1.0, 0.5, 0.1, 1.0 / 60.0, 0.01, 0.001)  # in which controls show feed
 
 
 @dataclass(frozen=True)
-class Stretch:
+class CutSection:
     """A section of a run without functions."""
 
     lines: tuple[int, int]  # first and last
@@ -147,9 +147,9 @@ def line_numbers(log: RunLog, timed: TimedProgram) -> IntArray:
         return value
     found, at = np.zeros(len(value), dtype=np.int64), 0
     for index, sequence_number in enumerate(value.tolist()):
-        ahead = [place for place in timed.sequence_lines.get(sequence_number, []) if place >= at]
-        if ahead:
-            at = found[index] = ahead[0]
+        later = [candidate for candidate in timed.sequence_lines.get(sequence_number, []) if candidate >= at]
+        if later:
+            at = found[index] = later[0]
     return found
 
 
@@ -214,7 +214,9 @@ def steady_value(values: FloatArray) -> float | None:
     return float(np.median(ordered[at : at + most]))
 
 
-def stretches_of(entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float, notes: list[str]) -> list[Stretch]:
+def cut_sections_of(
+    entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float, notes: list[str]
+) -> list[CutSection]:
     """Feed override of each section: what steady cuts show, else what is stated, else that of the run, else 1."""
     ratio = np.empty(0)
     line = np.empty(0, dtype=np.int64)
@@ -222,7 +224,7 @@ def stretches_of(entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float,
         line = lines_at(log.feed, log, timed)
         ratio = log.feed.value * unit / timed.feed_mm_per_s[line]
         # A control shows feeds in steps, the largest usual one that all are multiples of: where it is much of the
-        # feed, that tells nothing.
+        # feed, that shows nothing.
         shown = ((step, log.feed.value / step) for step in _STEPS)
         step = next((each for each, parts in shown if np.all(np.abs(parts - np.round(parts)) < 1e-3)), 0.0)
         fine = timed.feed_mm_per_s[line] * _FEED_BIN > step * unit
@@ -238,17 +240,17 @@ def stretches_of(entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float,
         seen = steady_value(inside) if len(inside) else None
         fallback = stated if stated is not None else whole
         value = seen if seen is not None else fallback if fallback is not None else 1.0
-        found.append(Stretch((first, last), as_dialled(value), seen is not None))
-    used = sorted({stretch.feed_override for stretch in found if stretch.measured})
+        found.append(CutSection((first, last), to_whole_percent(value), seen is not None))
+    used = sorted({cut_section.feed_override for cut_section in found if cut_section.measured})
     if any(abs(value - 1.0) > 0.005 for value in used):
         notes.append("feed override " + ", ".join(f"{value:.1%}" for value in used) + " as steady cuts show")
     if ratio.size == 0 and stated is None:
-        notes.append("no feed in the log: overrides cannot be told and are taken as 100 %")
+        notes.append("no feed in the log: overrides are not known and are taken as 100 %")
     return found
 
 
-def as_dialled(ratio: float) -> float:
-    """As a dial has it: whole percents where they are within what a reading means."""
+def to_whole_percent(ratio: float) -> float:
+    """As an override switch has it: whole percents where they are within what a reading means."""
     whole = round(ratio, 2)
     return whole if abs(ratio - whole) < 0.002 else round(ratio, 4)
 
@@ -262,14 +264,14 @@ _MIN_RISING = 0.9  # of the reported lines
 
 @dataclass(frozen=True, eq=False)
 class ObservedRun:
-    """One run of a program, as far as its log tells."""
+    """One run of a program, as far as its log shows."""
 
     timed: TimedProgram
     log: RunLog
     entry: RunEntry  # what the file of runs says of it
     time_s: FloatArray  # (n,) when the control first reported a line, since the start
     line: IntArray  # (n,) the line, never falling
-    stretches: tuple[Stretch, ...]  # sections with their feed overrides
+    cut_sections: tuple[CutSection, ...]  # sections with their feed overrides
     rapid_override: float  # ratio of the rapid rates
     feed_unit_mm_per_s: float  # what one unit of the logged feed is; NaN without a feed
     notes: tuple[str, ...]  # what was found and bridged
@@ -287,15 +289,15 @@ def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine)
     time_s, line = _lines(entry, log, timed, notes)
     _compare_tools(entry, log, timed, notes)
     unit = feed_unit(entry, log, timed)
-    stretches = tuple(stretches_of(entry, log, timed, unit, notes))
+    cut_sections = tuple(cut_sections_of(entry, log, timed, unit, notes))
     rapid_override = math.nan
     if entry.rapid_override_percent is not None:
         rapid_override = entry.rapid_override_percent / 100.0
     elif log.rapid_override is not None and len(log.rapid_override):
-        # The dial may be turned for a moment, at the start mostly: what held longest counts.
+        # The override may change for a moment, at the start mostly: what held longest counts.
         rapid_override = held_longest(log.rapid_override, log.duration_s) or math.nan
-    run = ObservedRun(timed, log, entry, time_s, line, stretches, rapid_override, unit, tuple(notes))
-    starts = timed.starts(fanuc_model(machine))  # by the machine's own limits, before anything is learned
+    run = ObservedRun(timed, log, entry, time_s, line, cut_sections, rapid_override, unit, tuple(notes))
+    starts = timed.starts(fanuc_model(machine))  # by the machine's own limits, before anything is calibrated
     whole = _is_whole(run, starts, notes)
     _require_same(run, starts)
     return replace(run, whole=whole, notes=tuple(notes))
@@ -356,19 +358,19 @@ def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: lis
 def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
     """Which values belong to the longest row that never falls."""
     ends: list[int] = []  # value at which the best row of each length ends
-    places: list[int] = []  # and where
+    positions: list[int] = []  # and where
     before = np.full(len(line), -1, dtype=np.int64)
     for index, value in enumerate(line.tolist()):
         length = bisect_right(ends, value)
         if length == len(ends):
             ends.append(value)
-            places.append(index)
+            positions.append(index)
         else:
             ends[length] = value
-            places[length] = index
-        before[index] = places[length - 1] if length > 0 else -1
+            positions[length] = index
+        before[index] = positions[length - 1] if length > 0 else -1
     kept = np.zeros(len(line), dtype=bool)
-    at = places[-1] if places else -1
+    at = positions[-1] if positions else -1
     while at >= 0:
         kept[at] = True
         at = int(before[at])
@@ -394,7 +396,7 @@ def _is_whole(run: ObservedRun, starts: FloatArray, notes: list[str]) -> bool:
 
 
 def _require_same(run: ObservedRun, starts: FloatArray) -> None:
-    """The way that the program goes between the reported lines must take time where the log says that it did."""
+    """The motion of the program between the reported lines must take time where the log says that it did."""
     begin = starts[run.line]
     known = np.isfinite(begin) & ~run.timed.function[run.line]
     if known.sum() < _MIN_BLOCKS:
@@ -409,7 +411,7 @@ def _require_same(run: ObservedRun, starts: FloatArray) -> None:
     if agreement < 0.3:
         raise RecordError(
             f"{run.log.source}: its lines do not take the time that those of {run.entry.program.name} need "
-            f"(correlation {agreement:.2f} over {groups} stretches, at least 0.3 is expected): log and program do not "
+            f"(correlation {agreement:.2f} over {groups} parts, at least 0.3 is expected): log and program do not "
             "belong together"
         )
 
@@ -418,7 +420,7 @@ def _require_same(run: ObservedRun, starts: FloatArray) -> None:
 
 _LIMITED = 0.9  # of the programmed feed: below it something else than the program sets the speed
 _MIN_ARC_READINGS = 12
-_DIALS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.05)  # where a dial of rapids usually stands
+_DIALS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.05)  # usual settings of the rapid override
 
 
 def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
@@ -449,7 +451,7 @@ def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
     """Rapid rate of the machine and the override of each run, from the feeds that its logs show in rapids.
 
     A rate shows as the highest feed that returns again and again. Where runs show several, the highest one, or one that
-    a usual place of the dial makes of it, is the machine's.
+    a usual setting of the rapid override makes of it, is the machine's.
     """
     shown = {id(run): _shown_rate(run) for run in runs}
     plateaus = [plateau for plateau, _ in shown.values() if math.isfinite(plateau)]
@@ -471,13 +473,13 @@ def with_override(run: ObservedRun, rate_mm_per_s: float) -> ObservedRun:
     if math.isfinite(run.rapid_override):
         return run
     ratio = _shown_rate(run)[0] / rate_mm_per_s
-    override = as_dialled(min(1.0, ratio)) if math.isfinite(ratio) else 1.0
+    override = to_whole_percent(min(1.0, ratio)) if math.isfinite(ratio) else 1.0
     notes = (*run.notes, f"rapid override {override:.0%} as its rapids show") if override < 0.99 else run.notes
     return replace(run, rapid_override=override, notes=notes)
 
 
 def _shown_rate(run: ObservedRun) -> tuple[float, float]:
-    """Feed at which rapids run steadily, and the highest one of a way along Z alone; NaN and 0 where none is seen."""
+    """Feed at which rapids run steadily, and the highest one along Z alone; NaN and 0 where none is seen."""
     log, timed = run.log, run.timed
     if log.feed is None or not math.isfinite(run.feed_unit_mm_per_s):
         return math.nan, 0.0

@@ -22,13 +22,13 @@ def plots_of(found: LearnedClock) -> dict[str, Plot]:
 
 
 def plot_clock(found: LearnedClock, ax: Axes | None = None) -> Axes:
-    """How far is the learned machine off? One row for each run: whole run, tools, kinds of motion.
+    """How far is the calibrated model off? One row for each run: whole run, tools, kinds of motion.
 
     How to read this: 0 is what the machine took; the bands are 2 % for a run and 5 % for a tool's share; a bar is the
     95 % interval.
 
     Args:
-        found: what was learned.
+        found: the calibration.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -54,7 +54,7 @@ def plot_clock(found: LearnedClock, ax: Axes | None = None) -> Axes:
         label = once("whole run, with its interval")
         panel.errorbar(error, row, xerr=reach, fmt="o", color=plot.COLOURS[1], capsize=3, label=label)
         if run.left_out_percent is not None:
-            label = once("whole run, learned from the others")
+            label = once("whole run, calibrated with the others")
             panel.plot(run.left_out_percent, row, "D", color=plot.COLOURS[0], markersize=5, label=label)
         for share in run.tools:
             if share.measured_s > 0.02 * took:

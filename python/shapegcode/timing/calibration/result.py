@@ -21,8 +21,8 @@ class FamilyScore:
     Attributes:
         name: of it.
         meaning: in words.
-        fitted_s: how far its clock runs apart from the logs that it was fitted to, s (weighted root mean square over
-            stretches of seconds to minutes).
+        fitted_s: how far its times differ from the logs that it was fitted to, s (weighted root mean square over
+            windows of seconds to minutes).
         left_out_s: the same on runs that it was not fitted to; null: too few runs to leave any out.
     """
 
@@ -39,11 +39,11 @@ class LearnedNumber:
     Attributes:
         key: of it.
         meaning: in words.
-        value: that was learned.
+        value: as calibrated.
         low: least value of the 95 % interval.
         high: largest one.
         unit: of all three.
-        told: whether the runs tell it; else they bear very different values, or only sums with others are told.
+        told: whether the runs determine it; else they allow very different values, or determine only sums with others.
         had: what the machine file had before.
     """
 
@@ -64,7 +64,7 @@ class LearnedShare:
     Attributes:
         name: "T3", "cuts", "between cuts".
         measured_s: what it took in the log.
-        predicted_s: what the learned machine says.
+        predicted_s: of the calibrated model.
     """
 
     name: str
@@ -87,10 +87,10 @@ class LearnedRun:
         use: "fit" or "test".
         measured_s: from start to completion, by the log; null: it does not hold both.
         held_s: of it, holds: the machine waited where no program asks for it.
-        predicted_s: by the learned machine, at the overrides of this run.
+        predicted_s: of the calibrated model, at the overrides of this run.
         low_s: least time of the 95 % interval.
         high_s: largest one.
-        left_out_s: what a machine says that was learned from the other programs (or runs) alone; null: no others.
+        left_out_s: of a model calibrated with the other programs (or runs) alone; null: no others.
         feed_override: ratio at which most of it was cut.
         rapid_override: ratio of its rapids.
         tools: by tool.
@@ -128,7 +128,7 @@ class LearnedRun:
 
     @property
     def left_out_percent(self) -> float | None:
-        """The same of the machine learned from the others."""
+        """The same of the model calibrated with the others."""
         return _error(self.left_out_s, self.measured_s, self.held_s)
 
     @property
@@ -145,17 +145,17 @@ def _error(predicted_s: float | None, measured_s: float | None, held_s: float) -
 
 @dataclass(frozen=True, repr=False, eq=False)
 class LearnedClock(Result):
-    """A machine learned from what it did.
+    """A cycle-time model of a machine, calibrated with logs of its runs.
 
     Attributes:
         machine: name.
         family: kind of look-ahead that says best what runs took that it was not fitted to.
         families: all that were tried.
-        numbers: what was learned, one row for each key of the machine file.
+        numbers: what was calibrated, one row for each key of the machine file.
         runs: one row for each run.
         fitted: the machine with it.
         remarks: for each key that was set, by its dotted name: interval and source.
-        not_told: what the logs cannot tell, in words.
+        not_told: what the logs do not determine, in words.
         warnings: runs that differ by more than 2 %, and where one was held.
         largest_error_percent: of a run: as one left out where others are, without holds; null: no whole run.
     """
@@ -189,7 +189,7 @@ class LearnedClock(Result):
         """How well it says what the machine did."""
         largest = self.largest_error_percent
         learned = sum(number.told for number in self.numbers)
-        head = f"{self.machine}: {learned} numbers learned from {sum(run.use == 'fit' for run in self.runs)} runs"
+        head = f"{self.machine}: {learned} parameters calibrated with {sum(run.use == 'fit' for run in self.runs)} runs"
         if largest is None:
             return f"{head}; no log holds a whole run to judge them by"
         kind = "left out" if any(run.left_out_s is not None or run.use == "test" for run in self.runs) else "fitted"
@@ -200,7 +200,7 @@ class LearnedClock(Result):
     def next_step(self) -> str:
         """To use the machine file, or to give it more runs."""
         if self.ok:
-            return "write it with -o FILE; shapegcode time part.nc -m FILE tells what other programs take"
+            return "write it with -o FILE; shapegcode time part.nc -m FILE gives the time of other programs"
         return "add runs of other programs, or state what the operator had set (override_percent in RUNS.toml)"
 
     def next_step_after(self, file: str) -> str:
@@ -212,14 +212,14 @@ class LearnedClock(Result):
         Returns:
             One sentence.
         """
-        return f"shapegcode time part.nc -m {file} tells what other programs take" if self.ok else self.next_step
+        return f"shapegcode time part.nc -m {file} gives the time of other programs" if self.ok else self.next_step
 
     def plots(self) -> Mapping[str, Plot]:
         """Predicted against measured."""
         return self._drawn_beside()
 
     def to_toml(self) -> str:
-        """The machine file with what was learned; a remark stands behind each key."""
+        """The machine file with the calibrated parameters; a remark stands behind each key."""
         return self.fitted.to_toml(self.remarks)
 
     def tables(self) -> list[Table]:
@@ -229,12 +229,12 @@ class LearnedClock(Result):
             Table("runs", _RUNS, self.runs),
             Table("by tool, and by kind of motion", _SHARES, tools),
             Table("kinds of look-ahead", _FAMILIES, self.families),
-            Table("learned", _NUMBERS, self.numbers),
+            Table("calibrated", _NUMBERS, self.numbers),
         ]
 
 
 def _interval(number: LearnedNumber) -> str:
-    return f"{number.low:.4g} ... {number.high:.4g}" if number.told else "not told"
+    return f"{number.low:.4g} ... {number.high:.4g}" if number.told else "not determined"
 
 
 _RUNS = (

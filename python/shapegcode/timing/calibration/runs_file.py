@@ -89,7 +89,7 @@ class RunEntry:
             if log in self.shared and any(run.program is None for run in runs):
                 raise RecordError(
                     f"{log}: it is a log of several programs, and a run in it (from line {runs[0].lines[0]}) names "
-                    f"none: whether {self.program.name} made it cannot be told; divide the log"
+                    f"none: whether {self.program.name} made it is not known; divide the log"
                 )
             found += runs
         return tuple(found)
@@ -121,7 +121,7 @@ class _RunsRow(TomlTable):
     logs: Annotated[tuple[_Path, ...], Field(min_length=1)] | None = key(
         "several logs, or patterns, in place of log", default=None
     )
-    use: Use = key('"fit": learned from; "test": predicted only', default="fit")
+    use: Use = key('"fit": calibrated with; "test": predicted only', default="fit")
     feed_unit: Text | None = key("unit of the feed in the logs; left out: by the data", default=None)
     items: dict[Text, Text] | None = key("names of the items in the logs by what they are", default=None)
     format: LogFormat | None = key("of the logs; left out: by their content", default=None)
@@ -193,15 +193,15 @@ class _Found:
 
     def entry(self, number: int, row: _RunsRow) -> RunEntry:
         """An entry; what is wrong goes to the problems, unless it is left out."""
-        place = f"runs.{number}"
+        where = f"runs.{number}"
         program = self._folder / row.program
         if row.leave_out is None and not program.is_file():
-            self._problem(f"{place}.program", row.program, "no such file")
+            self._problem(f"{where}.program", row.program, "no such file")
         key = "log" if row.logs is None else "logs"
         logs = tuple(
             log
             for pattern in row.logs or [row.log or ""]
-            for log in self._logs(f"{place}.{key}", pattern, number, program, row.leave_out is None)
+            for log in self._logs(f"{where}.{key}", pattern, number, program, row.leave_out is None)
         )
         same = ("use", "format", "override_percent", "rapid_override_percent", "leave_out", "logged_as")
         return RunEntry(
@@ -209,7 +209,7 @@ class _Found:
             logs,
             feed_unit=None if row.feed_unit is None else stated_feed_unit(row.feed_unit),
             items=tuple((row.items or {}).items()),
-            line=line_of(place, self._text),
+            line=line_of(where, self._text),
             **{name: getattr(row, name) for name in same},
         )
 

@@ -1,0 +1,199 @@
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <utility>
+
+#include "arrays.hpp"
+#include "register.hpp"
+#include "shapegcode/error.hpp"
+#include "shapegcode/simulation.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+namespace {
+
+py::array recorded(const Samples& samples) { return take(Eigen::MatrixXd(samples.positions_mm)); }
+
+}  // namespace
+
+void register_simulation(py::module_& module) {
+  py::enum_<BlockEnd>(module, "BlockEnd", "When a block's successor starts.")
+      .value("ceil", BlockEnd::ceil)
+      .value("carry", BlockEnd::carry);
+
+  py::class_<DeviationStats>(module, "DeviationStats", "Statistics of a signed deviation.")
+      .def_readonly("max_abs_mm", &DeviationStats::max_abs_mm, "Largest magnitude, mm.")
+      .def_readonly("most_positive_mm", &DeviationStats::most_positive_mm, "Left of the path or above, mm.")
+      .def_readonly("most_negative_mm", &DeviationStats::most_negative_mm, "Right of the path or below, mm.")
+      .def_readonly("sum_of_squares_mm2", &DeviationStats::sum_of_squares_mm2, "mm^2.")
+      .def_readonly("count", &DeviationStats::count, "Samples.")
+      .def_property_readonly("rms_mm", &DeviationStats::rms_mm, "mm.");
+
+  py::class_<ContourTracker, std::shared_ptr<ContourTracker>>(
+      module, "ContourTracker", "Geometry of a path for the distance of a moving point to it.")
+      .def(py::init([](const std::shared_ptr<Path>& path) { return ContourTracker(*path); }),
+           py::arg("path").none(false), "Raises ArgumentError on a path without segments.");
+
+  py::class_<SimulationOptions>(module, "PlaybackOptions", "What a run of set-points is measured with.")
+      .def(py::init<>())
+      .def_readwrite("period_s", &SimulationOptions::period_s, "Interpolation period, s.")
+      .def_readwrite("axis_filters", &SimulationOptions::axis_filters, "Filters after the set-points, in order.")
+      .def_property(
+          "tracker",
+          [](const SimulationOptions& self) { return std::const_pointer_cast<ContourTracker>(self.tracker); },
+          [](SimulationOptions& self, std::shared_ptr<ContourTracker> tracker) { self.tracker = std::move(tracker); },
+          "Tracker of the path, whose geometry several runs share; None: each run makes its own.")
+      .def_readwrite("modes", &SimulationOptions::modes, "Modes of X, Y and Z.")
+      .def_readwrite("mode_tables", &SimulationOptions::mode_tables,
+                     "How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.")
+      .def_readwrite("drives", &SimulationOptions::drives,
+                     "Feed drives of X, Y and Z in place of the modes; none: modes alone.")
+      .def_readwrite("settling_band_mm", &SimulationOptions::settling_band_mm, "Of the settling time, mm; 0: none.")
+      .def_readwrite(
+          "arrived_mm", &SimulationOptions::arrived_mm,
+          "Drives: the residual is the vibration of the table against its motor once that is so near, mm; 0: the "
+          "whole error from the stop on.")
+      .def_readwrite("settling_limit_s", &SimulationOptions::settling_limit_s,
+                     "How long behind the stop it is looked for; with drives the residual too, s.")
+      .def_readwrite("measure_contour", &SimulationOptions::measure_contour, "Deviations and orbit errors.")
+      .def_readwrite("measure_response", &SimulationOptions::measure_response,
+                     "False: the command alone; no figures of the response.")
+      .def_readwrite("measure_command", &SimulationOptions::measure_command,
+                     "False: the deviation of the response alone, no orbit errors.")
+      .def_readwrite("feed_window_s", &SimulationOptions::feed_window_s,
+                     "Time over which the speed is held against the programmed feed, beside four and sixteen times it, "
+                     "s; 0: not measured.")
+      .def_readwrite("feed_slack_mm", &SimulationOptions::feed_slack_mm,
+                     "Distance within that time that rounding may add, mm.")
+      .def_readwrite("last_seconds", &SimulationOptions::last_seconds,
+                     "Blocks only: play the last so many seconds; 0: all.")
+      .def_readwrite("starved_blocks", &SimulationOptions::starved_blocks,
+                     "Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?")
+      .def_readwrite("measure_response_orbit", &SimulationOptions::measure_response_orbit,
+                     "Orbit errors of the response too, where the contour is measured.")
+      .def_readwrite("starved_s", &SimulationOptions::starved_s, "How long the set-points then wait, s.")
+      .def_readwrite("starved_memory_s", &SimulationOptions::starved_memory_s,
+                     "How much of the run behind such a wait is looked at, s; 0: all.")
+      .def_readwrite("other_overrides", &SimulationOptions::other_overrides,
+                     "Blocks only: the largest deviations at these feed overrides too.")
+      .def_readwrite("record_samples", &SimulationOptions::record_samples, "Samples kept for pictures; 0: none.");
+
+  py::class_<FeedExcess>(module, "FeedExcess",
+                         "Where a motion is fastest against the programmed feed at the same position.")
+      .def_readonly("speed_mm_per_s", &FeedExcess::speed_mm_per_s, "Speed there, mm/s.")
+      .def_readonly("programmed_mm_per_s", &FeedExcess::programmed_mm_per_s, "Feed programmed there, mm/s.")
+      .def_readonly("line", &FeedExcess::line, "Line of the segment that is programmed there.")
+      .def_property_readonly("ratio", &FeedExcess::ratio, "Speed over feed; 0 where nothing was measured.");
+
+  py::class_<StarvedFigures>(module, "StarvedFigures", "What a wait for the next block does to a run.")
+      .def_readonly("block", &StarvedFigures::block, "The set-points wait behind it.")
+      .def_readonly("residual_mm", &StarvedFigures::residual_mm,
+                    "Largest |response - command| while the set-points rest, in the wait and at the end, (3,), mm.")
+      .def_readonly("command", &StarvedFigures::command, "Deviation of the command from the path.")
+      .def_readonly("response", &StarvedFigures::response, "Deviation of the response from the path.");
+
+  py::class_<OverrideFigures>(module, "OverrideFigures", "The largest deviations of a run at another feed override.")
+      .def_readonly("override_ratio", &OverrideFigures::override_ratio, "1 = 100 %.")
+      .def_readonly("command_mm", &OverrideFigures::command_mm, "Of the command from the path, mm.")
+      .def_readonly("response_mm", &OverrideFigures::response_mm, "Of the response from the path, mm.");
+
+  py::class_<SimulationFigures, std::shared_ptr<SimulationFigures>>(module, "PlaybackFigures",
+                                                                    "Figures of one run from rest to rest.")
+      .def_readonly("duration_s", &SimulationFigures::duration_s, "Until the set-points rest, s.")
+      .def_readonly("residual_mm", &SimulationFigures::residual_mm,
+                    "Largest |response - command| from the instant at which the set-points rest, (3,), mm.")
+      .def_readonly("settling_s", &SimulationFigures::settling_s,
+                    "From that instant until |response - command| stays within the band, (3,), s; inf: not within the "
+                    "limit.")
+      .def_readonly("peak_mm", &SimulationFigures::peak_mm, "Largest |response - command| before it, (3,), mm.")
+      .def_readonly("peak_acceleration_mm_per_s2", &SimulationFigures::peak_acceleration_mm_per_s2,
+                    "Of the command, (3,), mm/s^2.")
+      .def_readonly("command", &SimulationFigures::command, "Deviation of the command from the path.")
+      .def_readonly("response", &SimulationFigures::response, "Deviation of the response from the path.")
+      .def_readonly("orbit_error_percent", &SimulationFigures::orbit_error_percent, "Per arc of the path.")
+      .def_readonly("response_orbit_error_percent", &SimulationFigures::response_orbit_error_percent,
+                    "The same of the response, where asked for.")
+      .def_readonly("feed_excess", &SimulationFigures::feed_excess, "Of the command, where asked for.")
+      .def_readonly("end_mm", &SimulationFigures::end_mm, "Last set-point, (3,), mm.")
+      .def_readonly("starved", &SimulationFigures::starved, "One per PlaybackOptions.starved_blocks.")
+      .def_readonly("other_overrides", &SimulationFigures::other_overrides, "One per PlaybackOptions.other_overrides.")
+      .def_property_readonly(
+          "recorded_command", [](const SimulationFigures& self) { return recorded(self.recorded_command); },
+          "(n, 3), mm.")
+      .def_property_readonly(
+          "recorded_response", [](const SimulationFigures& self) { return recorded(self.recorded_response); },
+          "(n, 3), mm.");
+
+  module.def(
+      "play_path",
+      [](std::shared_ptr<Path> path, std::shared_ptr<SpeedProfile> profile, const SimulationOptions& options,
+         const std::shared_ptr<Path>& programmed) {
+        const py::gil_scoped_release release;
+        return std::make_shared<SimulationFigures>(
+            programmed ? simulate_path(std::move(path), std::move(profile), *programmed, options)
+                       : simulate_path(std::move(path), std::move(profile), options));
+      },
+      py::arg("path").none(false), py::arg("profile").none(false), py::arg("options"),
+      py::arg("programmed") = py::none(),
+      "Simulate a path under a speed profile (a controller with look-ahead) through filters and plant, measured "
+      "against "
+      "the programmed path (None: the path itself).");
+
+  module.def(
+      "play_planned",
+      [](const std::shared_ptr<Path>& path, const MotionLimits& limits, const SimulationOptions& options,
+         const std::shared_ptr<Path>& programmed) {
+        const py::gil_scoped_release release;
+        return std::make_shared<SimulationFigures>(simulate_planned(path, limits, *programmed, options));
+      },
+      py::arg("path").none(false), py::arg("limits"), py::arg("options"), py::arg("programmed").none(false),
+      "simulate_path under the profile of plan_speed, which is not kept as a whole where it need not be.");
+
+  module.def(
+      "play_blocks",
+      [](const std::shared_ptr<Path>& blocks, const std::shared_ptr<Path>& path, BlockEnd block_end,
+         double override_ratio, const SimulationOptions& options) {
+        const py::gil_scoped_release release;
+        return std::make_shared<SimulationFigures>(
+            simulate_blocks(blocks->segments(), *path, block_end, override_ratio, options));
+      },
+      py::arg("blocks").none(false), py::arg("path").none(false), py::arg("block_end"), py::arg("override_ratio"),
+      py::arg("options"),
+      "Simulate blocks at their feed (a controller without look-ahead), measured against the programmed path.");
+
+  module.def(
+      "play_samples",
+      [](const MatrixArray& positions_mm, const std::shared_ptr<Path>& path, const SimulationOptions& options) {
+        const Samples samples = samples_from(positions_mm, options.period_s);
+        const py::gil_scoped_release release;
+        return std::make_shared<SimulationFigures>(simulate_samples(samples, *path, options));
+      },
+      py::arg("positions_mm"), py::arg("path").none(false), py::arg("options"),
+      "Simulate set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.");
+
+  module.def(
+      "play_duration_s",
+      [](const std::shared_ptr<Path>& blocks, double period_s, BlockEnd block_end, double override_ratio) {
+        const py::gil_scoped_release release;
+        return blocks_duration_s(blocks->segments(), period_s, block_end, override_ratio);
+      },
+      py::arg("blocks").none(false), py::arg("period_s"), py::arg("block_end"), py::arg("override_ratio") = 1.0,
+      "Sum of block durations, s.");
+
+  module.def(
+      "fastest_block_ends", [](const std::shared_ptr<Path>& blocks) { return fastest_block_ends(blocks->segments()); },
+      py::arg("blocks").none(false),
+      "Per axis the block, but for the last, at whose end it is fastest; ascending, each once.");
+
+  module.def(
+      "count_slowed_blocks",
+      [](const std::shared_ptr<Path>& blocks, const Vector3& corner_speed_difference, const Vector3& max_feed) {
+        const py::gil_scoped_release release;
+        return count_slowed_blocks(blocks->segments(), {corner_speed_difference, max_feed});
+      },
+      py::arg("blocks").none(false), py::arg("corner_speed_difference_mm_per_s"), py::arg("max_feed_mm_per_s"),
+      "Blocks that a controller with look-ahead would run slower than programmed.");
+}
+
+}  // namespace shapegcode::bindings

@@ -1,0 +1,399 @@
+"""How a machine file has programs read (offsets, variables, other programs), shaped and written; when they are good."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
+
+from shapegcode.settings.keys import Bool, Float, NonNegative, Positive, Text, TomlTable, key, toml
+
+_OFFSET_NAME = re.compile(r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}")
+
+
+def _named(pattern: str, wrong: str) -> AfterValidator:
+    """Refuse a table with a name that does not have the form."""
+
+    def check(table: dict[str, Any]) -> dict[str, Any]:
+        for name in table:
+            if not re.fullmatch(pattern, name):
+                raise ValueError(f"{json.dumps(name)} {wrong}")
+        return table
+
+    return AfterValidator(check)
+
+
+_NUMBERED = _named("[1-9][0-9]{0,7}", 'is no number; names are whole numbers, for example "1"')
+_G_CODED = _named(r"[1-9][0-9]{0,3}(\.[1-9])?", 'is no G code; names are for example "120" or "120.1"')
+_RETAINED = _named("[5-9][0-9]{2}", 'is no variable that the control keeps: "500" ... "999"')
+_Lengths = Annotated[dict[str, Float], _NUMBERED]
+_Programs = dict[str, Annotated[int, Strict(), Field(ge=1, le=99_999_999)]]
+
+
+class Input(TomlTable):
+    """How programs are read."""
+
+    arc_centre: Literal["incremental", "absolute"] = key(
+        'I J K of an arc: "incremental" from its start, as FANUC reads them; "absolute" for programs posted '
+        "for other controls",
+        default="incremental",
+    )
+    arc_without_centre: Literal["alarm", "line"] = key(
+        'G02 or G03 without R, I, J, K: "alarm" 0022, or a "line" to its end',
+        fanuc="3403#5",
+        default="alarm",
+        assumed=True,
+    )
+    tool_change_unknown_axes: Annotated[str, Strict(), Field(pattern=r"^X?Y?Z?$")] = key(
+        "axes whose position is not known after M06, until they are programmed again; letters of XYZ in this order",
+        default="XYZ",
+        assumed=True,
+    )
+    work_offsets: dict[str, tuple[Float, Float, Float]] = key(
+        'work offsets, for programs that use more than one: G54 = [x, y, z]; "G54.1P5" = [x, y, z]; one that '
+        "is left out is zero",
+        unit="mm",
+        default={},
+    )
+    tool_radius_mm: _Lengths = key(
+        'cutter radius by offset number D, for programs with G41 or G42 that are expanded: { "1" = 5.0 }', default={}
+    )
+    tool_radius_wear_mm: _Lengths = key("wear of the radius by offset number D", default={})
+    tool_length_mm: _Lengths = key(
+        "tool length by offset number H; with it the Z travel of a tool length change is known", default={}
+    )
+    tool_length_wear_mm: _Lengths = key("wear of the length by offset number H", default={})
+    compensation: Literal["refuse", "expand", "keep"] = key(
+        'what `convert` does with cutter compensation G41/G42. "refuse": says so and stops; "expand": shapes the tool '
+        'path of the radius given here: the offset in the control no longer acts; "keep": leaves these moves as they '
+        "are. Cycle time and pictures always use the expanded path where the radius is known",
+        default="refuse",
+    )
+    compensation_start_up: Literal["A", "B"] = key(
+        "kind of the start-up and cancel moves of cutter compensation", fanuc="5003#0, #1", default="A", assumed=True
+    )
+    material_side: Literal["left", "right"] | None = key(
+        "side of the programmed tool path on which the workpiece lies, seen along the travel: right where the contour "
+        "is cut as with G41, left as with G42; with it deviations are reported as gouge and excess; left out: not "
+        "known",
+        default=None,
+    )
+    scale_unit: Annotated[Positive, Field(le=1)] = key(
+        "unit of the factors P, I, J, K of scaling G51 without a decimal point",
+        unit="1",
+        fanuc="5400#7",
+        default=0.001,
+        assumed=True,
+    )
+    peck_clearance_mm: NonNegative = key(
+        "distance to which a peck of G73 and G83 returns before it feeds on; for the cycle time",
+        fanuc="5114, 5115",
+        default=0.5,
+        assumed=True,
+    )
+    block_skip: Literal["unknown", "on", "off"] = key(
+        'block-skip switch on the panel: "on": blocks with / do not run; "off": they run; "unknown": either may be '
+        "true, and nothing is shaped whose state depends on it",
+        default="unknown",
+    )
+    variables: Annotated[dict[str, Float], _RETAINED] = key(
+        'values of the variables that the control keeps, #500 ... #999, for macros that read them: { "500" = 12.5 }',
+        default={},
+    )
+    program_folders: tuple[Text, ...] = key(
+        "folders in which programs are looked for that a file calls and does not hold (O0123, O0123.nc, 0123.NC ...); "
+        "the folder of the calling file comes first",
+        default=(),
+    )
+    opaque_programs: tuple[Annotated[int, Strict(), Field(ge=0)], Annotated[int, Strict(), Field(ge=0)]] = key(
+        "first and last O number of programs of the machine builder or of a probe: a call of one that is not at hand "
+        "is kept as it stands, and position and variables are not known afterwards; a missing program outside of "
+        "these is an error",
+        default=(9000, 9999),
+        assumed=True,
+    )
+    g_macros: Annotated[_Programs, _G_CODED] = key(
+        'G codes that call a macro like G65: { "120" = 9010 }', fanuc="6050 ... 6059", default={}
+    )
+    m_macros: Annotated[_Programs, _NUMBERED] = key(
+        'M codes that call a macro like G65: { "200" = 9020 }', fanuc="6080 ... 6089", default={}
+    )
+    m_subprograms: Annotated[_Programs, _NUMBERED] = key(
+        'M codes that call a subprogram like M98: { "6" = 9001 }', fanuc="6071 ... 6079", default={}
+    )
+    tool_program: Annotated[int, Strict(), Field(ge=0, le=99_999_999)] = key(
+        "program that every T code calls, with T in #149; 0: none", fanuc="6001#5", default=0
+    )
+    max_line_length: Annotated[int, Strict(), Field(ge=20, le=100_000)] = key(
+        "a longer line is an error", unit="characters", default=250, assumed=True
+    )
+
+    @field_validator("work_offsets")
+    @classmethod
+    def _known_offsets(cls, offsets: dict[str, Any]) -> dict[str, Any]:
+        for name in offsets:
+            if not _OFFSET_NAME.fullmatch(name):
+                raise ValueError(f'{name} is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"')
+        return offsets
+
+
+_BLOCK_CHARACTERS = re.compile(r"[A-Z0-9 .,+\-*/=#\[\]()<>_:;&]*")
+_LOOK_AHEAD = re.compile(r"G(?:0?5\.1 *Q|0?8 *P)(\d)(?!\d)")
+
+
+class Emission(TomlTable):
+    """How shaped programs are written."""
+
+    block_period_s: Annotated[Positive, Field(le=1)] | None = key(
+        "duration of a short block: a whole multiple of controller.interpolation_period_s and not below "
+        "controller.block_time_s; left out: chosen for the shortest shaper",
+        default=None,
+    )
+    prologue: tuple[Text, ...] = key(
+        'lines written before each shaped cut, for example ["G05.1 Q0"] to switch a look-ahead mode off', default=()
+    )
+    epilogue: tuple[Text, ...] = key("lines written after each shaped cut", default=())
+    override: Literal["ask", "any", "lock"] = key(
+        'what is done about the feed override while shaped moves run. "ask": the header asks for 100 %, but for a '
+        'verdict.override_percent that states more, where it is as "any"; "lock": '
+        "lock_lines switch the feed override off before each shaped cut, unlock_lines switch it on again behind it; "
+        '"any": blocks of one duration, of which the override changes the speed and little else (more text, and a '
+        "block period that suits other overrides)",
+        default="ask",
+    )
+    lock_lines: tuple[Text, ...] = key(
+        'lines that switch the feed override off, for override = "lock"; a builder\'s own code, for example ["M49"], '
+        "goes here",
+        fanuc="#3004",
+        default=("#33=#3004", "#3004=[#33OR2]"),
+    )
+    unlock_lines: tuple[Text, ...] = key(
+        "lines that give the feed override back as it was. Macro statements run when they are read, so G53 comes "
+        'first: it is not read past until the moves before it are done. For a builder\'s own code ["M48"]',
+        fanuc="#3004",
+        default=("G53", "#3004=#33"),
+    )
+    prefill_dwell_s: Annotated[NonNegative, Field(le=60)] = key(
+        "dwell before each shaped cut, in which the block buffer fills; 0: none", default=0.0
+    )
+    restart_interval_s: Positive = key(
+        "cutting time between restart points of a shaped cut, at most, where its command comes nearly to rest anyway; "
+        "a block period or more; longer than the cuts: none",
+        default=60.0,
+    )
+    restart_stops: Bool = key(
+        "let a shaped cut stop for a restart point where it comes nowhere near rest for restart_interval_s: costs "
+        "time, and the tool stands in the cut",
+        default=False,
+    )
+    compensation_guard: Literal["alarm", "stop"] = key(
+        'where cutter compensation was expanded: "alarm" compares the offset in the control with the expanded radius '
+        'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always so where '
+        "programs are drip fed: IF cannot run from there)",
+        default="alarm",
+    )
+    header: Bool = key(
+        "write comments: tool version, machine, modes, block period, shaper length, override, time constant",
+        default=True,
+    )
+    failed_suffix: Annotated[str, Strict(), Field(min_length=1, pattern=r"^[^/\\\x00-\x1f]+$")] = key(
+        "added to the name of an output that misses its tolerance, so that nobody runs it by mistake",
+        default=".out-of-tolerance",
+    )
+    max_line_length: Annotated[int, Strict(), Field(ge=30, le=250)] = key(
+        "longest line written", unit="characters", default=60, assumed=True
+    )
+    arc_min_chord_mm: NonNegative = key(
+        "a piece of an arc with a shorter chord is written as a line: rounding could turn it into a full circle",
+        default=0.02,
+    )
+    merge_tolerance_increments: NonNegative = key(
+        "blocks are merged into one where the path and the feed stay within this many least increments; "
+        "0: only where they agree exactly",
+        unit="increments",
+        default=0.35,
+    )
+    rounding: Literal["vibration", "nearest"] = key(
+        'how the ends of blocks are rounded. "vibration": to that of the two neighbouring increments that leaves the '
+        'modes at rest; "nearest": each to the nearest increment, which leaves up to several increments of vibration',
+        default="vibration",
+    )
+
+    @field_validator("prologue", "epilogue", "lock_lines", "unlock_lines")
+    @classmethod
+    def _fanuc_lines(cls, lines: tuple[str, ...]) -> tuple[str, ...]:
+        for line in lines:
+            if not _BLOCK_CHARACTERS.fullmatch(line):
+                raise ValueError(
+                    f"the line {json.dumps(line)} has a character other than capital letters, digits and "
+                    "signs that a program may hold (no %, no end of line)"
+                )
+        return lines
+
+    @model_validator(mode="after")
+    def _lines_fit(self) -> Emission:
+        for line in (*self.prologue, *self.epilogue, *self.lock_lines, *self.unlock_lines):
+            if len(line) > self.max_line_length:
+                raise ValueError(
+                    f"the line {json.dumps(line)} has {len(line)} characters, emission.max_line_length is "
+                    f"{self.max_line_length}"
+                )
+        return self
+
+    @property
+    def prefill_lines(self) -> tuple[str, ...]:
+        """The dwell before each shaped cut, as a line; none where there is none."""
+        return (f"G04P{round(self.prefill_dwell_s * 1e3)}",) if self.prefill_dwell_s > 0.0 else ()
+
+    @property
+    def leaves_look_ahead(self) -> bool:
+        """Whether the prologue switches a look-ahead mode off: G05.1 Q0 or G08 P0."""
+        last = [found for line in self.prologue for found in _LOOK_AHEAD.findall(line)]
+        return bool(last) and last[-1] == "0"
+
+
+_Family = Literal[
+    "auto", "zv", "zvd", "zvdd", "mzv", "ei", "ei2", "ei3", "si", "negative-zv", "polynomial", "non-negative",
+    "robust", "mirrored", "smooth-zv", "smooth-mzv", "smooth-ei", "smooth-ei2", "smooth-si", "smooth-zvd-ei",
+]  # fmt: skip
+
+
+class Shaping(TomlTable):
+    """What is shaped, and how."""
+
+    max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", default=0.25)
+    family: _Family = key(
+        'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative impulses, '
+        "exact at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
+        default="auto",
+    )
+    per_axis: Bool = key(
+        "a shaper for each axis, which cancels only that axis' modes: shorter than one for all, usable because the "
+        'contour is brought back (not with contour = "off", stated bands, or modes that move with an axis)',
+        default=False,
+    )
+    vibration_limit: Annotated[Positive, Field(lt=1)] = key(
+        "largest residual vibration over the modes' bands as a share of the unshaped one, for families that leave some",
+        unit="1",
+        default=0.05,
+    )
+    arc_feed_ratio: Annotated[Positive, Field(le=1)] = key(
+        "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction", default=1.0
+    )
+    contour: Literal["response", "command", "off"] = key(
+        "what contour compensation keeps on the programmed path behind the shaper, at the highest feed within "
+        'tolerance.contour_um: "response" is the table with its modes, and so the part; "command" the set-points; '
+        '"off": neither, the feed alone keeps the command within the tolerance',
+        default="response",
+    )
+    rapids: Bool = key(
+        "write rapids (G00) as shaped cutting moves where the table is settled for the next cut sooner; rapid override "
+        "does not act on them",
+        default=False,
+    )
+    least_gain_um: NonNegative = key(
+        "a cut stays unchanged unless shaping lowers residual vibration or the contour error of the machine table by "
+        "at least this; 0: everything is shaped",
+        default=3.0,
+    )
+    plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
+        "a corner is a forced stop of the shaped command if a side of it leans from the Z axis by no more than "
+        "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",
+        default=15.0,
+    )
+    part_mass_kg: NonNegative | None = key(
+        "mass of the part on the table, for modes with a table over mass_kg; left out: not known, and their "
+        "nominal frequency holds",
+        default=None,
+    )
+
+
+_Override = Annotated[Positive, Field(le=254)]
+
+
+class Tolerance(TomlTable):
+    """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
+
+    contour_um: Positive = key(
+        "largest deviation from the programmed path of what shaping.contour names: the response, or the command",
+        default=20.0,
+    )
+    residual_ratio: Annotated[NonNegative, Field(le=1)] = key(
+        "residual vibration passes if it is below this share of the original program's, or below residual_floor_um",
+        default=0.25,
+    )
+    residual_floor_um: NonNegative = key(
+        "residual vibration below this passes whatever the original's was", default=3.0
+    )
+    residual_floor_increments: NonNegative = key(
+        "residual vibration below this passes too: rounding the words alone may leave a lightly damped mode so much",
+        unit="increments",
+        default=5.0,
+    )
+    feed_excess_ratio: Annotated[NonNegative, Field(ge=0.01, le=10)] = key(
+        "share by which the set-points may run faster along the path than the program says at the same place, counted "
+        "over one, four and sixteen shortest blocks less the two increments by which rounding may lengthen a block; "
+        "corrections of the contour keep to it, and ask for 0.01 at least",
+        default=0.05,
+    )
+
+
+class Price(TomlTable):
+    """What shaping may cost: a cut that costs more gets the tightest tolerance within the price, or stays as it is."""
+
+    program_time_percent: Annotated[Positive, Field(le=1e6)] = key(
+        "largest increase of the program's time", default=10.0
+    )
+    cut_time_percent: Annotated[Positive, Field(le=1e6)] = key("largest increase of the time of one cut", default=25.0)
+
+
+ANY_PRICE = {"price.program_time_percent": 1e6, "price.cut_time_percent": 1e6}
+"""Values of a machine on which shaping may take any time: where its effect is asked for, not its worth."""
+
+
+class Verdict(TomlTable):
+    """The stated band: which of the cases that are simulated decide. All are shown; 100 % override always counts."""
+
+    plant: Literal["modal", "feed-drive"] = key(
+        'what stands behind the command: "modal": the modes behind an ideal servo, so that servo lag is no part of the '
+        'verdict; "feed-drive": motor, screw, friction and servo loops of axes.*.drive with the modes, where they are '
+        "known: the contour error then holds their lag, the residual is the vibration of the table behind its motor",
+        default="modal",
+    )
+    override_percent: tuple[_Override, _Override] = key(
+        "lowest and highest feed override under which the program will run: every case in between must be good. The "
+        "header of a program asks for 100 %, so only that counts unless you state more",
+        default=(100.0, 100.0),
+    )
+    mode_uncertainty: Bool = key(
+        "whether every mode must be allowed to be off by its frequency_uncertainty_percent, with less damping by its "
+        "damping_uncertainty_percent; modes that state neither are taken as exact",
+        default=True,
+    )
+    block_end: Literal["both", "own"] = key(
+        '"both": the program must be good under either rule of block timing; "own": under controller.block_end, '
+        "for a controller whose rule is known",
+        default="both",
+    )
+    look_ahead: Bool = key(
+        "whether the program must be good with the look-ahead mode left on, which plans the shaped blocks anew; "
+        "false: it is off while they run (emission.prologue)",
+        default=False,
+    )
+    starved_block: Bool = key(
+        "whether the program must be good if the block buffer runs empty once, at the worst place; false: it never "
+        "does (memory or a data server, emission.prefill_dwell_s)",
+        default=False,
+    )
+    starved_s: Annotated[Positive, Field(le=10)] = key(
+        "how long the axes then wait for the next block", default=0.02, assumed=True
+    )
+
+    @model_validator(mode="after")
+    def _band_ascends(self) -> Verdict:
+        low, high = self.override_percent
+        if low > high:
+            raise ValueError(f"override_percent = {toml(self.override_percent)}: the lower end comes first")
+        return self

@@ -1,0 +1,133 @@
+"""Programs on the machine that runs them: what the header of an emitted one says of it, and simulated for a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from shapegcode.machine import Machine
+from shapegcode.model.modes import axis_modes
+from shapegcode.program import Program
+from shapegcode.program.stamp import Stamp, text_mark
+
+if TYPE_CHECKING:
+    from shapegcode.results.page.scene import Scene
+
+_WHOLE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedPrograms:
+    """A program, and the one that was made of it.
+
+    Attributes:
+        original: what is simulated.
+        machine: controller and plant.
+        emitted: made of it; None: none.
+        labels: of both, for people.
+        plant: "modal" or "feed-drive".
+    """
+
+    original: Program
+    machine: Machine
+    emitted: Program | None = None
+    labels: tuple[str, str] = ("original", "emitted")
+    plant: str = "modal"
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods of the controller and the plant that play them; see `Result.methods`."""
+        control, drives = self.machine.controller, [axis.drive for axis in self.machine.axes.as_tuple()]
+        used = {
+            "block overlap": control.motion == "after_interpolation",
+            "junction deviation": control.motion == "look_ahead" and control.corner_rule == "junction_deviation",
+            "LuGre friction": self.plant != "modal"
+            and any(drive is not None and drive.friction_model == "lugre" for drive in drives),
+        }
+        return tuple(name for name, is_used in used.items() if is_used)
+
+    def scene(self, on_progress: Callable[[float], None] = lambda _done: None) -> Scene | None:
+        """Simulate them."""
+        from shapegcode.model.scene import scene_of
+
+        return scene_of(
+            self.original, self.machine, self.emitted, labels=self.labels, plant=self.plant, on_progress=on_progress
+        )
+
+
+def stamp_of_machine(machine: Machine, *, version: str = "") -> Stamp:
+    """The part of a header that the machine alone decides."""
+    modes = [
+        f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
+        for axis, modes in zip("XYZ", axis_modes(machine), strict=True)
+        for mode in modes
+    ]
+    return Stamp(version, machine.name, tuple(modes), "", "", "", _own_filter(machine))
+
+
+def _own_filter(machine: Machine) -> str:
+    controller = machine.controller
+    time_s, bell_s = controller.shaped_time_constant_s, controller.shaped_bell_time_s
+    exponential = " EXPONENTIAL" if controller.shaped_filter_shape == "exponential" and time_s else ""
+    bell = f" BELL {bell_s * 1e3:g} MS" if bell_s else ""
+    return f"{time_s * 1e3:g} MS{exponential}{bell}"
+
+
+def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]:
+    """Why the verdict in the header of an emitted program does not hold here."""
+    stamp = program.stamp
+    if stamp is None:
+        return []
+    found = []
+    if (mark := text_mark(program.own_text)) != stamp.mark:
+        found.append(
+            (
+                "edited",
+                f"the program was changed since it was shaped (its header says {stamp.mark}, it comes to {mark}): the "
+                "verdict in its header does not hold for it; convert the original again",
+            )
+        )
+    if difference := stamp.difference(stamp_of_machine(machine)):
+        found.append(
+            ("other_machine", f"shaped for another machine ({difference}): it is no remedy for this one's vibration")
+        )
+    if why := _other_period(stamp, machine):
+        found.append(("other_period", why))
+    if not program.shaped_regions:
+        found.append(
+            (
+                "unmarked",
+                "its header says that it is shaped, but no cut is marked (SHAPED): simulated as an ordinary program "
+                "(simulate --shaped simulates all of it as shaped blocks)",
+            )
+        )
+    return found
+
+
+def _other_period(stamp: Stamp, machine: Machine) -> str:
+    controller, stated_s = machine.controller, machine.emission.block_period_s
+    try:
+        period_s = float(stamp.block_period_ms) * 1e-3
+    except ValueError:
+        return f"its header gives no block period: {stamp.block_period_ms!r}"
+    ticks = period_s / controller.interpolation_period_s
+    blocks = f"its blocks last {stamp.block_period_ms} ms"
+    if abs(ticks - round(ticks)) > _WHOLE:
+        tick_ms = controller.interpolation_period_s * 1e3
+        return f"{blocks}, which is no whole number of this control's periods of {tick_ms:g} ms"
+    if period_s < controller.block_time_s * (1.0 - _WHOLE):
+        return f"{blocks}, this control needs {controller.block_time_s * 1e3:g} ms for a block: buffer underrun"
+    if stated_s is not None and abs(stated_s - period_s) > _WHOLE * period_s:
+        return f"{blocks}, emission.block_period_s is {stated_s * 1e3:g} ms here"
+    return ""
+
+
+def shaped_note(program: Program) -> str:
+    """How a program is simulated, in one sentence; empty for one without shaped regions."""
+    shaped, whole = program.shaped_regions, len(program.regions)
+    if not shaped:
+        return ""
+    others = "" if shaped == whole else f"; the other {whole - shaped} as the control executes any program"
+    how = f"{shaped} of {whole} regions are simulated block by block at their feed"
+    return f"its header says that it is shaped: {how}{others}"

@@ -1,0 +1,83 @@
+"""What this computer offers a run: processors, and memory, which is asked for before it is needed."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+
+from shapegcode._core import ProgramError
+
+_CGROUP = Path("/sys/fs/cgroup")
+_PER_LINE = 130
+"""Bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)."""
+_SMALL_BYTES = 2**20
+MEMORY_NEEDED = "bytes of memory are needed"
+"""What a refusal for want of memory says: a batch that limits it tells it apart by that."""
+
+
+def cores() -> int:
+    """Processors that this process may use, by its affinity; SHAPEGCODE_THREADS says another number."""
+    stated = os.environ.get("SHAPEGCODE_THREADS", "")
+    if stated.isdecimal() and int(stated) > 0:
+        return int(stated)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def available_bytes() -> int | None:
+    """Memory that this process may still take: of the machine, of its control group, and of its own limits."""
+    found = [_kilobytes("/proc/meminfo", "MemAvailable"), *_of_groups(), *_of_own_limits()]
+    known = [value for value in found if value is not None]
+    return max(0, min(known)) if known else None
+
+
+def require_memory(source: str, needed: int, what: str) -> None:
+    """Refuse what the memory would not hold."""
+    available = available_bytes()
+    if available is not None and needed > available:
+        raise ProgramError(
+            f"{source}:1:1: {what}: some {needed} {MEMORY_NEEDED} and {available} are available; split the "
+            "program, or take a machine with more memory"
+        )
+
+
+def require_memory_for_lines(text: bytes, source: str, per_line: int = _PER_LINE) -> None:
+    """Refuse a program text whose lines the memory would not hold; one of less than a megabyte is not counted."""
+    if len(text) > _SMALL_BYTES:
+        lines = text.count(b"\n")
+        require_memory(source, lines * per_line, f"{lines} lines are to be read")
+
+
+def _kilobytes(file: str, name: str) -> int | None:
+    """A line "Name:  123 kB" of a file of /proc, in bytes."""
+    with contextlib.suppress(OSError):
+        for line in Path(file).read_text().splitlines():
+            if line.startswith(f"{name}:"):
+                return int(line.split()[1]) * 1024
+    return None
+
+
+def _of_groups() -> list[int | None]:
+    """What the control group of this process (version 2) leaves."""
+    with contextlib.suppress(OSError, ValueError):
+        own = Path("/proc/self/cgroup").read_text().partition("::")[2].strip().lstrip("/")
+        for folder in {_CGROUP / own, _CGROUP}:
+            limit = folder / "memory.max"
+            if limit.is_file() and (limit_text := limit.read_text().strip()) != "max":
+                return [int(limit_text) - int((folder / "memory.current").read_text())]
+    return []
+
+
+def _of_own_limits() -> list[int | None]:
+    """What `ulimit` leaves of address space and data."""
+    try:
+        import resource
+    except ModuleNotFoundError:  # not on this system
+        return []
+    found: list[int | None] = []
+    for limit, taken in ((resource.RLIMIT_AS, "VmSize"), (resource.RLIMIT_DATA, "VmData")):
+        most = resource.getrlimit(limit)[0]
+        used = _kilobytes("/proc/self/status", taken)
+        if most != resource.RLIM_INFINITY and used is not None:
+            found.append(most - used)
+    return found
