@@ -39,7 +39,9 @@ class HardRecord:
 
 def accelerance(modes: tuple[TrueMode, ...], rigid_mass_kg: float | None, s: ComplexArray) -> ComplexArray:
     """Acceleration over force of the structure at points of the Laplace plane."""
-    total = np.zeros(len(s), dtype=np.complex128) if rigid_mass_kg is None else np.full(len(s), 1.0 / rigid_mass_kg + 0j)
+    total = (
+        np.zeros(len(s), dtype=np.complex128) if rigid_mass_kg is None else np.full(len(s), 1.0 / rigid_mass_kg + 0j)
+    )
     for mode in modes:
         total += s**2 / mode.mass_kg / (s**2 + 2.0 * mode.damping_ratio * mode.omega * s + mode.omega**2)
     return total
@@ -65,7 +67,9 @@ def structure(rng: np.random.Generator) -> tuple[tuple[TrueMode, ...], float | N
     damping += list(np.exp(rng.uniform(np.log(0.005), np.log(0.05), above)))
     total = float(np.exp(rng.uniform(np.log(2.0), np.log(200.0))))
     masses = total * np.exp(rng.normal(0.0, 0.6, len(hertz)))
-    modes = sorted((TrueMode(*each) for each in zip(hertz, damping, map(float, masses), strict=True)), key=lambda m: m.omega)
+    modes = sorted(
+        (TrueMode(*each) for each in zip(hertz, damping, map(float, masses), strict=True)), key=lambda m: m.omega
+    )
     return tuple(modes), (None if rng.random() < 0.5 else total * float(rng.uniform(0.5, 3.0)))
 
 
@@ -105,11 +109,11 @@ def hard_record(seed: int) -> HardRecord:
     drift, hum = top * rng.uniform(0.0, 0.01), top * rng.uniform(0.0, 0.003)
     for force, response in clean:
         phases = rng.uniform(0.0, 2.0 * np.pi, 2)
-        response = response + top * noise * rng.standard_normal(SAMPLES)
-        response = response + drift * float(rng.uniform(-1, 1)) * (1.0 - np.exp(-time_s / float(rng.uniform(0.3, 3.0))))
-        response = response + hum * (np.sin(314.159 * time_s + phases[0]) + 0.4 * np.sin(942.478 * time_s + phases[1]))
-        force = force + top_n * noise * rng.standard_normal(SAMPLES)
-        noisy.append((_converted(force, 1.5 * top_n), _converted(response, 1.5 * top)))
+        recorded = response + top * noise * rng.standard_normal(SAMPLES)
+        recorded += drift * float(rng.uniform(-1, 1)) * (1.0 - np.exp(-time_s / float(rng.uniform(0.3, 3.0))))
+        recorded += hum * (np.sin(314.159 * time_s + phases[0]) + 0.4 * np.sin(942.478 * time_s + phases[1]))
+        pushed = force + top_n * noise * rng.standard_normal(SAMPLES)
+        noisy.append((_converted(pushed, 1.5 * top_n), _converted(recorded, 1.5 * top)))
     records = tuple(
         Record(f"hit {number}", 1.0 / RATE_HZ, response, "acceleration", force)
         for number, (force, response) in enumerate(noisy, start=1)

@@ -274,6 +274,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "what a file does not say": (
         "time_column", "force_column", "response_columns", "time_unit", "force_unit", "response_unit", "period_s",
         "quantity", "force_scale", "response_scale", "force_sensitivity", "response_sensitivity", "response_first",
+        "exponential_window_s",
     ),
     "runs": (
         "draws", "batch_command", "resume", "jobs", "time_limit", "memory_limit", "scheduler", "tls_ca", "tls_cert",

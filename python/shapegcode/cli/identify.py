@@ -44,6 +44,10 @@ _OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
         "of the sensor, where the response is in volts: 100mV/g",
     ),
     (
+        "--exponential-window", "exponential_window_s", {"metavar": "TIME", "type": arguments.seconds},
+        "time constant of an exponential window that the analyser applied to the response, such as 50ms",
+    ),
+    (
         "--response-first", "response_first", {"action": "store_true", "default": False},
         "in a WAV file the response is the first channel, not the force",
     ),

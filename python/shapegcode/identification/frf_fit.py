@@ -98,10 +98,12 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
             f"are of several points: the modes are those of all, masses those at {used[0].source}"
         )  # fmt: skip
         notes.append(f"{len(used)} frequency responses {said}")
-    notes.append(
-        "a frequency response no longer tells overload, double hits or windows: an exponential window adds its damping"
-    )
-    measured = _of_responses(merged)
+    if sought.exponential_window_s is None:
+        notes.append(
+            "a frequency response no longer tells overload, double hits or windows: an exponential window adds its "
+            "damping, unless --exponential-window states it"
+        )
+    measured = _of_responses(merged, sought.exponential_window_s)
     found = find(measured, sought)
     turned: list[str] = []
     if _all_opposed(found):
@@ -111,7 +113,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
         )
         merged = [replace(each, response=-each.response) for each in merged]
         used = [replace(each, response=-each.response) for each in used]
-        measured = _of_responses(merged)
+        measured = _of_responses(merged, sought.exponential_window_s)
         found = find(measured, sought)
     lines = [found.model[0]] * len(used) if one_point and len(used) > 1 else list(found.model)
     left = np.concatenate([each.response - model for each, model in zip(used, lines, strict=True)])
@@ -180,29 +182,30 @@ def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
     return [replace(used[0], response=mean, coherence=np.clip(power / (power + scatter + 1e-300), 0.0, 1.0))]
 
 
-def _of_responses(responses: Sequence[FrequencyResponse]) -> _Measured:
-    parts = tuple(measured_lines(each) for each in responses)
+def _of_responses(responses: Sequence[FrequencyResponse], applied_s: float | None) -> _Measured:
+    parts = tuple(measured_lines(each, applied_s) for each in responses)
     low = min(float(lines.omega[0]) for lines in parts)
     high = max(float(lines.omega[-1]) for lines in parts)
     return _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
 
 
-def hits_measured(ready: Prepared, band_hz: tuple[float, float] | None) -> _Measured:
+def hits_measured(ready: Prepared, sought: Sought) -> _Measured:
     """Hits as they are fitted, without what oscillates throughout."""
     responses = [each.record.response for each in ready.usable]
     period = ready.records[0].period_s
     responses = [each - steady_sines(each, period)[0] for each in responses]
-    return _of_hits(ready, responses, band_hz)
+    return _of_hits(ready, responses, sought)
 
 
-def _of_hits(ready: Prepared, responses: Sequence[FloatArray], band_hz: tuple[float, float] | None) -> _Measured:
+def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -> _Measured:
     period = ready.records[0].period_s
     duration = min(len(each) for each in responses) * period
     excited = min(max(each.excited_hz or 0.0 for each in ready.usable), 0.45 / period)
     low_hz, high_hz = MIN_SWINGS / duration, excited
-    if band_hz is not None:
-        low_hz, high_hz = max(low_hz, band_hz[0]), band_hz[1]
-    hits = hits_of(ready.usable, responses, low_hz / (1.0 + _BESIDE), min(_FURTHER * high_hz, 0.49 / period))
+    if sought.band_hz is not None:
+        low_hz, high_hz = max(low_hz, sought.band_hz[0]), sought.band_hz[1]
+    highest = min(_FURTHER * high_hz, 0.49 / period)
+    hits = hits_of(ready.usable, responses, low_hz / (1.0 + _BESIDE), highest, sought.exponential_window_s)
     force = np.sqrt(np.sum(np.abs(hits.force) ** 2, axis=0))
     low, high = (2.0 * np.pi * each for each in (low_hz, min(1.1 * high_hz, 0.49 / period)))
     return _Measured((hits.lines,), low, high, duration, 1.0 / duration, hits, force / float(np.max(force)))
@@ -213,7 +216,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
 
     What oscillates throughout is looked for once more in what a first model leaves.
     """
-    measured = hits_measured(ready, sought.band_hz)
+    measured = hits_measured(ready, sought)
     pool, poles = candidates_of(measured.parts)
     windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
     hits = measured.hits
@@ -230,7 +233,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
         response[start : start + hits.count] -= sines
         responses.append(response)
     if found:
-        measured = _of_hits(ready, responses, sought.band_hz)
+        measured = _of_hits(ready, responses, sought)
     found_modes = find(measured, sought, pool, poles, modes_of(windows))
     assert measured.hits is not None
     inside = (measured.parts[0].omega >= measured.low) & (measured.parts[0].omega < measured.high)

@@ -97,7 +97,8 @@ def identify(
         raise ArgumentError("force is given without a response: identify(time_s, response, force)")
     sources: Sequence[Any] = [source] if isinstance(source, str | Path) else source  # type: ignore[assignment]
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
-    sought = Sought(band_hz, max_modes, modes, accepted_percent)
+    window_s = None if options is None else options.exponential_window_s
+    sought = Sought(band_hz, max_modes, modes, accepted_percent, window_s)
     ready: Prepared | None = None
     try:
         swept = _swept(sources, options or ReadOptions())
@@ -178,9 +179,14 @@ _POSSIBLY = 15.0  # by so much (twice the logarithm of the odds) another course 
 def find_modes(ready: Prepared, files: tuple[str, ...], sought: Sought) -> Identification:
     """Find the modes that checked records of the same point support; see `identify.identify`."""
     problem = problem_of(ready, sought.band_hz, within=sought.modes is not None)
-    if isinstance(problem, Taps) and sought.modes is None and not are_blows(ready):
+    windowed = sought.exponential_window_s is not None
+    if windowed and not isinstance(problem, Taps):
+        raise RecordError(
+            "an exponential window of a free decay cannot be told from its damping: state it with the force"
+        )
+    if isinstance(problem, Taps) and (windowed or (sought.modes is None and not are_blows(ready))):
         many, fitted = find_hit_modes(ready, sought)
-        if not _are_few(ready, problem, many):
+        if windowed or not _are_few(ready, problem, many):
             return _many(ready, files, many, fitted)
     models = search(problem, sought)
     sought.order(models)

@@ -73,7 +73,7 @@ class Hits:
     starts: tuple[int, ...]  # first sample of each record
     count: int  # samples of each
     period_s: float
-    sigma: float  # 1/s: the window is exp(-sigma t)
+    sigma: float  # 1/s: the window of the responses is exp(-sigma t)
     gain_error: FloatArray  # (n,) relative standard error of the force's spectrum: noise of its channel
 
     def in_time(self, lines: ComplexArray) -> FloatArray:
@@ -84,32 +84,39 @@ class Hits:
         return np.asarray(fft.irfft(whole, self.count, axis=1) * grown, dtype=np.float64)
 
 
-def hits_of(usable: Sequence[Usable], responses: Sequence[FloatArray], low_hz: float, high_hz: float) -> Hits:
+def hits_of(
+    usable: Sequence[Usable], responses: Sequence[FloatArray], low_hz: float, high_hz: float, applied_s: float | None
+) -> Hits:
     """Lines of all hits, each from the beginning of its pulse, with these responses.
 
     Behind the window exp(-t/tau) a system at rest answers at jw + 1/tau as it did at jw: no damping is added, and what
-    the record cuts off is a hundredth of what it was.
+    the record cuts off is a hundredth of what it was. `applied_s`: time constant of a window that the responses have.
     """
     period = usable[0].record.period_s
     starts = [max(0, each.hit.first - _LEAD) if each.hit else 0 for each in usable]
     count = min(len(response) - start for response, start in zip(responses, starts, strict=True))
     sigma = -np.log(_END) / (count * period)
+    applied = 0.0 if applied_s is None else 1.0 / applied_s
     window = np.exp(-sigma * period * np.arange(count))
     frequency = np.fft.rfftfreq(count, period)
     kept = slice(int(np.searchsorted(frequency, low_hz)), int(np.searchsorted(frequency, high_hz, "right")))
 
-    def transformed(samples: Sequence[FloatArray]) -> ComplexArray:
-        cuts = [values[start : start + count] * window for values, start in zip(samples, starts, strict=True)]
+    def transformed(samples: Sequence[FloatArray], along: FloatArray) -> ComplexArray:
+        cuts = [values[start : start + count] * along for values, start in zip(samples, starts, strict=True)]
         return np.asarray(fft.rfft(np.array(cuts), axis=1)[:, kept], dtype=np.complex128)
 
-    force, response = transformed([each.record.force_n for each in usable]), transformed(responses)  # type: ignore[misc]
+    whole = window * np.exp(-applied * period * np.arange(count))
+    force, response = (
+        transformed([np.asarray(each.record.force_n) for each in usable], whole),
+        transformed(responses, window),
+    )
     power = np.sum(np.abs(force) ** 2, axis=0)
     noise = np.mean([(each.response_noise or 0.0) ** 2 for each in usable]) * np.sum(window**2)
     level = max(float(np.sqrt(noise)), _QUIETEST * float(np.max(np.abs(response))))
     lags = fft.fft(window**2)[:_LAGS]
     pulse = np.mean([np.count_nonzero(np.asarray(each.record.force_n)) for each in usable])
     noise_n = np.sqrt(np.mean([(each.force_noise_n or 0.0) ** 2 for each in usable]))
-    plane = np.asarray(sigma + 2j * np.pi * frequency[kept], dtype=np.complex128)
+    plane = np.asarray(sigma + applied + 2j * np.pi * frequency[kept], dtype=np.complex128)
     ratio = np.sum(np.conj(force) * response, axis=0) / power
     nothing = np.zeros((len(power), 0), dtype=np.complex128)
     quantity = POWERS[usable[0].record.quantity]
@@ -125,7 +132,7 @@ _THIRD_DIFFERENCE = 20.0  # squared third difference of white noise, over its va
 _SAME_POINT = 0.1  # responses of one point differ by no more than this share
 
 
-def measured_lines(each: FrequencyResponse) -> Lines:
+def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
     """Lines of a measured response, weighted by its coherence, or by how rough the neighbours are."""
     omega = 2.0 * np.pi * each.frequency_hz
     power = np.abs(each.response) ** 2
@@ -136,7 +143,11 @@ def measured_lines(each: FrequencyResponse) -> Lines:
     else:
         rough = np.abs(np.diff(each.response, 3)) ** 2 / _THIRD_DIFFERENCE
         noise = smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)), omega, quantity)
-    plane, nothing = np.asarray(1j * omega, dtype=np.complex128), np.zeros((len(omega), 0), dtype=np.complex128)
+    applied = 0.0 if applied_s is None else 1.0 / applied_s
+    plane, nothing = (
+        np.asarray(applied + 1j * omega, dtype=np.complex128),
+        np.zeros((len(omega), 0), dtype=np.complex128),
+    )
     alone = np.ones(1, dtype=np.complex128)
     return weighted(Lines(plane, each.response, np.ones(len(omega)), quantity, nothing, alone), noise)
 

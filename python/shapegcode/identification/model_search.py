@@ -77,6 +77,7 @@ class Sought:
     max_modes: int | None
     modes: int | None  # their number; None: by evidence
     accepted_percent: float | None  # see `identify.identify`
+    exponential_window_s: float | None = None  # applied to the response before it was read
 
     def order(self, models: Search) -> int:
         """Number of modes that is taken; refused where the data hold fewer than were asked for."""

@@ -234,7 +234,8 @@ class Identification(Result):
         """Published methods of the fit that was made."""
         if self.sweep is not None:
             return ("modes from a sweep",)
-        return ("modes from frequency responses" if self.responses else "modes from records",)
+        over_time = self.evidence and not self.responses
+        return ("modes from records" if over_time else "modes from frequency responses",)
 
     @property
     def taps(self) -> tuple[Record, ...]:

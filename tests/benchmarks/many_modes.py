@@ -1,6 +1,6 @@
 """Identification of hard simulated impact tests: modes found, false ones, coverage of intervals, CPU time.
 
-Run from the root of the repository: ``python tests/benchmarks/hard_records.py --draws 200`` (``tests/oracles/
+Run from the root of the repository: ``python tests/benchmarks/many_modes.py --draws 200`` (``tests/oracles/
 hard_records.py`` says what is drawn). Counted as to be found: modes within what the hits excite (-20 dB) whose
 Cramér-Rao bounds are below 1 % in frequency and 20 % in damping. Found: supported, within half of the damping ratio in
 frequency and a factor of two in damping. ``--pyema``: sdypy-EMA (``pip install sdypy-EMA``) on the same records.
@@ -9,20 +9,18 @@ frequency and a factor of two in damping. ``--pyema``: sdypy-EMA (``pip install 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
+import numpy as np
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 
-import numpy as np
-from hard_records import RATE_HZ, HardRecord, bounds, hard_record
 from table import markdown
 
+from hard_records import RATE_HZ, HardRecord, bounds, hard_record
 from shapegcode.identification.identify import identify
 from shapegcode.identification.result import IdentifiedMode
 from tap_truth import TrueMode
@@ -105,7 +103,9 @@ def theirs(hard: HardRecord, excited_hz: float, tally: Tally) -> None:
     ratio = np.sum(np.conj(force) * response, axis=0) / np.sum(np.abs(force) ** 2, axis=0)
     frequency = np.fft.rfftfreq(len(used[0].response), 1.0 / RATE_HZ)
     kept = frequency < 1.3 * excited_hz
-    model = EMA.Model(ratio[None, kept], frequency[kept], lower=20, upper=excited_hz, pol_order_high=60, frf_type="accelerance")
+    model = EMA.Model(
+        ratio[None, kept], frequency[kept], lower=20, upper=excited_hz, pol_order_high=60, frf_type="accelerance"
+    )
     model.get_poles(show_progress=False)
     found = stable_poles(model)
     tally.seconds.append(time.process_time() - start)
