@@ -63,11 +63,11 @@ int main() {
   });
 
   for (const BlockEnd end : {BlockEnd::ceil, BlockEnd::carry}) {
-    BlockInterpolator interpolator(segments, 1e-3, end, 0.9);
+    BlockInterpolator blocks(segments, 1e-3, end, 0.9);
     expect_none(end == BlockEnd::ceil ? "BlockInterpolator::step ceil" : "BlockInterpolator::step carry", [&] {
       long steps = 0;
-      for (; interpolator.step(position); ++steps) sink += position.sum();
-      interpolator.step(position);
+      for (; blocks.step(position); ++steps) sink += position.sum();
+      blocks.step(position);
       return steps;
     });
   }
