@@ -23,7 +23,7 @@ from shapegcode.identification.lines import (
 )
 from shapegcode.identification.modal_fit import Lines, ModalFit
 from shapegcode.identification.modal_search import (
-    Candidate,
+    StablePole,
     Starts,
     Uncertainty,
     Window,
@@ -247,7 +247,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
 def find(
     measured: _Measured,
     sought: Sought,
-    pool: Sequence[Candidate] | None = None,
+    pool: Sequence[StablePole] | None = None,
     poles: Sequence[Pole] = (),
     starts: Starts | None = None,
 ) -> FrfModes:
@@ -370,7 +370,7 @@ def _chart(poles: Sequence[Pole]) -> tuple[ChartPole, ...]:
 
 
 # --- The modes of a window --------------------------------------------------------------------------------------------
-def _modes(window: Window, measured: _Measured, pool: Sequence[Candidate], sought: Sought) -> list[IdentifiedMode]:
+def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], sought: Sought) -> list[IdentifiedMode]:
     fit = window.fit
     if fit is None or not window.inside():
         return []
@@ -470,7 +470,7 @@ def _refusal(
     index: int,
     mode: IdentifiedMode,
     measured: _Measured,
-    pool: Sequence[Candidate],
+    pool: Sequence[StablePole],
     sought: Sought,
 ) -> str:
     """Why the data do not support a mode; empty if they do."""
@@ -529,7 +529,7 @@ def _response_refusal(residues: ComplexArray) -> str:
     return ""
 
 
-def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[Candidate]) -> str:
+def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[StablePole]) -> str:
     """Without a peak of its own and a stable pole, the fit must be clearly worse without the mode."""
     fit = window.fit
     assert fit is not None

@@ -40,7 +40,7 @@ _NO_VIBRATION = 0.5
 
 
 @dataclass(frozen=True)
-class Candidate:
+class StablePole:
     """A pole that models of several orders have."""
 
     omega: float  # rad/s
@@ -48,7 +48,7 @@ class Candidate:
     share: float  # of the models of higher order that have it
 
 
-def candidates_of(parts: Sequence[Lines]) -> tuple[list[Candidate], list[Pole]]:
+def candidates_of(parts: Sequence[Lines]) -> tuple[list[StablePole], list[Pole]]:
     """Poles that stay over orders and bands, ascending, and all poles."""
     low = min(float(lines.omega[0]) for lines in parts)
     high = max(float(lines.omega[-1]) for lines in parts)
@@ -65,14 +65,14 @@ def candidates_of(parts: Sequence[Lines]) -> tuple[list[Candidate], list[Pole]]:
             orders = {pole.order for pole in poles if pole.order > highest // 3}
             found += _clusters([pole for pole in kept if pole.order in orders], len(orders))
         begin *= _STEP
-    candidates: list[Candidate] = []
+    candidates: list[StablePole] = []
     for each in sorted(found, key=lambda each: -each.share):
         if each.share >= _SEEN and not any(_same(each, other) for other in candidates):
             candidates.append(each)
     return sorted(candidates, key=lambda each: each.omega), everything
 
 
-def _clusters(poles: list[Pole], orders: int) -> list[Candidate]:
+def _clusters(poles: list[Pole], orders: int) -> list[StablePole]:
     """Poles of one band that are the same mode, as the models of higher order have it."""
     left = sorted(poles, key=lambda pole: -pole.order)
     found = []
@@ -81,12 +81,12 @@ def _clusters(poles: list[Pole], orders: int) -> list[Candidate]:
         top = near[: max(1, len(near) // 2)]
         share = len({pole.order for pole in near}) / orders
         omega, zeta = (float(np.median([getattr(pole, name) for pole in top])) for name in ("omega", "zeta"))
-        found.append(Candidate(omega, zeta, share))
+        found.append(StablePole(omega, zeta, share))
         left = [pole for pole in left if pole not in near]
     return found
 
 
-def _same(one: Pole | Candidate, other: Pole | Candidate) -> bool:
+def _same(one: Pole | StablePole, other: Pole | StablePole) -> bool:
     apart = abs(one.omega - other.omega)
     width = _SAME * max(one.zeta, other.zeta) + 1e-4
     return apart < width * one.omega and abs(np.log(one.zeta / other.zeta)) < _SAME_DAMPING
@@ -109,7 +109,7 @@ class Window:
 
 
 def search(
-    parts: Sequence[Lines], low: float, high: float, most: int, candidates: Sequence[Candidate], starts: Starts | None
+    parts: Sequence[Lines], low: float, high: float, most: int, candidates: Sequence[StablePole], starts: Starts | None
 ) -> list[Window]:
     """Fit windows, each without what the modes outside of it do in it; from poles that are stable, or from `starts`."""
     spare = [(each.omega, each.zeta) for each in candidates]
