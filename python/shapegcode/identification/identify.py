@@ -17,6 +17,7 @@ from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.frf_fit import FrfModes, doubt_of, find_frf_modes, find_hit_modes
 from shapegcode.identification.model_search import (
     ACCEPTED_PERCENT,
+    MAX_MODES,
     Doubts,
     Fit,
     Search,
@@ -163,9 +164,10 @@ def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
     return read_sweep(found[0], options)
 
 
-_FEW_MODES = 4
+_FEW_MODES, _MORE = 4, 2  # that are fitted over time; beyond those that are seen at once
 _START_DAMPING = 0.02
-_EXPLAINED, _NOISE_SHARE = 0.01, 1.5  # of the record's RMS that few modes may leave; or times its noise
+_SAMPLES_IN_TIME = 20_000  # of all records together; more take too long
+_EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # of the record's RMS that few modes may leave; or times its noise
 _MANY = "many modes, or more than modes: fitted over frequency, band by band, in what the hits excite"
 _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white
 _SPECTRUM = 4096  # points of the force's transform
@@ -186,8 +188,10 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: Sought) -> Ident
         )
     if isinstance(problem, Taps) and (windowed or (sought.modes is None and not are_blows(ready))):
         many, fitted = find_hit_modes(ready, sought)
-        if windowed or not _are_few(ready, problem, many):
+        few = None if windowed else _few(ready, problem, many)
+        if few is None:
             return _many(ready, files, many, fitted)
+        sought = replace(sought, max_modes=min(sought.max_modes or MAX_MODES, few + _MORE))
     models = search(problem, sought)
     sought.order(models)
     others: list[Fit] = []
@@ -196,27 +200,29 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: Sought) -> Ident
     return _result(ready, files, problem, models, others, sought)
 
 
-def _are_few(ready: Prepared, problem: Taps, many: FrfModes) -> bool:
-    """Whether so few modes explain the whole record, down to its noise, that a fit in time tells them best."""
+def _few(ready: Prepared, problem: Taps, many: FrfModes) -> int | None:
+    """Number of modes that explain the whole record, down to its noise, if a fit in time tells so few best."""
     starts = [
         (2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in many.modes if not mode.refusal
     ]
     power = np.mean([np.mean(record.response**2) for record in ready.records])
     noise = np.mean([(each.response_noise or 0.0) ** 2 for each in ready.usable]) / power
     limit = max(_EXPLAINED**2, _NOISE_SHARE**2 * noise)
+    if starts and problem.samples > _SAMPLES_IN_TIME:
+        return None
     quick: Fit | None = None
     while len(starts) <= _FEW_MODES:
         try:
             quick = problem.fit_quickly(starts) if starts else None
         except (ArgumentError, NumericError):
-            return False
+            return None
         if quick is not None and quick.sum_of_squares < limit * problem.squares:
-            return True
+            return len(starts)
         peaks = problem.peaks_left(quick)
         if not peaks:
-            return quick is None
+            return len(starts) if quick is None else None
         starts = [*(starts_of(quick) if quick is not None else []), (peaks[0], _START_DAMPING)]
-    return not any(mode.refusal == "" for mode in many.modes)
+    return None if any(mode.refusal == "" for mode in many.modes) else _FEW_MODES
 
 
 def _many(ready: Prepared, files: tuple[str, ...], many: FrfModes, fitted: Sequence[FloatArray]) -> Identification:

@@ -30,6 +30,7 @@ _UNUSUAL = 2.0  # times the median of what a fit leaves: around a mode that may 
 _LINES_PER_MODE = 4
 _FEW = 350  # lines of a window that trials take
 _BAND_LINES = 48  # a band or window has at least so many
+_ROUNDS = 4  # changes that are tried with all lines, behind those with few
 _FEWEST = 12  # lines below which a window is left out
 _DEGREE = 2  # of the background of a window
 CLEAR = 6.0  # by so much beyond Bayes' criterion a mode must better the fit
@@ -203,7 +204,7 @@ def _fit_window(
     if not final:
         return Window(low, high, tuple(wide), fitted(wide, starts_of(best), _QUICK))
     if fewer[0] is not wide[0]:
-        best = _selected(wide, starts_of(best), spare, room)
+        best = _selected(wide, starts_of(best), spare, room, _ROUNDS)
     best = fitted(wide, starts_of(best), _FULL)
     if best is not None:
         turned = fitted(wide, starts_of(best), _FULL, complex_modes=True)
@@ -223,7 +224,7 @@ def _thinned(lines: Lines) -> Lines:
     )  # fmt: skip
 
 
-def _selected(parts: Sequence[Lines], starts: Starts, spare: Starts, room: int) -> ModalFit | None:
+def _selected(parts: Sequence[Lines], starts: Starts, spare: Starts, room: int, rounds: int = 60) -> ModalFit | None:
     """From some modes on, with one more or one less as long as the data speak for it."""
     share = min(lines.independent for lines in parts)
     best = fitted(parts, starts, _QUICK)
@@ -231,7 +232,7 @@ def _selected(parts: Sequence[Lines], starts: Starts, spare: Starts, room: int) 
         starts = starts[:-1] if best is None else _apart(best)
         best = fitted(parts, starts, _QUICK)
     evidence = evidence_of(best, share) if best is not None else _empty(parts, share)
-    for _ in range(3 * room):
+    for _ in range(rounds):
         changed = _reduced(parts, best, share, evidence) if best is not None else None
         if changed is None and (best is None or len(best.omega) < room):
             changed = _grown(parts, best, spare, share, evidence)

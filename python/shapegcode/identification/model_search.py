@@ -26,7 +26,7 @@ Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 # A further mode must explain this share of the response's energy: sensors are not linear beyond .1 % of amplitude.
 _MIN_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
-_MAX_MODES = 8  # of a model, unless asked otherwise
+MAX_MODES = 8  # of a model, unless asked otherwise
 PEAKS = 2  # of the residual's spectrum that are tried
 _TWINS = 0.25  # of the half width of a resonance
 _STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of the chart: the model one order lower has the pole too
@@ -108,7 +108,7 @@ def search(problem: FitProblem, sought: Sought) -> Search:
     evidence = [evidence_of(problem, None)]
     fits: list[Fit] = []
     pool = _pool(problem)
-    while len(fits) < (sought.modes or sought.max_modes or _MAX_MODES):
+    while len(fits) < (sought.modes or sought.max_modes or MAX_MODES):
         best = _next_fit(problem, fits[-1] if fits else None, pool)
         if best is None:
             break
