@@ -290,7 +290,7 @@ def test_number_of_modes_and_band() -> None:
     rng = np.random.default_rng(12)
     record = tap([TrueMode(60.0, 0.02, 10.0), TrueMode(150.0, 0.02, 10.0)], rng, snr_db=40.0)
     assert identify([record], modes=1).order == 1
-    in_band = identify([record], band_hz=(100.0, 200.0), most_modes=1)
+    in_band = identify([record], band_hz=(100.0, 200.0), max_modes=1)
     assert in_band.modes == () or in_band.modes[0].frequency_hz.value > 100.0
     with pytest.raises(RecordError, match="2048 samples per second are too slow for 2000 Hz"):
         identify([record], band_hz=(100.0, 2000.0))

@@ -348,7 +348,7 @@ def test_a_result_prints_as_a_line_per_mode(taps: list[str]) -> None:
     found = sg.identify(taps)
     lines = repr(found).splitlines()
     assert len(lines) <= 2 + len(found.modes)
-    assert lines[0].startswith("<Identification: 2 modes of the X axis in 3 taps: ")
+    assert lines[0].startswith("<Identification: use: 2 modes of the X axis in 3 taps: ")
     assert re.match(r"  frequency 4[56]\.\d+ ± 0\.\d+ Hz, damping .* %, m 1\d\d.* kg, c .* N s/m, k .* N/µm$", lines[1])
     assert all(type(end) is float for mode in found.modes for end in vars(mode.frequency_hz).values())
 
@@ -373,6 +373,6 @@ def test_pictures_are_drawn_into_the_callers_axes(taps: list[str]) -> None:
 
 
 def test_a_number_of_modes_has_its_limits(taps: list[str]) -> None:
-    for wrong in ({"modes": 0}, {"modes": 100}, {"most_modes": 0}):
+    for wrong in ({"modes": 0}, {"modes": 100}, {"max_modes": 0}):
         with pytest.raises(sg.ArgumentError, match="must be from 1 to 99"):
             sg.identify(taps[0], **wrong)

@@ -268,12 +268,13 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "calculation": (
         "plant", "no_full", "look_ahead", "drive", "continuous", "family", "objective", "negative", "taps", "speed",
-        "radius", "modes", "most_modes", "frequencies", "ignore_force", "start", "station", "cutoff", "lambda_s",
+        "radius", "modes", "max_modes", "frequencies", "ignore_force", "start", "station", "cutoff", "lambda_s",
     ),
     "modes that were not measured on this machine": ("keep_modes", "rigid"),
     "what a file does not say": (
         "time_column", "force_column", "response_columns", "time_unit", "force_unit", "response_unit", "period_s",
         "quantity", "force_scale", "response_scale", "force_sensitivity", "response_sensitivity", "response_first",
+        "exponential_window_s",
     ),
     "runs": (
         "draws", "batch_command", "resume", "jobs", "time_limit", "memory_limit", "scheduler", "tls_ca", "tls_cert",

@@ -13,7 +13,6 @@ from shapegcode.io.atomic import write_text
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-_MAX_MODES = 8  # as identify.MAX_MODES, which would have to be imported with all that is slow
 _HELP_TIME = "where the decay begins in the file, for example 250ms (default: found by itself)"
 # What the user says of a file, over what it says itself: option, field of ReadOptions, how it is read, help.
 _OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
@@ -45,6 +44,10 @@ _OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
         "of the sensor, where the response is in volts: 100mV/g",
     ),
     (
+        "--exponential-window", "exponential_window_s", {"metavar": "TIME", "type": arguments.seconds},
+        "time constant of an exponential window that the analyser applied to the response, such as 50ms",
+    ),
+    (
         "--response-first", "response_first", {"action": "store_true", "default": False},
         "in a WAV file the response is the first channel, not the force",
     ),
@@ -70,8 +73,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--tap-plan", action="store_true", help="say how to do the test (for the modes of -m MACHINE), nothing else")
     options.add_machine_argument(parser, required=False)
     add("--modes", metavar="N", type=arguments.count, help="how many (default: chosen by evidence)")
-    most = "largest number of modes that is tried (default: %(default)s)"
-    add("--most-modes", metavar="N", type=arguments.count, default=_MAX_MODES, help=most)
+    most = "largest number of modes (default: 40 over frequency, 8 over time)"
+    add("--max-modes", "--most-modes", dest="max_modes", metavar="N", type=arguments.count, help=most)
+    add("--force", action="store_true", help="write modes with --update even if the answer is not to use them")
     within = "look for modes between these frequencies, Hz"
     add("--frequencies", metavar="LOW:HIGH", type=arguments.frequency_band, help=within)
     ignore = "take it as a free decay: do not use the force, even if there is one"
@@ -118,11 +122,13 @@ def _identify(args: argparse.Namespace) -> int:
     said["response_columns"] = tuple(args.response_columns or ())
     with runner.progress(f"fitting {', '.join(args.files)}", args):
         found = identify(
-            args.files, ReadOptions(**said), most_modes=args.most_modes, modes=args.modes, band_hz=args.frequencies,
+            args.files, ReadOptions(**said), max_modes=args.max_modes, modes=args.modes, band_hz=args.frequencies,
             start_s=args.start, strict=False,
         )  # fmt: skip
     notes, wrote = list(found.notes), []
-    if args.update is not None and found.modes:
+    if args.update is not None and found.modes and found.doubt and not args.force:
+        notes.append(f"{args.update}: not changed: {found.doubt} (--force writes all the same)")
+    elif args.update is not None and found.modes:
         if args.axis is None:
             _decide(args, machine, found.axis)
         update = update_machine(args.update, found, keep_modes=args.keep_modes, rigid=args.rigid)

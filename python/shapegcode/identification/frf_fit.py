@@ -1,280 +1,147 @@
-"""Modes of a frequency response without its time record, each with its 95 % interval, or the reason why not."""
+"""Modes of frequency responses and of hits with many modes, each with its 95 % interval, or the reason why not."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from scipy.ndimage import median_filter, uniform_filter1d
+from scipy import stats
+from scipy.signal import find_peaks
 
-from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.identification.frf_model import POWERS, FrfFit, FrfLines, fit_frf, mode_columns
-from shapegcode.identification.model_search import (
-    PEAKS,
-    Doubts,
-    Fit,
-    Search,
-    Sought,
-    Starts,
-    estimates_of,
-    evidence_of,
-    judged_modes,
-    rival_of,
-    search,
-    stabilisation_chart,
-    starts_of,
+from shapegcode.identification.checks import Prepared
+from shapegcode.identification.lines import (
+    Hits,
+    hits_of,
+    measured_lines,
+    neighbours_correlation,
+    smoothed,
+    steady_sines,
+    weighted,
 )
-from shapegcode.identification.result import Identification, IdentifiedMode, by_support
-from shapegcode.io.frequency_response import FrequencyResponse
+from shapegcode.identification.modal_fit import Lines, ModalFit
+from shapegcode.identification.modal_search import (
+    StablePole,
+    Starts,
+    Uncertainty,
+    Window,
+    candidates_of,
+    cut,
+    evidence_of,
+    fitted,
+    modes_of,
+    search,
+    starts_of,
+    uncertainty_of,
+)
+from shapegcode.identification.model_search import MIN_SWINGS, Sought, interval_refusal, mode_estimates
+from shapegcode.identification.plscf import Pole
+from shapegcode.identification.result import ChartPole, Identification, IdentifiedMode, by_support
+from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import FloatArray
 
-#: A resonance narrower than so many distances of two lines tells its damping by its window, not by its structure.
-_MIN_WIDTH = 1.0
-_ROUNDS = 2  # of weights taken from what the model leaves
+_BESIDE = 0.25  # lines beside the band asked for that are fitted along, as a share of its ends
+_FURTHER = 1.3  # lines are fitted up to so far above what the hits excite
+_EXCITED = 0.1  # -20 dB: what is excited less is not supported
+_MIN_WIDTH = 1.0  # a resonance narrower than so many distances of two lines is not told from the record's length
+_LASTING = 0.8  # what has not fallen to this share at the end of the record does not decay
+_HUM = 0.02  # ... and beside a harmonic of the mains what has not fallen to this one may be hum
+_MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # the width in resolutions
+_VERY_CLEAR = 6.0  # evidence beyond that for a mode without a peak of its own or without a stable pole
+_STABLE = 0.34  # share of the orders that have the pole of a mode
+_LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % left unexplained, within so many half-power widths
+_TURNED = 1.0  # tan of the phase of a residue: beyond it hammer and sensor are not at the same point
+_ACCEPTED_PERCENT = 50.0  # a damping ratio less certain than this is refused
+_MAX_MODES, _IN_WINDOW = 40, 24  # of a structure unless asked otherwise; of a window
+_NO_VIBRATION = 0.3  # damping ratio of what is background, not a mode
+_SCATTER = 0.01  # probability by noise alone of hits that differ as much
+_ENOUGH = 3.0  # independent samples a parameter of a fit that another one is held against
+_PEAK = 0.5  # half-power widths
+_RISES = 2.0  # a peak rises by this factor out of its surroundings
+_POOR = 70.0  # % of the response in the band that a model must explain to be used
+
+
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """What is fitted and what is known of it."""
+
+    parts: tuple[Lines, ...]
+    low: float  # rad/s
+    high: float
+    record_s: float | None  # length of a record; None: lines without one
+    resolution_hz: float
+    hits: Hits | None = None
+    excitation: FloatArray | None = None  # (n,) of the lines of hits, 1 at its largest
+
+
+@dataclass(frozen=True, eq=False)
+class FrfModes:
+    """Modes found in lines, and the model of each response."""
+
+    modes: tuple[IdentifiedMode, ...]  # refused ones too
+    windows: tuple[Window, ...]
+    chart: tuple[ChartPole, ...]
+    model: tuple[ComplexArray, ...]  # (n,) lines of each response; as measured where no window is
+    fit_percent: float
+    missing_peak_hz: float | None  # the highest peak of the response, if no supported mode is there
 
 
 def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...], sought: Sought) -> Identification:
-    """Find the modes that frequency responses of the same point support; see `identify.identify`."""
-    problem, used = frf_problem_of(responses, sought.band_hz)
-    problem, models = _searched(problem, sought)
+    """Find the modes that frequency responses of one structure support; see `identify.identify`."""
+    used, one_point = _chosen(responses, sought.band_hz)
+    merged = _merged(used) if one_point else used
+    notes = list(dict.fromkeys(note for each in responses for note in each.notes))
+    if len(used) > 1:
+        said = "agree and are averaged: one point" if one_point else (
+            f"are of several points: the modes are those of all, masses those at {used[0].source}"
+        )  # fmt: skip
+        notes.append(f"{len(used)} frequency responses {said}")
+    if sought.exponential_window_s is None:
+        notes.append(
+            "a frequency response no longer tells overload, double hits or windows: an exponential window adds its "
+            "damping, unless --exponential-window states it"
+        )
+    measured = _of_responses(merged, sought.exponential_window_s)
+    found = find(measured, sought)
     turned: list[str] = []
-    order = sought.modes or models.order
-    chosen = models.fits[order - 1] if 0 < order <= len(models.fits) else None
-    if isinstance(chosen, FrfFit) and bool(np.all(chosen.inverse_mass < 0.0)):
+    if _all_opposed(found):
         turned.append(
             f"{responses[0].source}: every mode goes against the push of the hammer: the sign is turned, as for a "
             "sensor at the same point that points the other way"
         )
-        opposite = [replace(each, response=-each.response) for each in responses]
-        problem, used = frf_problem_of(opposite, sought.band_hz)
-        problem, models = _searched(problem, sought)
-    order = sought.order(models)
-    notes = list(dict.fromkeys(note for each in responses for note in each.notes))
-    notes.append(
-        "a frequency response no longer tells overload, double hits or windows: an exponential window adds its damping"
-    )
-    fit = models.fits[order - 1] if order else None
-    left = problem.left(fit)
-    doubts = Doubts(
-        limit_percent=sought.accepted_percent,
-        band_hz=sought.band_hz or problem.band_hz,
-        record_s=problem.duration_s,
-        rival=rival_of(order, models.fits, problem.white_share),
-    )
-    found = [] if fit is None else estimates_of(fit, (), white_share=problem.white_share)
-    found = [_if_wide(mode, problem.resolution_hz) for mode in judged_modes(found, doubts)]
-    fitted = problem.lines.response - left if fit is not None else np.zeros_like(left)
+        merged = [replace(each, response=-each.response) for each in merged]
+        used = [replace(each, response=-each.response) for each in used]
+        measured = _of_responses(merged, sought.exponential_window_s)
+        found = find(measured, sought)
+    lines = [found.model[0]] * len(used) if one_point and len(used) > 1 else list(found.model)
+    left = np.concatenate([each.response - model for each, model in zip(used, lines, strict=True)])
     return Identification(
         files=files,
-        **by_support(found),
-        order=order,
-        evidence=dict(enumerate(models.evidence)),
-        fit_percent=0.0 if fit is None else 100.0 * (1.0 - float(np.sqrt(fit.sum_of_squares / problem.squares))),
+        **by_support(found.modes),
+        order=len(modes_of(found.windows)),
+        fit_percent=found.fit_percent if found.modes else 0.0,
         noise_rms=float(np.sqrt(np.mean(np.abs(left) ** 2))),
+        doubt=doubt_of(found),
         warnings=(*dict.fromkeys(warning for each in responses for warning in each.warnings), *turned),
         notes=tuple(notes),
         responses=tuple(used),
-        chart=stabilisation_chart(problem),
-        fitted_lines=tuple(np.split(fitted, np.cumsum(problem.counts)[:-1])),
+        chart=found.chart,
+        fitted_lines=tuple(lines),
     )
 
 
-def _searched(problem: FrfProblem, sought: Sought) -> tuple[FrfProblem, Search]:
-    """Models of growing order; then the noise is known from what they leave, and they are fitted and judged anew."""
-    models = search(problem, sought)
-    for _ in range(_ROUNDS):
-        if not models.fits:
-            break
-        problem = problem.reweighted(models.fits[max(models.order, 1) - 1])
-        fits = tuple(problem.fit(starts_of(fit)) for fit in models.fits)
-        models = Search(fits, tuple(evidence_of(problem, each) for each in (None, *fits)))
-    return problem, models
+def _all_opposed(found: FrfModes) -> bool:
+    fits = [(window.fit, i) for window in found.windows for i in window.inside() if window.fit is not None]
+    heights = [float(fit.residues[0, i].real / fit.zeta[i]) for fit, i in fits if fit.zeta[i] < _NO_VIBRATION]
+    return sum(heights) < 0.0
 
 
-def _if_wide(mode: IdentifiedMode, resolution_hz: float) -> IdentifiedMode:
-    """The mode, refused where lines so far apart do not tell the damping."""
-    width = 2.0 * mode.damping_ratio.value * mode.frequency_hz.value
-    if width >= _MIN_WIDTH * resolution_hz:
-        return mode
-    why = (
-        f"its half-power width of {width:.3g} Hz is less than the {resolution_hz:.3g} Hz between two lines: window and "
-        "length of the record make such a peak; needed is a finer resolution, or the time record"
-    )
-    return replace(mode, refusal=why)
-
-
-_STEPS, _QUICK_STEPS = 60, 15
-#: Noise is taken as even over so many lines, and over this share of all at least.
-_SMOOTH_LINES, _SMOOTH_SHARE = 31, 0.02
-#: A line counts for no more than a noise of this share of the largest line would have it: no sensor is better.
-_MIN_NOISE = 1e-5
-_BESIDE = 0.25  # Lines beside the band asked for that are fitted along, as a share of its ends
-_LEFT_OUT = 5.0  # Of the lines, the lowest lies so many distances of two of them above 0, if what is below was left out
-_IMPULSE_LINES = 4096
-_THIRD_DIFFERENCE = 20.0  # Squared third difference of white noise, over its variance: 1 + 9 + 9 + 1
-
-
-@dataclass(frozen=True, eq=False)
-class FrfProblem:
-    """Lines of frequency responses of one point, as a search wants them."""
-
-    lines: FrfLines  # of all responses, one behind another
-    counts: tuple[int, ...]  # lines of each response
-    band_hz: tuple[float, float]  # modes are looked for in it
-    resolution_hz: float  # usual distance of two lines
-    white_share: float = 1.0  # of the lines, how many are independent
-    noise_correlation: float = 0.0  # that of white noise
-
-    @property
-    def squares(self) -> float:
-        """Of the weighted lines."""
-        return float(np.sum(np.abs(self.lines.weight * self.lines.response) ** 2))
-
-    @property
-    def samples(self) -> int:
-        """Real and imaginary parts together."""
-        return 2 * len(self.lines.omega)
-
-    @property
-    def constants(self) -> int:
-        """Parameters of a model without modes."""
-        return int(self.lines.below) + int(self.lines.above)
-
-    @property
-    def duration_s(self) -> float:
-        """Length of a record that tells as fine a resolution."""
-        return 1.0 / self.resolution_hz
-
-    @property
-    def period_s(self) -> float:
-        """Sampling period of a record that holds the highest line."""
-        return float(np.pi / self.lines.omega.max())
-
-    @property
-    def chart_orders(self) -> int:
-        """Number of modes that the lines are enough for."""
-        even = int(self.lines.omega[: self.counts[0]].max() / (2.0 * np.pi * self.resolution_hz)) + 1
-        return (min(even, _IMPULSE_LINES) - 8) // 8
-
-    def fit(self, starts: Starts) -> FrfFit:
-        """The best model near some modes."""
-        return fit_frf(self.lines, starts, _STEPS)
-
-    def fit_quickly(self, starts: Starts) -> FrfFit:
-        """A model in a few steps."""
-        return fit_frf(self.lines, starts, _QUICK_STEPS)
-
-    def fit_left(self, starts: Starts, last: Fit | None) -> FrfFit:
-        """A model in a few steps of what another one leaves."""
-        left = replace(self.lines, response=self.left(last), below=False, above=False)
-        return fit_frf(left, starts, _QUICK_STEPS)
-
-    def left(self, last: Fit | None) -> npt.NDArray[np.complex128]:
-        """What a model leaves of the lines."""
-        if last is None:
-            return self.lines.response
-        return np.asarray(self.lines.response - np.concatenate(last.fitted), dtype=np.complex128)
-
-    def peaks_left(self, last: Fit | None) -> list[float]:
-        """Frequencies (rad/s) of the highest peaks within the band of what a model leaves, the highest first."""
-        height = np.abs(self.lines.weight * self.left(last))
-        low, high = (2.0 * np.pi * end for end in self.band_hz)
-        height[(self.lines.omega < low) | (self.lines.omega > high)] = 0.0
-        found: list[float] = []
-        for index in np.argsort(height)[::-1]:
-            omega = float(self.lines.omega[index])
-            if height[index] <= 0.0 or len(found) == PEAKS:
-                break
-            if all(abs(omega - other) > 6.0 * np.pi * self.resolution_hz for other in found):
-                found.append(omega)
-        return found
-
-    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
-        """Discrete poles of models with 1 to `most` modes, from the impulse response that belongs to the lines."""
-        count = self.counts[0]
-        omega, response = self.lines.omega[:count], self.lines.response[:count]
-        places = np.linspace(
-            0.0, omega[-1], min(int(omega[-1] / (2.0 * np.pi * self.resolution_hz)) + 1, _IMPULSE_LINES)
-        )
-        mobility = response * (1j * omega) ** (1 - POWERS[self.lines.quantity])
-        even = np.interp(places, omega, mobility.real, left=0.0) + 1j * np.interp(
-            places, omega, mobility.imag, left=0.0
-        )
-        return _core.stabilisation_poles([np.fft.irfft(even)[: len(places)]], most)
-
-    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
-        """The candidates that are kept, and the one that explains most beside them."""
-        omega, zeta = np.array(candidates).T
-        columns = self.lines.weight[:, None] * mode_columns(self.lines, omega, zeta)[0]
-        stacked = np.vstack((columns.real, columns.imag))
-        goal = np.concatenate([(part(self.lines.weight * self.lines.response)) for part in (np.real, np.imag)])
-        if kept:
-            basis = np.linalg.qr(stacked[:, :kept])[0]
-            goal = goal - basis @ (basis.T @ goal)
-            stacked = stacked - basis @ (basis.T @ stacked)
-        norm = np.sum(stacked**2, axis=0)
-        gain = np.where(norm > 0.0, (goal @ stacked) ** 2 / np.maximum(norm, 1e-300), 0.0)
-        gain[:kept] = -1.0
-        return [*range(kept), int(np.argmax(gain))] if len(candidates) > kept else list(range(kept))
-
-    def reweighted(self, fit: Fit) -> FrfProblem:
-        """The same lines with the noise that a model leaves, smoothed, and the share of them that is independent."""
-        left, ends = np.abs(self.left(fit)) ** 2, np.cumsum(self.counts)[:-1]
-        parts = zip(np.split(left, ends), np.split(self.lines.omega, ends), strict=True)
-        noise = np.concatenate([_smoothed(part, omega, self.lines.quantity) for part, omega in parts])
-        weight = _weight(noise, self.lines)
-        weighted = weight * self.left(fit)
-        return replace(self, lines=replace(self.lines, weight=weight), white_share=_independent(weighted, self.counts))
-
-
-def _smoothed(power: FloatArray, omega: FloatArray, quantity: str) -> FloatArray:
-    """Running mean of a power over neighbouring lines, as an acceleration's, its peaks levelled by a median first."""
-    course = omega ** (2.0 * (2.0 - POWERS[quantity]))
-    width = max(_SMOOTH_LINES, int(_SMOOTH_SHARE * len(power))) | 1
-    level = median_filter(power * course, width, mode="nearest") / np.log(2.0)
-    return np.asarray(uniform_filter1d(level, width, mode="nearest") / course, dtype=np.float64)
-
-
-def _weight(noise: FloatArray, lines: FrfLines) -> FloatArray:
-    # Of the acceleration: noise of a displacement made of it may exceed every mode at the lowest lines.
-    course = lines.omega ** (2.0 - POWERS[lines.quantity])
-    least = (_MIN_NOISE * float(np.max(np.abs(lines.response * course))) / course) ** 2
-    return np.asarray(1.0 / np.sqrt(np.maximum(noise, least)), dtype=np.float64)
-
-
-def _independent(residual: npt.NDArray[np.complex128], counts: tuple[int, ...]) -> float:
-    """Share of lines that tell something of their own, from the correlation of neighbours."""
-    parts = np.split(residual, np.cumsum(counts)[:-1])
-    power = sum(float(np.sum(np.abs(part) ** 2)) for part in parts)
-    total = 1.0
-    for lag in range(1, max(2, min(counts) // 4)):
-        rho = sum(float(np.sum((part[lag:] * np.conj(part[:-lag])).real)) for part in parts) / max(power, 1e-300)
-        if rho < 2.0 / np.sqrt(sum(counts)):
-            break
-        total += 2.0 * rho
-    return 1.0 / total
-
-
-def _measured_noise(each: FrequencyResponse) -> FloatArray:
-    """Noise power of each line: from the coherence, else from how rough the neighbours are."""
-    power = np.abs(each.response) ** 2
-    omega = 2.0 * np.pi * each.frequency_hz
-    if each.coherence is not None and np.any(each.coherence < 1.0):
-        coherence = np.clip(each.coherence, 1e-3, 1.0)
-        return _smoothed(power * (1.0 - coherence) / coherence, omega, each.quantity)
-    if len(power) < 8:
-        return np.ones(len(power))
-    rough = np.abs(np.diff(each.response, 3)) ** 2 / _THIRD_DIFFERENCE
-    return _smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)), omega, each.quantity)
-
-
-def frf_problem_of(
+def _chosen(
     responses: Sequence[FrequencyResponse], band_hz: tuple[float, float] | None
-) -> tuple[FrfProblem, list[FrequencyResponse]]:
-    """The lines of a fit, and the band to look in."""
+) -> tuple[list[FrequencyResponse], bool]:
+    """The lines that are fitted, and whether they are of one point."""
     first = responses[0]
     for other in responses[1:]:
         for name in ("quantity", "axis"):
@@ -292,25 +159,414 @@ def frf_problem_of(
                 f"{highest:g} Hz"
             )
         used = [_within(each, (1.0 - _BESIDE) * band_hz[0], (1.0 + _BESIDE) * band_hz[1]) for each in responses]
-    frequency = np.concatenate([each.frequency_hz for each in used])
-    resolution = max(each.resolution_hz for each in used)
-    # Modes that the lines leave out below and above.
-    below = bool(np.min(frequency) > _LEFT_OUT * resolution)
-    lines = FrfLines(
-        2.0 * np.pi * frequency,
-        np.concatenate([each.response for each in used]),
-        np.ones(len(frequency)),
-        first.quantity,
-        below,
-        True,
-    )
-    noise = np.concatenate([_measured_noise(each) for each in used])
-    lines = replace(lines, weight=_weight(noise, lines))
-    band = (float(np.min(frequency)), float(np.max(frequency)))
-    return FrfProblem(lines, tuple(len(each.frequency_hz) for each in used), band, resolution), used
+    alike = all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:])
+    mean = np.mean([each.response for each in used], axis=0) if alike else None
+    one_point = len(used) > 1 and mean is not None and all(
+        float(np.linalg.norm(each.response - mean)) < 0.1 * float(np.linalg.norm(mean)) for each in used
+    )  # fmt: skip
+    return used, one_point
 
 
 def _within(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
     inside = (each.frequency_hz >= low_hz) & (each.frequency_hz <= high_hz)
     coherence = None if each.coherence is None else each.coherence[inside]
     return replace(each, frequency_hz=each.frequency_hz[inside], response=each.response[inside], coherence=coherence)
+
+
+def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
+    """One response, the mean of several of one point, with what they differ by as coherence."""
+    stacked = np.array([each.response for each in used])
+    mean = np.mean(stacked, axis=0)
+    scatter = np.sum(np.abs(stacked - mean) ** 2, axis=0) / (len(used) - 1) / len(used)
+    power = np.abs(mean) ** 2
+    return [replace(used[0], response=mean, coherence=np.clip(power / (power + scatter + 1e-300), 0.0, 1.0))]
+
+
+def _of_responses(responses: Sequence[FrequencyResponse], applied_s: float | None) -> _Measured:
+    parts = tuple(measured_lines(each, applied_s) for each in responses)
+    low = min(float(lines.omega[0]) for lines in parts)
+    high = max(float(lines.omega[-1]) for lines in parts)
+    return _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
+
+
+def hits_measured(ready: Prepared, sought: Sought) -> _Measured:
+    """Hits as they are fitted, without what oscillates throughout."""
+    responses = [each.record.response for each in ready.usable]
+    period = ready.records[0].period_s
+    responses = [each - steady_sines(each, period)[0] for each in responses]
+    return _of_hits(ready, responses, sought)
+
+
+def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -> _Measured:
+    period = ready.records[0].period_s
+    duration = min(len(each) for each in responses) * period
+    excited = min(max(each.excited_hz or 0.0 for each in ready.usable), 0.45 / period)
+    low_hz, high_hz = MIN_SWINGS / duration, excited
+    if sought.band_hz is not None:
+        low_hz, high_hz = max(low_hz, sought.band_hz[0]), sought.band_hz[1]
+    highest = min(_FURTHER * high_hz, 0.49 / period)
+    hits = hits_of(ready.usable, responses, low_hz / (1.0 + _BESIDE), highest, sought.exponential_window_s)
+    force = np.sqrt(np.sum(np.abs(hits.force) ** 2, axis=0))
+    low, high = (2.0 * np.pi * each for each in (low_hz, min(1.1 * high_hz, 0.49 / period)))
+    return _Measured((hits.lines,), low, high, duration, 1.0 / duration, hits, force / float(np.max(force)))
+
+
+def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[FloatArray]]:
+    """Find modes in hits, and the model's response of each record.
+
+    What oscillates throughout is looked for once more in what a first model leaves.
+    """
+    measured = hits_measured(ready, sought)
+    pool, poles = candidates_of(measured.parts)
+    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+    hits = measured.hits
+    assert hits is not None
+    model = _model(measured.parts, windows)[0]
+    inside = (measured.parts[0].omega >= measured.low) & (measured.parts[0].omega < measured.high)
+    left = hits.in_time(np.where(inside, hits.response - model * hits.force, 0.0))
+    responses, found = [], False
+    for each, start, rest in zip(ready.usable, hits.starts, left, strict=True):
+        response = each.record.response - steady_sines(each.record.response, hits.period_s)[0]
+        sines, hertz = steady_sines(rest, hits.period_s)
+        found = found or bool(hertz)
+        response = response.copy()
+        response[start : start + hits.count] -= sines
+        responses.append(response)
+    if found:
+        measured = _of_hits(ready, responses, sought)
+    found_modes = find(measured, sought, pool, poles, modes_of(windows))
+    assert measured.hits is not None
+    inside = (measured.parts[0].omega >= measured.low) & (measured.parts[0].omega < measured.high)
+    courses = measured.hits.in_time(np.where(inside, found_modes.model[0] * measured.hits.force, 0.0))
+    fitted = [np.zeros(len(each)) for each in responses]
+    for samples, start, course in zip(fitted, measured.hits.starts, courses, strict=True):
+        samples[start : start + len(course)] = course
+    return found_modes, fitted
+
+
+def find(
+    measured: _Measured,
+    sought: Sought,
+    pool: Sequence[StablePole] | None = None,
+    poles: Sequence[Pole] = (),
+    starts: Starts | None = None,
+) -> FrfModes:
+    """Search twice, weigh the lines by what is left in between, and test every mode."""
+    parts = measured.parts
+    if pool is None:
+        pool, poles = candidates_of(parts)
+        windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+        starts = modes_of(windows)
+        parts = tuple(_weighed(lines, model) for lines, model in zip(parts, _model(parts, windows), strict=True))
+    windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, starts)
+    if measured.hits is None:
+        windows = [_with_correlation(window) for window in windows]
+    measured = replace(measured, parts=parts)
+    modes = [mode for window in windows for mode in _modes(window, measured, pool, sought)]
+    low_hz, high_hz = sought.band_hz or (0.0, np.inf)
+    modes = [each for each in modes if low_hz <= each.frequency_hz.value <= high_hz]
+    modes = _strongest(modes, sought)
+    model = _model(parts, windows)
+    return FrfModes(
+        tuple(sorted(modes, key=lambda mode: mode.frequency_hz.value)), tuple(windows), _chart(poles), tuple(model),
+        _explained(measured, model), _missing_peak(measured, modes),
+    )  # fmt: skip
+
+
+def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[IdentifiedMode]:
+    """As many modes as are wanted: those of the highest peaks, the others refused."""
+    supported = [mode for mode in modes if not mode.refusal and mode.mass_kg is not None]
+    if sought.modes is not None and len(supported) < sought.modes:
+        raise RecordError(f"{sought.modes} modes are asked for, and the data hold no more than {len(supported)}")
+    most = sought.modes or sought.max_modes or _MAX_MODES
+    height = {id(mode): mode.damping_ratio.value * (mode.mass_kg.value if mode.mass_kg else 1.0) for mode in supported}
+    over = {id(mode) for mode in sorted(supported, key=lambda mode: height[id(mode)])[most:]}
+    why = f"{most} modes of higher peaks were asked for"
+    return [replace(mode, refusal=why) if id(mode) in over else mode for mode in modes]
+
+
+def _weighed(lines: Lines, model: ComplexArray) -> Lines:
+    return weighted(lines, smoothed(np.abs(lines.response - model) ** 2 + 1e-300, lines.omega, lines.power))
+
+
+def _with_correlation(window: Window) -> Window:
+    if window.fit is None:
+        return window
+    correlation = neighbours_correlation(window.fit.left)
+    return replace(window, parts=tuple(replace(lines, correlation=correlation) for lines in window.parts))
+
+
+def _model(parts: Sequence[Lines], windows: Sequence[Window]) -> list[ComplexArray]:
+    """Lines of each response as the windows have them."""
+    found = [lines.response.copy() for lines in parts]
+    for window in windows:
+        if window.fit is None:
+            continue
+        for row, (lines, left) in enumerate(zip(window.parts, window.fit.left, strict=True)):
+            core = (lines.omega >= window.low) & (lines.omega < window.high)
+            places = np.searchsorted(parts[row].omega, lines.omega[core])
+            found[row][places] = parts[row].response[places] - left[core] / lines.weight[core]
+    return found
+
+
+def _inside(lines: Lines, measured: _Measured) -> Any:
+    return (lines.omega >= measured.low) & (lines.omega < measured.high)
+
+
+def _explained(measured: _Measured, model: Sequence[ComplexArray]) -> float:
+    """Percent of the lines between the ends that the model explains."""
+    left = total = 0.0
+    for lines, fitted_lines in zip(measured.parts, model, strict=True):
+        inside = _inside(lines, measured)
+        left += float(np.sum(np.abs((lines.weight * (lines.response - fitted_lines))[inside]) ** 2))
+        total += float(np.sum(np.abs((lines.weight * lines.response)[inside]) ** 2))
+    return 100.0 * (1.0 - float(np.sqrt(left / max(total, 1e-300))))
+
+
+def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float | None:
+    """Frequency of the highest peak of the mobility, unless a supported mode is there."""
+    lines = measured.parts[0]
+    height = np.abs(lines.response * lines.s ** (1 - lines.power))
+    inside = _inside(lines, measured)
+    if measured.excitation is not None:
+        inside &= measured.excitation >= _EXCITED
+    if not np.any(inside):
+        return None
+    level = np.log(np.maximum(height[inside], 1e-300))
+    tops, _ = find_peaks(level, prominence=np.log(_RISES))
+    if not len(tops):
+        return None
+    top = float(lines.omega[inside][tops[int(np.argmax(level[tops]))]]) / (2.0 * np.pi)
+    for mode in modes:
+        width = mode.frequency_hz.value * (2.0 * mode.damping_ratio.value + 0.01)
+        if not mode.refusal and abs(mode.frequency_hz.value - top) < width:
+            return None
+    return top
+
+
+def doubt_of(found: FrfModes) -> str:
+    """Why the modes should not be used; empty: they may."""
+    if found.missing_peak_hz is not None:
+        return f"the highest peak of the response, at {found.missing_peak_hz:.4g} Hz, belongs to no supported mode"
+    if found.fit_percent < _POOR:
+        return f"the model explains {found.fit_percent:.0f} % of the response in the band only"
+    return ""
+
+
+def _chart(poles: Sequence[Pole]) -> tuple[ChartPole, ...]:
+    """Poles with what the model of one order less has of them."""
+    by_order: dict[int, list[Pole]] = {}
+    for pole in poles:
+        by_order.setdefault(pole.order, []).append(pole)
+    found = []
+    for order, now in sorted(by_order.items()):
+        before = np.array([(pole.omega, pole.zeta) for pole in by_order.get(order - 1, [])]).reshape(-1, 2)
+        for pole in now:
+            near = np.abs(before[:, 0] / pole.omega - 1.0) <= 0.01
+            alike = near & (np.abs(before[:, 1] / pole.zeta - 1.0) <= 0.05)
+            hertz = pole.omega / (2.0 * np.pi)
+            found.append(ChartPole(order, hertz, pole.zeta, bool(np.any(near)), bool(np.any(alike))))
+    return tuple(found)
+
+
+# --- The modes of a window --------------------------------------------------------------------------------------------
+def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], sought: Sought) -> list[IdentifiedMode]:
+    fit = window.fit
+    if fit is None or not window.inside():
+        return []
+    known = uncertainty_of(window)
+    others = _other_fits(window)
+    found = []
+    for index in window.inside():
+        if fit.zeta[index] > _NO_VIBRATION:
+            continue
+        values, spread = _logarithms(window, known, index, measured, others)
+        mode = mode_estimates(values, spread)
+        refusal = _refusal(window, index, mode, measured, pool, sought)
+        found.append(replace(mode, refusal=refusal))
+    return found
+
+
+def _other_fits(window: Window) -> list[ModalFit]:
+    """The same modes in a narrower band with another background, and as the other kind of modes, real or complex."""
+    fit = window.fit
+    assert fit is not None
+    starts = starts_of(fit)
+    narrow = [cut(lines, window.low / 1.15, window.high * 1.15, 1) for lines in window.parts]
+    tried = ((narrow, fit.complex_modes), (window.parts, not fit.complex_modes))
+    found = []
+    for parts, complex_modes in tried:
+        columns = (2 + 1 + complex_modes) * len(starts) + 6
+        if min(2 * len(lines.s) * lines.independent for lines in parts) > _ENOUGH * columns:
+            found.append(fitted(parts, starts, complex_modes=complex_modes))
+    return [each for each in found if each is not None]
+
+
+def _logarithms(
+    window: Window, known: Uncertainty, index: int, measured: _Measured, others: Sequence[ModalFit]
+) -> tuple[FloatArray, FloatArray]:
+    """ln of frequency (Hz), damping ratio, mass, viscous damping, stiffness, and half of their 95 % intervals."""
+    fit = window.fit
+    assert fit is not None
+    residue = abs(fit.residues[0, index])
+    omega, zeta = float(fit.omega[index]), float(fit.zeta[index])
+    base = np.array([np.log(omega), np.log(zeta), np.log(max(residue, 1e-300))])
+    scale = np.array([1.0, 1.0, 1.0 / max(residue, 1e-300)])
+    covariance = _misfit(fit, window.parts, index) * known.each[0, index] * np.outer(scale, scale)
+    change = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]], dtype=np.float64)
+    values = change @ base + np.array([-np.log(2.0 * np.pi), 0.0, 0.0, np.log(2.0), 0.0])
+    half = float(stats.t.ppf(0.975, known.freedom)) * np.sqrt(np.maximum(np.diag(change @ covariance @ change.T), 0.0))
+    for other in others:
+        size = abs(other.residues[0, index])
+        moved = np.array([np.log(other.omega[index]), np.log(other.zeta[index]), np.log(max(size, 1e-300))]) - base
+        half = np.hypot(half, np.abs(change @ moved))
+    if measured.hits is not None:
+        # Noise of the force turns and scales the whole response about a mode.
+        error = 2.0 * float(np.interp(omega, measured.parts[0].omega, measured.hits.gain_error))
+        half = np.hypot(half, error * np.array([zeta, 1.0, 1.0, 1.0, 1.0]))
+        half = np.maximum(half, _scatter(window, known, index, measured, change, scale))
+    return values, half
+
+
+def _misfit(fit: ModalFit, parts: Sequence[Lines], index: int) -> float:
+    """How much more the fit leaves around a mode than in the whole window, in power; 1 where it leaves less."""
+    omega, width = float(fit.omega[index]), 2.0 * float(fit.zeta[index] * fit.omega[index])
+    around, count = 0.0, 0
+    for lines, left in zip(parts, fit.left, strict=True):
+        near = np.abs(lines.omega - omega) <= max(width, 3.0 * (lines.omega[1] - lines.omega[0]))
+        around += float(np.sum(np.abs(left[near]) ** 2))
+        count += int(np.count_nonzero(near))
+    return max(1.0, around / max(count, 1) * sum(map(len, fit.left)) / max(fit.squares, 1e-300))
+
+
+def _scatter(
+    window: Window, known: Uncertainty, index: int, measured: _Measured, change: FloatArray, scale: FloatArray
+) -> FloatArray:
+    """Half widths from what single hits would have made of a mode; 0 where noise explains it."""
+    hits, fit, lines = measured.hits, window.fit, window.parts[0]
+    assert hits is not None and fit is not None
+    count = len(hits.force)
+    if count < 2:
+        return np.zeros(5)
+    first = int(np.searchsorted(measured.parts[0].omega, lines.omega[0] - 1e-6))
+    places = slice(first, first + len(lines.s))
+    force, response = hits.force[:, places], hits.response[:, places]
+    power = np.sum(np.abs(force) ** 2, axis=0)
+    mean = measured.parts[0].response[places]
+    rest = lines.weight * np.conj(force) * (response - mean * force) / power
+    stacked = np.hstack((rest.real, rest.imag))
+    modes = len(fit.omega)
+    begin = known.step.shape[0] - 2 * modes + 2 * index
+    rows = known.step[[begin, begin + 1, index]]
+    moved = (change * scale) @ (rows @ stacked.T)
+    spread = np.sqrt(count / (count - 1.0) * np.sum((moved - moved.mean(axis=1, keepdims=True)) ** 2, axis=1))
+    expected = np.sqrt(np.maximum(np.diag(change @ (known.each[0, index] * np.outer(scale, scale)) @ change.T), 1e-300))
+    limit = np.sqrt(stats.chi2.ppf(1.0 - _SCATTER, count - 1) / (count - 1))
+    return np.asarray(np.where(spread > limit * expected, stats.t.ppf(0.975, count - 1) * spread, 0.0))
+
+
+def _refusal(
+    window: Window,
+    index: int,
+    mode: IdentifiedMode,
+    measured: _Measured,
+    pool: Sequence[StablePole],
+    sought: Sought,
+) -> str:
+    """Why the data do not support a mode; empty if they do."""
+    fit = window.fit
+    assert fit is not None
+    omega, zeta = float(fit.omega[index]), float(fit.zeta[index])
+    hertz, width = omega / (2.0 * np.pi), 2.0 * zeta * omega
+    return (
+        _record_refusal(hertz, zeta, measured)
+        or _response_refusal(fit.residues[:, index])
+        or _evidence_refusal(window, index, hertz, pool)
+        or _local_refusal(window, omega, width)
+        or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or _ACCEPTED_PERCENT)
+    )
+
+
+def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
+    width = 2.0 * zeta * hertz
+    if measured.record_s is None:
+        if width >= _MIN_WIDTH * measured.resolution_hz:
+            return ""
+        return (
+            f"its half-power width of {width:.3g} Hz is less than the {measured.resolution_hz:.3g} Hz between two "
+            "lines: window and length of the record make such a peak; needed is a finer resolution, or the time record"
+        )
+    lasting = float(np.exp(-2.0 * np.pi * hertz * zeta * measured.record_s))
+    if lasting > _LASTING:
+        return (
+            f"still at {100.0 * lasting:.0f} % after {measured.record_s:.3g} s: a steady disturbance (mains, pump, "
+            "spindle), or a record too short for a mode of so little damping"
+        )
+    mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
+    if lasting > _HUM and abs(mains - hertz) < _HUM_WIDTH * measured.resolution_hz:
+        return f"beside {mains:g} Hz, a harmonic of the mains, and still at {100.0 * lasting:.0f} %: it may be hum"
+    assert measured.excitation is not None
+    excitation = float(np.interp(2.0 * np.pi * hertz, measured.parts[0].omega, measured.excitation))
+    if excitation < _EXCITED:
+        return (
+            f"the hit excites it at {20.0 * np.log10(max(excitation, 1e-9)):.0f} dB of its largest force only (limit "
+            "-20 dB): take a harder tip"
+        )
+    return ""
+
+
+def _response_refusal(residues: ComplexArray) -> str:
+    first = complex(residues[0])
+    if len(residues) > 1:  # points other than the one of the force may move either way
+        return ""
+    if first.real < 0.0:
+        return "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
+    if abs(first.imag) > _TURNED * first.real:
+        return (
+            f"its phase is {np.degrees(np.angle(first)):.0f}° off that of hammer and sensor at one point (limit 45°): "
+            "another point, a delay between the channels, or no mode"
+        )
+    return ""
+
+
+def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[StablePole]) -> str:
+    """Without a peak of its own and a stable pole, the fit must be clearly worse without the mode."""
+    fit = window.fit
+    assert fit is not None
+    omega, zeta = float(fit.omega[index]), float(fit.zeta[index])
+    share = min(lines.independent for lines in window.parts)
+    starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
+    apart = np.abs(fit.omega - omega) > zeta * omega + fit.zeta * fit.omega
+    # Where another mode lies within its width, that one must not take its part.
+    effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
+    without = fitted(window.parts, starts, effort, complex_modes=fit.complex_modes)
+    gain = np.inf if without is None else evidence_of(without, share) - evidence_of(fit, share)
+    stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega and each.share >= _STABLE for each in pool)
+    lines, left = window.parts[0], fit.left[0]
+    modelled_lines = (lines.response - left / lines.weight) * lines.s ** (1 - lines.power)
+    near = np.flatnonzero(
+        np.abs(lines.omega - omega) <= max(_PEAK * 2.0 * zeta * omega, lines.omega[1] - lines.omega[0])
+    )
+    course = np.abs(modelled_lines.real)
+    peak = any(0 < i < len(course) - 1 and course[i] >= course[i - 1] and course[i] > course[i + 1] for i in near)
+    needed = 0.0 if peak and stable else _VERY_CLEAR
+    if gain >= needed:
+        return ""
+    return (
+        f"no {'peak of its own' if not peak else 'pole that stays over the orders'} at {hertz:.4g} Hz, and the fit "
+        f"without it is hardly worse (evidence {gain:.1f}, limit {needed:g})"
+    )
+
+
+def _local_refusal(window: Window, omega: float, width: float) -> str:
+    fit = window.fit
+    assert fit is not None
+    left = total = 0.0
+    for lines, rest in zip(window.parts, fit.left, strict=True):
+        near = np.abs(lines.omega - omega) <= max(_LOCAL_WIDTHS * width, 3.0 * (lines.omega[1] - lines.omega[0]))
+        left += float(np.sum(np.abs(rest[near]) ** 2))
+        total += float(np.sum(np.abs((lines.weight * lines.response)[near]) ** 2))
+    percent = 100.0 * float(np.sqrt(left / max(total, 1e-300)))
+    if percent <= _LOCAL:
+        return ""
+    return f"the model leaves {percent:.0f} % of the response around it unexplained (limit {_LOCAL:g} %)"

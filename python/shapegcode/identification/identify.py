@@ -14,9 +14,10 @@ from scipy.signal import resample_poly
 from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
 from shapegcode.identification.checks import Prepared, prepare
-from shapegcode.identification.frf_fit import find_frf_modes
+from shapegcode.identification.frf_fit import FrfModes, doubt_of, find_frf_modes, find_hit_modes
 from shapegcode.identification.model_search import (
     ACCEPTED_PERCENT,
+    MAX_MODES,
     Doubts,
     Fit,
     Search,
@@ -29,7 +30,7 @@ from shapegcode.identification.model_search import (
     stabilisation_chart,
     starts_of,
 )
-from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Taps, problem_of
+from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Taps, are_blows, problem_of
 from shapegcode.identification.result import Identification, MassCheck, by_support
 from shapegcode.identification.sweep import find_swept_modes
 from shapegcode.io.data_file import open_file
@@ -39,7 +40,6 @@ from shapegcode.io.record import FloatArray, Quantity, ReadOptions, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.taps import is_klipper, read_sweep
 
-MAX_MODES = 8  # Largest number of modes that is tried unless asked otherwise
 _LARGEST_MODEL = 99
 _MIN_SAMPLES = 3
 
@@ -51,11 +51,11 @@ def identify(
     *,
     options: ReadOptions | None = None,
     quantity: Quantity = "acceleration",
-    most_modes: int = MAX_MODES,
+    max_modes: int | None = None,
     modes: int | None = None,
     band_hz: tuple[float, float] | None = None,
     start_s: float | None = None,
-    accepted_percent: float = ACCEPTED_PERCENT,
+    accepted_percent: float | None = None,
     strict: bool = True,
 ) -> Identification:
     """Modes in one or several taps of a point (with force), in free decays (without), or in frequency responses.
@@ -68,11 +68,12 @@ def identify(
         force: of the hammer at these instants in N, shape (n,); None: a free decay.
         options: what the files do not say.
         quantity: of `response`: "acceleration" in m/s², "velocity" in m/s or "displacement" in m.
-        most_modes: largest number of modes that is tried.
+        max_modes: largest number of modes; None: 40 over frequency, 8 over time.
         modes: number of modes; None: chosen by evidence.
         band_hz: lowest and highest frequency of interest; None: all.
         start_s: time at which a decay begins; None: it is looked for.
-        accepted_percent: a mode is refused whose damping ratio or stiffness is less certain than this (95 %).
+        accepted_percent: a mode is refused whose damping ratio is less certain than this (95 %; of a fit over time its
+            stiffness too); None: 5 % over time, 50 % over frequency.
         strict: raise where no record can be used; False: the result says it, in `reason`.
 
     Returns:
@@ -86,7 +87,7 @@ def identify(
     Source: Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md) for its ARMA models; the fit in
     time, intervals and refusals are this project's.
     """
-    for name, number in (("most_modes", most_modes), ("modes", modes)):
+    for name, number in (("max_modes", max_modes), ("modes", modes)):
         if number is not None and not 1 <= number <= _LARGEST_MODEL:
             raise ArgumentError(f"{name} = {number}: must be from 1 to {_LARGEST_MODEL}")
     if isinstance(response, ReadOptions):
@@ -97,7 +98,8 @@ def identify(
         raise ArgumentError("force is given without a response: identify(time_s, response, force)")
     sources: Sequence[Any] = [source] if isinstance(source, str | Path) else source  # type: ignore[assignment]
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
-    sought = Sought(band_hz, most_modes, modes, accepted_percent)
+    window_s = None if options is None else options.exponential_window_s
+    sought = Sought(band_hz, max_modes, modes, accepted_percent, window_s)
     ready: Prepared | None = None
     try:
         swept = _swept(sources, options or ReadOptions())
@@ -162,6 +164,11 @@ def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
     return read_sweep(found[0], options)
 
 
+_FEW_MODES, _MORE = 4, 2  # that are fitted over time; beyond those that are seen at once
+_START_DAMPING = 0.02
+_SAMPLES_IN_TIME = 20_000  # of all records together; more take too long
+_EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # of the record's RMS that few modes may leave; or times its noise
+_MANY = "many modes, or more than modes: fitted over frequency, band by band, in what the hits excite"
 _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white
 _SPECTRUM = 4096  # points of the force's transform
 _FOLDED = 2.0 / 3.0
@@ -174,12 +181,66 @@ _POSSIBLY = 15.0  # by so much (twice the logarithm of the odds) another course 
 def find_modes(ready: Prepared, files: tuple[str, ...], sought: Sought) -> Identification:
     """Find the modes that checked records of the same point support; see `identify.identify`."""
     problem = problem_of(ready, sought.band_hz, within=sought.modes is not None)
+    windowed = sought.exponential_window_s is not None
+    if windowed and not isinstance(problem, Taps):
+        raise RecordError(
+            "an exponential window of a free decay cannot be told from its damping: state it with the force"
+        )
+    if isinstance(problem, Taps) and (windowed or (sought.modes is None and not are_blows(ready))):
+        many, fitted = find_hit_modes(ready, sought)
+        few = None if windowed else _few(ready, problem, many)
+        if few is None:
+            return _many(ready, files, many, fitted)
+        sought = replace(sought, max_modes=min(sought.max_modes or MAX_MODES, few + _MORE))
     models = search(problem, sought)
     sought.order(models)
     others: list[Fit] = []
     if isinstance(problem, Taps) and models.fits:
         problem, models, others = _choose_course(problem, models, sought)
     return _result(ready, files, problem, models, others, sought)
+
+
+def _few(ready: Prepared, problem: Taps, many: FrfModes) -> int | None:
+    """Number of modes that explain the whole record, down to its noise, if a fit in time tells so few best."""
+    starts = [
+        (2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in many.modes if not mode.refusal
+    ]
+    power = np.mean([np.mean(record.response**2) for record in ready.records])
+    noise = np.mean([(each.response_noise or 0.0) ** 2 for each in ready.usable]) / power
+    limit = max(_EXPLAINED**2, _NOISE_SHARE**2 * noise)
+    if starts and problem.samples > _SAMPLES_IN_TIME:
+        return None
+    quick: Fit | None = None
+    while len(starts) <= _FEW_MODES:
+        try:
+            quick = problem.fit_quickly(starts) if starts else None
+        except (ArgumentError, NumericError):
+            return None
+        if quick is not None and quick.sum_of_squares < limit * problem.squares:
+            return len(starts)
+        peaks = problem.peaks_left(quick)
+        if not peaks:
+            return len(starts) if quick is None else None
+        starts = [*(starts_of(quick) if quick is not None else []), (peaks[0], _START_DAMPING)]
+    return None if any(mode.refusal == "" for mode in many.modes) else _FEW_MODES
+
+
+def _many(ready: Prepared, files: tuple[str, ...], many: FrfModes, fitted: Sequence[FloatArray]) -> Identification:
+    noise = [each.response_noise for each in ready.usable if each.response_noise is not None]
+    return Identification(
+        files=files,
+        **by_support(many.modes),
+        order=sum(len(window.inside()) for window in many.windows),
+        fit_percent=many.fit_percent,
+        noise_rms=float(np.sqrt(np.mean(np.square(noise)))) if noise else None,
+        doubt=doubt_of(many),
+        warnings=(*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)),
+        notes=(*ready.notes, _MANY),
+        prepared=ready,
+        chart=many.chart,
+        fitted=tuple(fitted),
+        fitted_records=ready.records,
+    )
 
 
 def _choose_course(problem: Taps, models: Search, sought: Sought) -> tuple[Taps, Search, list[Fit]]:
@@ -244,7 +305,7 @@ def _result(
     aliased = _aliased(ready, problem)
     is_whole = isinstance(problem, Decays) or problem.thinned is None
     doubts = Doubts(
-        limit_percent=sought.accepted_percent,
+        limit_percent=sought.accepted_percent or ACCEPTED_PERCENT,
         band_hz=sought.band_hz or problem.band_hz,
         record_s=problem.duration_s,
         rival=rival_of(order, models.fits, problem.white_share),

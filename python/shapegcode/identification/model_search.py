@@ -18,7 +18,6 @@ from scipy import stats
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.identification.frf_model import FrfFit
 from shapegcode.identification.result import ChartPole, Estimate, IdentifiedMode
 from shapegcode.io.record import FloatArray
 
@@ -27,6 +26,7 @@ Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 # A further mode must explain this share of the response's energy: sensors are not linear beyond .1 % of amplitude.
 _MIN_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
+MAX_MODES = 8  # of a model, unless asked otherwise
 PEAKS = 2  # of the residual's spectrum that are tried
 _TWINS = 0.25  # of the half width of a resonance
 _STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of the chart: the model one order lower has the pole too
@@ -38,7 +38,7 @@ _MAX_DAMPING = 0.7  # of a pole to begin with
 _PATIENCE = 2  # Two models in a row that the data do not ask for end the search: one may only have missed its place
 
 
-Fit = _core.ModalFit | _core.DecayFit | FrfFit
+Fit = _core.ModalFit | _core.DecayFit
 
 
 class FitProblem(Protocol):
@@ -74,9 +74,10 @@ class Sought:
     """What is looked for."""
 
     band_hz: tuple[float, float] | None  # frequencies of interest; None: all
-    most_modes: int
+    max_modes: int | None
     modes: int | None  # their number; None: by evidence
-    accepted_percent: float  # see `identify.identify`
+    accepted_percent: float | None  # see `identify.identify`
+    exponential_window_s: float | None = None  # applied to the response before it was read
 
     def order(self, models: Search) -> int:
         """Number of modes that is taken; refused where the data hold fewer than were asked for."""
@@ -107,7 +108,7 @@ def search(problem: FitProblem, sought: Sought) -> Search:
     evidence = [evidence_of(problem, None)]
     fits: list[Fit] = []
     pool = _pool(problem)
-    while len(fits) < (sought.modes or sought.most_modes):
+    while len(fits) < (sought.modes or sought.max_modes or MAX_MODES):
         best = _next_fit(problem, fits[-1] if fits else None, pool)
         if best is None:
             break
@@ -265,13 +266,20 @@ def estimates_of(
             spread = np.maximum(spread, np.abs(apart.values - row.values) + _half_widths(apart, quantile))
         if len(alone) > 1:
             spread = np.maximum(spread, _scatter([_logarithms(one, mode) for one in alone], white_share))
-        values = [
-            Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
-            for value, half in zip(np.exp(row.values), np.minimum(spread, _UNKNOWN), strict=True)
-        ]
-        named = dict(zip(_VALUES, values, strict=False))
-        found.append(IdentifiedMode(**named, refusal=_OPPOSED if row.opposed else ""))
+        found.append(mode_estimates(row.values, spread, _OPPOSED if row.opposed else ""))
     return found
+
+
+def mode_estimates(values: FloatArray, spread: FloatArray, refusal: str = "") -> IdentifiedMode:
+    """A mode from logarithms of frequency (Hz), damping ratio, mass, viscous damping and stiffness, or the first two.
+
+    `spread`: half of their 95 % intervals.
+    """
+    estimates = [
+        Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
+        for value, half in zip(np.exp(values), np.minimum(spread, _UNKNOWN), strict=True)
+    ]
+    return IdentifiedMode(**dict(zip(_VALUES, estimates, strict=False)), refusal=refusal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,15 +365,41 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
             f"still at {100.0 * lasting:.0f} % after {doubts.record_s:.3g} s: a steady disturbance (mains, pump, "
             "spindle), or a record too short for a mode of so little damping"
         )
+    folded = 100.0 * doubts.aliased(frequency.value)
+    refusal = interval_refusal(mode, doubts.limit_percent, folded)
+    if refusal:
+        return refusal
+    if mode.refusal or doubts.rival is None:
+        return mode.refusal
+    # A rival that splits the mode in two or lacks it disagrees as much as one can.
+    rows = [_logarithms(doubts.rival, i) for i in range(len(doubts.rival.omega_rad_s))]
+    nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(frequency.value)))
+    for name, estimate, index in (
+        ("frequency", frequency, 0),
+        ("damping ratio", damping, 1),
+        ("stiffness", stiffness, 4),
+    ):
+        change = 0.0
+        if estimate is not None:
+            change = 100.0 * abs(float(np.expm1(nearest.values[index] - np.log(estimate.value))))
+        if change > doubts.limit_percent:
+            return (
+                f"{name} would change by {change:.0f} % with one mode more in the model, which the data cannot decide "
+                f"(limit {doubts.limit_percent:g} %): more taps or less noise"
+            )
+    return ""
+
+
+def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent: float = 0.0) -> str:
+    """Why an interval is too wide; empty if none is. `folded_percent`: of the force, from above half the rate."""
     limits = (
-        ("frequency", frequency, min(_FREQUENCY_PERCENT, doubts.limit_percent)),
-        ("damping ratio", damping, doubts.limit_percent),
-        ("stiffness", stiffness, doubts.limit_percent),
+        ("frequency", mode.frequency_hz, min(_FREQUENCY_PERCENT, limit_percent)),
+        ("damping ratio", mode.damping_ratio, limit_percent),
+        ("stiffness", mode.stiffness_n_per_m, limit_percent),
     )
     for name, estimate, limit in limits:
         if estimate is not None and not estimate.uncertainty_percent <= limit:
-            folded = 100.0 * doubts.aliased(frequency.value)
-            if name == "stiffness" and folded > 0.5 * limit:
+            if name == "stiffness" and folded_percent > 0.5 * limit:
                 return (
                     f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} %): the pulse has "
                     "few samples, and without an anti-aliasing filter they do not tell its force at this frequency; "
@@ -375,18 +409,4 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
             if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:
                 known = "not at all"
             return f"{name} is known {known} (limit {limit:g} %): more taps, a longer record or less noise"
-    if mode.refusal or doubts.rival is None:
-        return mode.refusal
-    # A rival that splits the mode in two or lacks it disagrees as much as one can.
-    rows = [_logarithms(doubts.rival, i) for i in range(len(doubts.rival.omega_rad_s))]
-    nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(frequency.value)))
-    for (name, estimate, _), index in zip(limits, (0, 1, 4), strict=True):
-        change = 0.0
-        if estimate is not None:
-            change = 100.0 * abs(float(np.expm1(nearest.values[index] - np.log(estimate.value))))
-        if change > doubts.limit_percent:
-            return (
-                f"{name} would change by {change:.0f} % with one mode more in the model, which the data cannot decide "
-                f"(limit {doubts.limit_percent:g} %): more taps or less noise"
-            )
     return ""

@@ -12,6 +12,7 @@ from shapegcode.identification.checks import Prepared, RecordUse
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import FloatArray, Record
 from shapegcode.results.json import hidden
+from shapegcode.results.page.model import Light
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
 
@@ -187,6 +188,7 @@ class Identification(Result):
             without a model.
         mass_check: where the model has one mode.
         reason: why there is no mode; empty: there is.
+        doubt: why the modes should not be used although there are some; empty: they may.
         machine_file: where the modes were put; null: nowhere.
         warnings: what the user should know of the records and of the result.
         notes: what was left out of the files and the like.
@@ -215,6 +217,7 @@ class Identification(Result):
     noise_rms: float | None = None
     mass_check: MassCheck | None = None
     reason: str = ""
+    doubt: str = ""
     machine_file: MachineFile | None = None
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -231,7 +234,8 @@ class Identification(Result):
         """Published methods of the fit that was made."""
         if self.sweep is not None:
             return ("modes from a sweep",)
-        return ("modes from frequency responses" if self.responses else "modes from records",)
+        over_time = self.evidence and not self.responses
+        return ("modes from records" if over_time else "modes from frequency responses",)
 
     @property
     def taps(self) -> tuple[Record, ...]:
@@ -289,24 +293,34 @@ class Identification(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether there are modes, and all that stands out of the noise is supported."""
-        return bool(self.modes) and not self.refused
+        """Whether there are modes to use, and all that stands out of the noise is supported."""
+        return bool(self.modes) and not self.refused and not self.doubt
 
     @property
     def exit_code(self) -> int:
-        """0: all that stands out is supported; 1: some of it is not; 2: nothing is."""
+        """0: use all of it; 1: some of it is not supported, or better not used; 2: nothing is supported."""
         return super().exit_code if self.modes else 2
 
     @property
+    def light(self) -> tuple[Light, str]:
+        """Red: do not use; amber: some of it is not supported, or there are warnings."""
+        if self.doubt or not self.modes:
+            return "red", self.doubt or self.reason
+        if self.refused:
+            return "amber", f"{len(self.refused)} more not supported by the data"
+        return super().light
+
+    @property
     def answer(self) -> str:
-        """The frequencies, and how well the model explains the records; or why there is none."""
+        """Whether to use it or why not, the frequencies, and how well the model explains the records."""
         if not self.modes:
             why = "what stands out is not supported by the data, the table says why" if self.refused else self.reason
-            return f"no mode in {', '.join(self.files)}: {why}"
+            return f"do not use: no mode in {', '.join(self.files)}: {why}"
         count = f"{len(self.modes)} mode{'' if len(self.modes) == 1 else 's'}"
         axis = "" if self.axis is None else f" of the {self.axis.upper()} axis"
         hertz = ", ".join(f"{mode.frequency_hz.value:.4g}" for mode in self.modes)
-        said = f"{count}{axis} in {self._counted()}: {hertz} Hz; the model explains {self.fit_percent:.1f} %"
+        use = f"do not use: {self.doubt}; " if self.doubt else "use: "
+        said = f"{use}{count}{axis} in {self._counted()}: {hertz} Hz; the model explains {self.fit_percent:.1f} %"
         if not self.refused:
             return said
         return f"{said}; {len(self.refused)} more {'is' if len(self.refused) == 1 else 'are'} NOT supported by the data"
@@ -316,7 +330,7 @@ class Identification(Result):
         """The one thing to do next."""
         if not self.modes:
             return "shapegcode identify --tap-plan says how to do the test"
-        if self.refused:
+        if self.refused or self.doubt:
             return "tap again, longer or more often, for what is not supported (shapegcode identify --tap-plan)"
         if self.machine_file is not None:
             return f"shapegcode shaper -m {self.machine_file.path}"

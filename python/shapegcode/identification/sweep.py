@@ -47,7 +47,7 @@ def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> 
     frequency, power = _spectrum(record, band)
     fits = [_fit(frequency, power, [], free=False)]
     evidence = [_evidence(fits[0], len(power))]
-    while len(fits) - 1 < (modes or min(sought.most_modes, _MAX_MODES)):
+    while len(fits) - 1 < (modes or min(sought.max_modes or _MAX_MODES, _MAX_MODES)):
         fits.append(_next(frequency, power, fits[-1]))
         evidence.append(_evidence(fits[-1], len(power)))
         if modes is None and len(fits) - 1 - int(np.argmin(evidence)) >= 1:

@@ -95,6 +95,7 @@ class ReadOptions:
         force_sensitivity: of the hammer, such as "2.25 mV/N", where the force is in volts.
         response_sensitivity: of the sensor, such as "100 mV/g", where the response is in volts.
         ignore_force: read the response only, as a free decay.
+        exponential_window_s: time constant of an exponential window that the analyser applied to the response.
     """
 
     axis: str | None = None
@@ -112,6 +113,7 @@ class ReadOptions:
     force_sensitivity: str | None = None
     response_sensitivity: str | None = None
     ignore_force: bool = False
+    exponential_window_s: float | None = None
 
     def __post_init__(self) -> None:
         if self.axis not in {None, "x", "y", "z"}:
@@ -120,8 +122,10 @@ class ReadOptions:
             value = getattr(self, name)
             if value is not None and not 0.0 < abs(value) < float("inf"):
                 raise RecordError(f"{name} = {value:g}: must be a number other than 0")
-        if self.period_s is not None and self.period_s < 0.0:
-            raise RecordError(f"period_s = {self.period_s:g}: must be above 0")
+        for name in ("period_s", "exponential_window_s"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < float("inf"):
+                raise RecordError(f"{name} = {value:g}: must be above 0")
         stated: tuple[tuple[str, str | None, tuple[Measured, ...]], ...] = (
             ("time_unit", self.time_unit, ("time",)),
             ("force_unit", self.force_unit, ("force",)),

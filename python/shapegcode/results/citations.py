@@ -38,7 +38,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "LuGre friction": ("canudas1995",),
     "cutting force": ("kim2001",),
     "modes from records": ("back2003", "steiglitz1965", "roy1989", "golub2003"),
-    "modes from frequency responses": ("ewins", "golub2003"),
+    "modes from frequency responses": ("guillaume2003", "ewins", "golub2003"),
     "modes from a sweep": (),
     "circle fit": ("chernov2010",),
     "path of paper 000": ("ko2023",),

@@ -1,0 +1,178 @@
+"""Maximum-likelihood fit of modes to frequency responses: poles shared by all responses, residues of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapegcode.errors import ArgumentError
+from shapegcode.io.frequency_response import ComplexArray
+from shapegcode.io.record import FloatArray
+
+POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
+_LARGEST_STEP = 0.3  # of ln omega and ln zeta in one iteration
+_STEP_FLOOR, _GAIN_FLOOR = 1e-10, 1e-9
+_MIN_DAMPING, _MAX_DAMPING = 1e-6, 0.99
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of one response over force."""
+
+    s: ComplexArray  # (n,) rad/s, points of the Laplace plane: off the imaginary axis behind an exponential window
+    response: ComplexArray  # (n,) SI over N
+    weight: FloatArray  # (n,) 1 over the standard deviation of the noise
+    power: int  # of s in the numerator of a mode: 0 displacement, 1 velocity, 2 acceleration
+    background: ComplexArray  # (n, k) columns with real factors for what lies outside the lines
+    correlation: ComplexArray  # (m,) of the noise of two lines 0, 1, 2, ... apart
+
+    @property
+    def omega(self) -> FloatArray:
+        """Angular frequencies."""
+        return np.asarray(self.s.imag, dtype=np.float64)
+
+    @property
+    def independent(self) -> float:
+        """Share of the lines that are independent."""
+        return 1.0 / float(1.0 + 2.0 * np.sum(np.abs(self.correlation[1:]) ** 2))
+
+
+@dataclass(frozen=True, eq=False)
+class ModalFit:
+    """Modes and what they leave."""
+
+    omega: FloatArray  # (m,) rad/s
+    zeta: FloatArray  # (m,)
+    residues: ComplexArray  # (responses, m) 1/kg; the real part is 1/mass, the imaginary part is of a complex mode
+    background: tuple[FloatArray, ...]  # factors of the columns, of each response
+    left: tuple[ComplexArray, ...]  # (n,) of each response, weighted
+    jacobian: tuple[FloatArray, ...]  # (2n, columns + 2m) of each response
+    complex_modes: bool
+
+    @property
+    def squares(self) -> float:
+        """Sum of the weighted residuals."""
+        return float(sum(np.sum(np.abs(part) ** 2) for part in self.left))
+
+    @property
+    def parameters(self) -> int:
+        """Number of fitted ones."""
+        modes = len(self.omega)
+        per_response = (2 if self.complex_modes else 1) * modes
+        return 2 * modes + sum(per_response + len(part) for part in self.background)
+
+
+def mode_columns(lines: Lines, omega: FloatArray, zeta: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Responses of modes of 1 kg, (n, m), and their derivatives to ln omega and ln zeta."""
+    s = lines.s[:, None]
+    damping = 2.0 * zeta * omega * s
+    below = s**2 + damping + omega**2
+    column = s**lines.power / below
+    shared = -column / below
+    return column, shared * (damping + 2.0 * omega**2), shared * damping
+
+
+def stacked(values: ComplexArray) -> FloatArray:
+    """Real parts, then imaginary parts."""
+    return np.concatenate((values.real, values.imag))
+
+
+@dataclass(frozen=True, eq=False)
+class _Linearised:
+    linear: list[FloatArray]
+    jacobian: list[FloatArray]  # of the linear factors, then of ln omega and ln zeta of each mode
+    projected: FloatArray  # without what the linear factors follow
+    residual: FloatArray
+    squares: float
+
+
+def _linearised(parts: Sequence[Lines], theta: FloatArray, complex_modes: bool) -> _Linearised:
+    omega, zeta = np.exp(theta[::2]), np.exp(theta[1::2])
+    modes = len(omega)
+    linear, jacobians, projected, residuals = [], [], [], []
+    for lines in parts:
+        weight = lines.weight[:, None]
+        column, to_omega, to_zeta = mode_columns(lines, omega, zeta)
+        blocks = [column]
+        if complex_modes:  # a second column per mode: numerator of first degree
+            turn = lines.s[:, None] / omega
+            blocks.append(column * turn)
+        columns = stacked(np.asarray(weight * np.hstack([*blocks, lines.background]), dtype=np.complex128))
+        goal = stacked(np.asarray(lines.weight * lines.response, dtype=np.complex128))
+        norms = np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
+        basis, triangle = np.linalg.qr(columns / norms)
+        factors = np.linalg.lstsq(triangle, basis.T @ goal, rcond=1e-12)[0] / norms
+        gain = factors[:modes] + (factors[modes : 2 * modes] * turn if complex_modes else 0.0)
+        moved = np.empty((len(goal), 2 * modes))
+        along: ComplexArray = to_omega * gain
+        if complex_modes:
+            along = along - column * turn * factors[modes : 2 * modes]
+        moved[:, ::2], moved[:, 1::2] = stacked(weight * along), stacked(weight * (to_zeta * gain))
+        linear.append(factors)
+        jacobians.append(np.hstack((columns, moved)))
+        projected.append(moved - basis @ (basis.T @ moved))
+        residuals.append(goal - columns @ factors)
+    residual = np.concatenate(residuals)
+    return _Linearised(linear, jacobians, np.vstack(projected), residual, float(residual @ residual))
+
+
+def fit_modes(
+    parts: Sequence[Lines],
+    starts: Sequence[tuple[float, float]],
+    iterations: int,
+    *,
+    complex_modes: bool = False,
+    gain_floor: float = _GAIN_FLOOR,
+) -> ModalFit:
+    """Fit modes to lines: sum over modes of residue s^q / (s² + 2 zeta omega s + omega²), and the background.
+
+    Levenberg-Marquardt in ln omega and ln zeta with exact derivatives; everything linear is eliminated.
+
+    Source: D. J. Ewins, Modal Testing, 2nd ed., ch. 4; variable projection: G. Golub and V. Pereyra, 2003.
+    """
+    theta = np.log(np.array(starts, dtype=np.float64)).ravel()
+    modes, samples = len(starts), 2 * sum(len(lines.s) for lines in parts)
+    if samples <= 2 * modes + sum((1 + complex_modes) * modes + lines.background.shape[1] for lines in parts) + 1:
+        raise ArgumentError(f"{samples // 2} lines are too few for {modes} modes")
+    low = 0.3 * min(float(lines.omega[0]) for lines in parts)
+    high = 3.0 * max(float(lines.omega[-1]) for lines in parts)
+    bounds = np.log([low, high]), np.log([_MIN_DAMPING, _MAX_DAMPING])
+    at, damping = _linearised(parts, theta, complex_modes), 1e-3
+    for _ in range(iterations):
+        gram = at.projected.T @ at.projected
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        scaled = gram / np.outer(scale, scale) + (damping + 1e-14) * np.eye(2 * modes)
+        step = np.linalg.solve(scaled, at.projected.T @ at.residual / scale) / scale
+        largest = float(np.max(np.abs(step)))
+        if not np.isfinite(largest):
+            break
+        tried = theta + step * min(1.0, _LARGEST_STEP / max(largest, 1e-300))
+        for index, (least, most) in enumerate(bounds):
+            tried[index::2] = np.clip(tried[index::2], least, most)
+        moved = float(np.max(np.abs(tried - theta)))
+        following = _linearised(parts, tried, complex_modes)
+        gained = at.squares - following.squares
+        if gained >= -1e-13 * at.squares:
+            theta, at, damping = tried, following, 0.1 * damping
+        else:
+            damping = max(10.0 * damping, 1e-6)
+        if moved <= _STEP_FLOOR or (0.0 <= gained <= gain_floor * at.squares) or damping > 1e8:
+            break
+    omega, zeta = np.exp(theta[::2]), np.exp(theta[1::2])
+    residues = [part[:modes] + (part[modes : 2 * modes] * 1j if complex_modes else 0.0) for part in at.linear]
+    first = (2 if complex_modes else 1) * modes
+    ends = np.cumsum([2 * len(lines.s) for lines in parts])[:-1]
+    left = [part[: len(part) // 2] + 1j * part[len(part) // 2 :] for part in np.split(at.residual, ends)]
+    return ModalFit(
+        omega, zeta, np.array(residues, dtype=np.complex128), tuple(part[first:] for part in at.linear), tuple(left),
+        tuple(at.jacobian), complex_modes,
+    )  # fmt: skip
+
+
+def modelled(lines: Lines, omega: FloatArray, zeta: FloatArray, residues: ComplexArray) -> ComplexArray:
+    """Response of modes alone at the lines; the imaginary part of a residue goes with s/omega."""
+    column = mode_columns(lines, omega, zeta)[0]
+    turn = lines.s[:, None] / omega
+    return np.asarray(np.sum(column * (residues.real + residues.imag * turn), axis=1), dtype=np.complex128)

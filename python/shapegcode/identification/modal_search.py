@@ -1,0 +1,472 @@
+"""Which modes frequency responses hold: poles that stay over orders and bands, fitted window by window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shapegcode.errors import ArgumentError
+from shapegcode.identification.modal_fit import Lines, ModalFit, fit_modes, mode_columns, modelled
+from shapegcode.identification.plscf import Pole, band_poles
+from shapegcode.io.frequency_response import ComplexArray
+from shapegcode.io.record import FloatArray
+
+Starts = list[tuple[float, float]]
+"""Natural frequency (rad/s) and damping ratio of each mode."""
+_BAND = 1.8  # upper end of a band of poles over its lower end
+_STEP = 1.3  # from band to band
+_EDGE = 1.05  # poles so near to an end of a band are left to the next one
+_SAME, _SAME_DAMPING = 0.35, 0.4  # one pole: distance in half-power half widths, and in ln zeta
+_CORE = 1.35  # upper end of a window over its lower end
+_MARGIN = 1.3  # the lines of a window reach so far beyond its ends
+_BESIDE = 0.02, 3.0  # modes that count beyond the lines: share of the frequency, and damping ratios
+_STABLE = 0.34  # share of the higher orders that have a pole which is fitted from the start
+_SEEN = 0.12  # ... which is tried
+_QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain below which they end
+_TRIED, _WEAKEST = 3, 2
+_UNUSUAL = 2.0  # times the median of what a fit leaves: around a mode that may be two
+_LINES_PER_MODE = 4
+_FEW = 350  # lines of a window that trials take
+_BAND_LINES = 48  # a band or window has at least so many
+_ROUNDS = 4  # changes that are tried with all lines, behind those with few
+_FEWEST = 12  # lines below which a window is left out
+_DEGREE = 2  # of the background of a window
+CLEAR = 6.0  # by so much beyond Bayes' criterion a mode must better the fit
+_OPPOSED = 8.0  # ... and one that moves against the push of the hammer by so much more
+_TWINS = 0.02  # modes nearer than this share of their width are one
+_START_DAMPING = (0.005, 0.02, 0.06)
+_NO_VIBRATION = 0.5
+
+
+@dataclass(frozen=True)
+class StablePole:
+    """A pole that models of several orders have."""
+
+    omega: float  # rad/s
+    zeta: float
+    share: float  # of the models of higher order that have it
+
+
+def candidates_of(parts: Sequence[Lines]) -> tuple[list[StablePole], list[Pole]]:
+    """Poles that stay over orders and bands, ascending, and all poles."""
+    low = min(float(lines.omega[0]) for lines in parts)
+    high = max(float(lines.omega[-1]) for lines in parts)
+    begin, found, everything = low, [], []
+    while begin < high / _EDGE:
+        end = _upper_end(parts, begin, _BAND, high)
+        poles = band_poles(parts, begin, end)
+        first = begin if begin == low else begin * _EDGE
+        last = end if end == high else end / _EDGE
+        kept = [pole for pole in poles if first <= pole.omega <= last]
+        everything += kept
+        if kept:
+            highest = max(pole.order for pole in poles)
+            orders = {pole.order for pole in poles if pole.order > highest // 3}
+            found += _clusters([pole for pole in kept if pole.order in orders], len(orders))
+        begin *= _STEP
+    candidates: list[StablePole] = []
+    for each in sorted(found, key=lambda each: -each.share):
+        if each.share >= _SEEN and not any(_same(each, other) for other in candidates):
+            candidates.append(each)
+    return sorted(candidates, key=lambda each: each.omega), everything
+
+
+def _clusters(poles: list[Pole], orders: int) -> list[StablePole]:
+    """Poles of one band that are the same mode, as the models of higher order have it."""
+    left = sorted(poles, key=lambda pole: -pole.order)
+    found = []
+    while left:
+        near = [pole for pole in left if _same(left[0], pole)]
+        top = near[: max(1, len(near) // 2)]
+        share = len({pole.order for pole in near}) / orders
+        omega, zeta = (float(np.median([getattr(pole, name) for pole in top])) for name in ("omega", "zeta"))
+        found.append(StablePole(omega, zeta, share))
+        left = [pole for pole in left if pole not in near]
+    return found
+
+
+def _same(one: Pole | StablePole, other: Pole | StablePole) -> bool:
+    apart = abs(one.omega - other.omega)
+    width = _SAME * max(one.zeta, other.zeta) + 1e-4
+    return apart < width * one.omega and abs(np.log(one.zeta / other.zeta)) < _SAME_DAMPING
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A part of the lines and what was fitted to it."""
+
+    low: float  # rad/s, of the modes that count
+    high: float
+    parts: tuple[Lines, ...]  # lines beyond both ends too, without what modes further off do there
+    fit: ModalFit | None
+
+    def inside(self) -> list[int]:
+        """Modes that count."""
+        return (
+            [] if self.fit is None else [i for i, omega in enumerate(self.fit.omega) if self.low <= omega < self.high]
+        )
+
+
+def search(
+    parts: Sequence[Lines], low: float, high: float, most: int, candidates: Sequence[StablePole], starts: Starts | None
+) -> list[Window]:
+    """Fit windows, each without what the modes outside of it do in it; from poles that are stable, or from `starts`."""
+    spare = [(each.omega, each.zeta) for each in candidates]
+    final = starts is not None
+    if starts is None:
+        starts = [(each.omega, each.zeta) for each in candidates if each.share >= _STABLE]
+        spare = [(each.omega, each.zeta) for each in candidates if each.share < _STABLE]
+    known = _linear(parts, starts)
+    windows, begin = [], low
+    while begin < high:
+        end = _upper_end(parts, begin / _MARGIN, _CORE * _MARGIN**2, high * _MARGIN) / _MARGIN
+        if end * np.sqrt(_CORE) > high:
+            end = high
+        first, last = begin / _MARGIN, end * _MARGIN
+        near = [
+            index
+            for index, (omega, zeta) in enumerate(starts)
+            if first * (1.0 - _BESIDE[1] * zeta - _BESIDE[0]) < omega < last * (1.0 + _BESIDE[1] * zeta + _BESIDE[0])
+        ]
+        far = [index for index in range(len(starts)) if index not in near]
+        rest = [_without(lines, [starts[i] for i in far], known[row, far]) for row, lines in enumerate(parts)]
+        tried = [each for each in spare if first < each[0] < last]
+        windows.append(_fit_window(rest, [starts[i] for i in near], tried, begin, end, most, final))
+        begin = end
+    return windows
+
+
+def _upper_end(parts: Sequence[Lines], low: float, ratio: float, highest: float) -> float:
+    """Upper end of a band: some ratio above its lower end, further where the lines are few."""
+    fewest = max(
+        float(lines.omega[min(int(np.searchsorted(lines.omega, low)) + _BAND_LINES, len(lines.s) - 1)])
+        for lines in parts
+    )
+    return float(min(max(low * ratio, fewest), highest))
+
+
+def modes_of(windows: Sequence[Window]) -> Starts:
+    """All modes that count."""
+    return [(float(w.fit.omega[i]), float(w.fit.zeta[i])) for w in windows for i in w.inside() if w.fit is not None]
+
+
+def _linear(parts: Sequence[Lines], starts: Starts) -> ComplexArray:
+    """(responses, m) residues of modes whose poles are taken as they are."""
+    found = []
+    omega, zeta = np.array(starts, dtype=np.float64).reshape(-1, 2).T
+    for lines in parts:
+        top = lines.s**lines.power
+        columns = lines.weight[:, None] * np.column_stack((mode_columns(lines, omega, zeta)[0], top, top / lines.s**2))
+        goal = lines.weight * lines.response
+        stacked = np.vstack((columns.real, columns.imag))
+        norms = np.maximum(np.sqrt(np.sum(stacked**2, axis=0)), 1e-300)
+        factors = np.linalg.lstsq(stacked / norms, np.concatenate((goal.real, goal.imag)), rcond=1e-10)[0] / norms
+        found.append(factors[: len(omega)])
+    return np.array(found, dtype=np.complex128)
+
+
+def _without(lines: Lines, modes: Starts, residues: ComplexArray) -> Lines:
+    if not modes:
+        return lines
+    omega, zeta = np.array(modes).T
+    return replace(lines, response=lines.response - modelled(lines, omega, zeta, residues))
+
+
+def cut(lines: Lines, low: float, high: float, degree: int = _DEGREE) -> Lines:
+    """The lines between two angular frequencies, with a polynomial as background."""
+    inside = (lines.omega >= low) & (lines.omega <= high)
+    place = (lines.omega[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
+    powers = place[:, None] ** np.arange(degree + 1)
+    return replace(
+        lines, s=lines.s[inside], response=lines.response[inside], weight=lines.weight[inside],
+        background=np.hstack((powers, 1j * powers)),
+    )  # fmt: skip
+
+
+def _fit_window(
+    parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, most: int, final: bool
+) -> Window:
+    """The modes of a window by evidence: from those near it, without what explains nothing, with what is left."""
+    wide = [cut(lines, low / _MARGIN, high * _MARGIN) for lines in parts]
+    if min(len(lines.s) for lines in wide) <= _FEWEST:
+        return Window(low, high, (), None)
+    room = min(most, min(len(lines.s) for lines in wide) // _LINES_PER_MODE)
+    fewer = [_thinned(lines) for lines in wide]
+    share = min(lines.independent for lines in fewer)
+    both = [_selected(fewer, near[:room], spare, room)]
+    pruned = _pruned(fewer, [*near, *spare], share)[:room]
+    if sorted(pruned) != sorted(near[:room]):
+        both.append(_selected(fewer, pruned, spare, room))
+    usable = [each for each in both if each is not None]
+    best = min(usable, key=lambda fit: evidence_of(fit, share)) if usable else None
+    if not final:
+        return Window(low, high, tuple(wide), fitted(wide, starts_of(best), _QUICK))
+    if fewer[0] is not wide[0]:
+        best = _selected(wide, starts_of(best), spare, room, _ROUNDS)
+    best = fitted(wide, starts_of(best), _FULL)
+    if best is not None:
+        turned = fitted(wide, starts_of(best), _FULL, complex_modes=True)
+        share = min(lines.independent for lines in wide)
+        if turned is not None and evidence_of(turned, share) < evidence_of(best, share) and not _twins(turned):
+            best = turned
+    return Window(low, high, tuple(wide), best)
+
+
+def _thinned(lines: Lines) -> Lines:
+    step = len(lines.s) // _FEW
+    if step < 2:
+        return lines
+    return replace(
+        lines, s=lines.s[::step], response=lines.response[::step], weight=lines.weight[::step],
+        background=lines.background[::step], correlation=lines.correlation[::step],
+    )  # fmt: skip
+
+
+def _selected(parts: Sequence[Lines], starts: Starts, spare: Starts, room: int, rounds: int = 60) -> ModalFit | None:
+    """From some modes on, with one more or one less as long as the data speak for it."""
+    share = min(lines.independent for lines in parts)
+    best = fitted(parts, starts, _QUICK)
+    while starts and (best is None or _twins(best)):
+        starts = starts[:-1] if best is None else _apart(best)
+        best = fitted(parts, starts, _QUICK)
+    evidence = evidence_of(best, share) if best is not None else _empty(parts, share)
+    for _ in range(rounds):
+        changed = _reduced(parts, best, share, evidence) if best is not None else None
+        if changed is None and (best is None or len(best.omega) < room):
+            changed = _grown(parts, best, spare, share, evidence)
+        if changed is None and best is not None and len(best.omega) < room:
+            changed = _split(parts, best, share, evidence)
+        if changed is None:
+            break
+        best, evidence = changed
+    return best
+
+
+def _pruned(parts: Sequence[Lines], starts: Starts, share: float) -> Starts:
+    """Of more poles than there are modes those that explain most, left as they are, as many as the data speak for."""
+    if not starts:
+        return []
+    omega, zeta = np.array(starts).T
+    gram, goal, squares, samples = [], [], 0.0, 0.0
+    for lines in parts:
+        columns = lines.weight[:, None] * np.hstack((lines.background, mode_columns(lines, omega, zeta)[0]))
+        stacked = np.vstack((columns.real, columns.imag))
+        stacked /= np.maximum(np.sqrt(np.sum(stacked**2, axis=0)), 1e-300)
+        weighted = lines.weight * lines.response
+        wanted = np.concatenate((weighted.real, weighted.imag))
+        gram.append(stacked.T @ stacked + 1e-13 * np.eye(stacked.shape[1]))
+        goal.append(stacked.T @ wanted)
+        squares += float(wanted @ wanted)
+        samples += len(wanted) * share
+    kept, fixed = list(range(len(starts))), parts[0].background.shape[1]
+    best, chosen = np.inf, kept
+    while True:
+        index = [*range(fixed), *(fixed + each for each in kept)]
+        left, loss = squares, np.zeros(len(kept))
+        for one, right in zip(gram, goal, strict=True):
+            inverse = np.linalg.inv(one[np.ix_(index, index)])
+            factors = inverse @ right[index]
+            left -= float(factors @ right[index])
+            loss += factors[fixed:] ** 2 / np.maximum(np.diag(inverse)[fixed:], 1e-300)
+        parameters = len(parts) * (fixed + len(kept)) + 3 * len(kept)
+        evidence = samples * np.log(max(left, 1e-12 * squares)) + parameters * np.log(samples) + CLEAR * len(kept)
+        if evidence < best:
+            best, chosen = evidence, list(kept)
+        if not kept:
+            return [starts[each] for each in chosen]
+        kept.pop(int(np.argmin(loss)))
+
+
+def _split(parts: Sequence[Lines], fit: ModalFit, share: float, evidence: float) -> tuple[ModalFit, float] | None:
+    """The fit with two modes in place of one, where around it most is left for its width."""
+    left = []
+    for omega, zeta in starts_of(fit):
+        near = np.abs(parts[0].omega - omega) < 2.0 * zeta * omega
+        left.append(float(np.mean(np.abs(fit.left[0][near]) ** 2)) if np.count_nonzero(near) > _FEWEST // 2 else 0.0)
+    usual = float(np.median(np.abs(fit.left[0]) ** 2))
+    for index in np.argsort(left)[::-1][:_TRIED]:
+        if left[index] < _UNUSUAL * usual:
+            break
+        starts = starts_of(fit)
+        omega, zeta = starts.pop(index)
+        pair = [(omega * (1.0 - 0.5 * zeta), 0.8 * zeta), (omega * (1.0 + 0.5 * zeta), 0.8 * zeta)]
+        found = fitted(parts, [*starts, *pair], _QUICK)
+        if found is not None and not _twins(found) and evidence_of(found, share) < evidence:
+            return found, evidence_of(found, share)
+    return None
+
+
+def evidence_of(fit: ModalFit, share: float) -> float:
+    """Bayes' criterion of a fit: lower is better."""
+    samples = 2 * sum(len(part) for part in fit.left) * share
+    opposed = np.count_nonzero(fit.residues.real < 0.0) if len(fit.residues) == 1 else 0
+    cost = (fit.parameters + len(fit.omega)) * np.log(samples) + _OPPOSED * opposed + CLEAR * len(fit.omega)
+    return float(samples * np.log(max(fit.squares, 1e-300)) + cost)
+
+
+def _empty(parts: Sequence[Lines], share: float) -> float:
+    squares, samples, columns = 0.0, 0.0, 0
+    for lines in parts:
+        goal = lines.weight * lines.response
+        basis = lines.weight[:, None] * lines.background
+        stacked, wanted = np.vstack((basis.real, basis.imag)), np.concatenate((goal.real, goal.imag))
+        squares += float(np.sum((wanted - stacked @ np.linalg.lstsq(stacked, wanted, rcond=None)[0]) ** 2))
+        samples += len(wanted) * share
+        columns += basis.shape[1]
+    return float(samples * np.log(max(squares, 1e-300)) + columns * np.log(samples))
+
+
+def fitted(
+    parts: Sequence[Lines], starts: Starts, effort: tuple[int, float] = _FULL, *, complex_modes: bool = False
+) -> ModalFit | None:
+    """A fit, or None where there are no starts or too few lines for them."""
+    if not starts:
+        return None
+    try:
+        fit = fit_modes(parts, starts, effort[0], complex_modes=complex_modes, gain_floor=effort[1])
+    except (ArgumentError, np.linalg.LinAlgError):
+        return None
+    return fit if np.isfinite(fit.squares) else None
+
+
+def starts_of(fit: ModalFit | None) -> Starts:
+    """The modes of a fit, for another one to begin with."""
+    return [] if fit is None else list(zip(fit.omega.tolist(), fit.zeta.tolist(), strict=True))
+
+
+def _grown(
+    parts: Sequence[Lines], fit: ModalFit | None, spare: Starts, share: float, evidence: float
+) -> tuple[ModalFit, float] | None:
+    """The fit with one mode more for which the data speak: of the pool, or where most is left."""
+    left = [lines.weight * lines.response for lines in parts] if fit is None else fit.left
+    highest = float(parts[0].omega[int(np.argmax(np.convolve(np.abs(left[0]), np.ones(3), "same")))])
+    tried = [*spare, *((highest, zeta) for zeta in _START_DAMPING)]
+    gains = []
+    for omega, zeta in tried:
+        gain = 0.0
+        for lines, rest in zip(parts, left, strict=True):
+            column = lines.weight * mode_columns(lines, np.array([omega]), np.array([zeta]))[0][:, 0]
+            near = np.abs(lines.omega - omega) < 3.0 * max(zeta * omega, lines.omega[1] - lines.omega[0])
+            norm = float(np.sum(np.abs(column[near]) ** 2))
+            gain += float(np.sum((np.conj(column[near]) * rest[near]).real)) ** 2 / norm if norm > 0.0 else 0.0
+        gains.append(gain)
+    squares = sum(float(np.sum(np.abs(part) ** 2)) for part in left)
+    samples = 2 * sum(len(part) for part in left) * share
+    for index in np.argsort(gains)[::-1][:_TRIED]:
+        # Poles move and residues with them: a mode may come to explain some times more than at its start.
+        if samples * np.log(max(1.0 - 3.0 * gains[index] / squares, 1e-9)) + 4.0 * np.log(samples) > 0.0:
+            break
+        found = fitted(parts, [*starts_of(fit), tried[index]], _QUICK)
+        if found is not None and not _twins(found):
+            better = evidence_of(found, share)
+            if better < evidence:
+                return found, better
+    return None
+
+
+def _twins(fit: ModalFit) -> bool:
+    """Whether two modes are one, drawn twice to make up for what is no mode, or one is no vibration."""
+    order = np.argsort(fit.omega)
+    omega, zeta = fit.omega[order], fit.zeta[order]
+    near = np.diff(omega) < _TWINS * np.maximum(zeta[1:], zeta[:-1]) * omega[1:]
+    return bool(np.any(near) or np.any(zeta > _NO_VIBRATION))
+
+
+def _apart(fit: ModalFit) -> Starts:
+    """The modes of a fit without the weaker of each two that are one."""
+    order = np.argsort(np.max(np.abs(fit.residues), axis=0))[::-1]
+    kept: list[int] = []
+    for index in order:
+        width = 2.0 * _TWINS * fit.zeta[index] * fit.omega[index]
+        if fit.zeta[index] <= _NO_VIBRATION and all(abs(fit.omega[index] - fit.omega[i]) > width for i in kept):
+            kept.append(int(index))
+    starts = starts_of(fit)
+    return [starts[i] for i in kept[: len(starts) - 1]]
+
+
+def _reduced(
+    parts: Sequence[Lines], fit: ModalFit, share: float, evidence: float
+) -> tuple[ModalFit | None, float] | None:
+    """The fit without the mode that explains least, if the data do not speak for it."""
+    order = np.argsort(np.max(np.abs(fit.residues) / _residue_spread(fit), axis=0))
+    for index in order[:_WEAKEST]:
+        starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
+        if not starts:
+            empty = _empty(parts, share)
+            return (None, empty) if empty < evidence else None
+        found = fitted(parts, starts, _QUICK)
+        if found is not None and evidence_of(found, share) < evidence:
+            return found, evidence_of(found, share)
+    return None
+
+
+def _residue_spread(fit: ModalFit) -> FloatArray:
+    """(responses, m) standard errors of the residues up to a common factor."""
+    modes, spread = len(fit.omega), []
+    for jacobian in fit.jacobian:
+        norms = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
+        scaled = jacobian / norms
+        inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True, rcond=1e-13)
+        spread.append(np.sqrt(np.maximum(np.diag(inverse), 1e-300))[:modes] / norms[:modes])
+    return np.array(spread)
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Covariances of the modes of a window."""
+
+    poles: FloatArray  # (m, 2, 2) of ln omega and ln zeta
+    each: FloatArray  # (responses, m, 3, 3) of ln omega, ln zeta and the residue's real part
+    freedom: float  # independent samples, less the parameters
+    step: FloatArray  # (p, 2n) residual to parameters; for the scatter of hits
+
+
+def uncertainty_of(window: Window) -> Uncertainty:
+    """Covariances with the noise that is left and its correlation between lines."""
+    fit, parts = window.fit, window.parts
+    assert fit is not None
+    modes = len(fit.omega)
+    counts = [jacobian.shape[1] - 2 * modes for jacobian in fit.jacobian]
+    rows = [jacobian.shape[0] for jacobian in fit.jacobian]
+    size = sum(counts) + 2 * modes
+    jacobian = np.zeros((sum(rows), size))
+    at, column = 0, 0
+    for part, count in zip(fit.jacobian, counts, strict=True):
+        jacobian[at : at + len(part), column : column + count] = part[:, :count]
+        jacobian[at : at + len(part), sum(counts) :] = part[:, count:]
+        at, column = at + len(part), column + count
+    norms = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
+    scaled = jacobian / norms
+    inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True, rcond=1e-14)
+    spread = np.zeros((size, size))
+    at = 0
+    for lines, count in zip(parts, rows, strict=True):
+        block = scaled[at : at + count]
+        paired = block[: count // 2] + 1j * block[count // 2 :]
+        spread += (paired.conj().T @ _correlated(paired, lines.correlation)).real
+        at += count
+    lost = float(np.trace(inverse @ spread))
+    samples = float(sum(rows))
+    variance = fit.squares / max(samples - lost, 1.0)
+    whole = variance * (inverse @ spread @ inverse) / np.outer(norms, norms)
+    freedom = max(sum(count * lines.independent for count, lines in zip(rows, parts, strict=True)) - size, 2.0)
+    first = sum(counts)
+    poles = np.array(
+        [whole[first + 2 * i : first + 2 * i + 2, first + 2 * i : first + 2 * i + 2] for i in range(modes)]
+    )
+    begins = np.cumsum([0, *counts[:-1]])
+    chosen = [[[first + 2 * i, first + 2 * i + 1, int(begin) + i] for i in range(modes)] for begin in begins]
+    each = np.array([[whole[np.ix_(index, index)] for index in row] for row in chosen])
+    return Uncertainty(poles, each, freedom, (inverse @ scaled.T) / norms[:, None])
+
+
+def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArray:
+    """Columns times the correlation matrix of the lines' noise."""
+    if len(correlation) == 1:
+        return columns
+    kernel = np.concatenate((np.conj(correlation[:0:-1]), correlation))
+    count = len(columns) + len(kernel) - 1
+    product = np.fft.ifft(np.fft.fft(columns, count, axis=0) * np.fft.fft(kernel, count)[:, None], axis=0)
+    return np.asarray(product[len(correlation) - 1 :][: len(columns)], dtype=np.complex128)
