@@ -12,17 +12,8 @@ from scipy.signal import find_peaks
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import Prepared
-from shapegcode.identification.lines import (
-    Hits,
-    hits_of,
-    measured_lines,
-    neighbours_correlation,
-    smoothed,
-    steady_sines,
-    weighted,
-)
-from shapegcode.identification.modal_fit import Lines, ModalFit
-from shapegcode.identification.modal_search import (
+from shapegcode.identification.frf_model import Lines, ModalFit
+from shapegcode.identification.frf_search import (
     StablePole,
     Starts,
     Uncertainty,
@@ -35,6 +26,15 @@ from shapegcode.identification.modal_search import (
     search,
     starts_of,
     uncertainty_of,
+)
+from shapegcode.identification.lines import (
+    Hits,
+    hits_of,
+    measured_lines,
+    neighbours_correlation,
+    smoothed,
+    steady_sines,
+    weighted,
 )
 from shapegcode.identification.model_search import MIN_SWINGS, Sought, interval_refusal, mode_estimates
 from shapegcode.identification.plscf import Pole

@@ -10,7 +10,7 @@ from scipy import fft
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from shapegcode.identification.checks import Usable
-from shapegcode.identification.modal_fit import POWERS, Lines
+from shapegcode.identification.frf_model import POWERS, Lines
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import FloatArray
 

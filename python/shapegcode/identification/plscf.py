@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from shapegcode.identification.modal_fit import Lines
+from shapegcode.identification.frf_model import Lines
 from shapegcode.io.frequency_response import ComplexArray
 
 _CIRCLE = 0.85  # share of the unit circle that a band is laid on

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shapegcode.errors import ArgumentError
-from shapegcode.identification.modal_fit import Lines, ModalFit, fit_modes, mode_columns, modelled
+from shapegcode.identification.frf_model import Lines, ModalFit, fit_modes, mode_columns, modelled
 from shapegcode.identification.plscf import Pole, band_poles
 from shapegcode.io.frequency_response import ComplexArray
 from shapegcode.io.record import FloatArray
