@@ -104,7 +104,7 @@ def theirs(hard: HardRecord, excited_hz: float, tally: Tally) -> None:
     frequency = np.fft.rfftfreq(len(used[0].response), 1.0 / RATE_HZ)
     kept = frequency < 1.3 * excited_hz
     model = EMA.Model(
-        ratio[None, kept], frequency[kept], lower=20, upper=excited_hz, pol_order_high=60, frf_type="accelerance"
+        ratio[None, kept], frequency[kept], lower=20, upper=excited_hz, pol_order_high=60, frf_form="accelerance"
     )
     model.get_poles(show_progress=False)
     found = stable_poles(model)
