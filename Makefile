@@ -254,7 +254,6 @@ release: test-packages .venv/.runtime
 	ctest --preset $@
 
 sanitize: test-packages
-	@tests/tools/debian_packages.sh $(CLANG_PACKAGES)
 	cmake --preset $@
 	cmake --build --preset $@
 	ctest --preset $@
