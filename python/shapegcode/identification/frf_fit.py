@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy import stats
 from scipy.signal import find_peaks
 
@@ -43,12 +44,14 @@ from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import FloatArray
 
 _BESIDE = 0.25  # lines beside the band asked for that are fitted along, as a share of its ends
+_COMMON = 0.5  # share of the band that several responses must have in common
 _FURTHER = 1.3  # lines are fitted up to so far above what the hits excite
 _EXCITED = 0.1  # -20 dB: what is excited less is not supported
 _MIN_WIDTH = 1.0  # a resonance narrower than so many distances of two lines is not told from the record's length
 _LASTING = 0.8  # what has not fallen to this share at the end of the record does not decay
-_HUM = 0.02  # ... and beside a harmonic of the mains what has not fallen to this one may be hum
+_HUM = 0.1  # ... and beside a harmonic of the mains what has not fallen to this one may be hum
 _MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # the width in resolutions
+_MAINS_WIDTH_HZ = 2.0
 _VERY_CLEAR = 6.0  # evidence beyond that for a mode without a peak of its own or without a stable pole
 _STABLE = 0.34  # share of the orders that have the pole of a mode
 _LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % left unexplained, within so many half-power widths
@@ -56,11 +59,16 @@ _TURNED = 1.0  # tan of the phase of a residue: beyond it hammer and sensor are 
 _ACCEPTED_PERCENT = 50.0  # a damping ratio less certain than this is refused
 _MAX_MODES, _IN_WINDOW = 40, 24  # of a structure unless asked otherwise; of a window
 _NO_VIBRATION = 0.3  # damping ratio of what is background, not a mode
+_AGAINST = "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
+_BEYOND = "beyond the number of modes that were asked for: its peak is lower"
+_DIFFERENT = 0.5  # share of a hit's response that the model of all hits leaves: another point, axis or sign
+_OUT_OF_NOISE = 5.0
+_NEAR = 20.0  # evidence within which a fit with the other kind of modes says how sure the values are
 _SCATTER = 0.01  # probability by noise alone of hits that differ as much
 _ENOUGH = 3.0  # independent samples a parameter of a fit that another one is held against
 _PEAK = 0.5  # half-power widths
 _RISES = 2.0  # a peak rises by this factor out of its surroundings
-_POOR = 70.0  # % of the response in the band that a model must explain to be used
+POOR = 0.3  # share of the response in the band that a model which is used may leave unexplained
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +93,8 @@ class FrfModes:
     chart: tuple[ChartPole, ...]
     model: tuple[ComplexArray, ...]  # (n,) lines of each response; as measured where no window is
     fit_percent: float
-    missing_peak_hz: float | None  # the highest peak of the response, if no supported mode is there
+    missing_peak_hz: float | None  # the highest peak of the mobility, if no supported mode is there
+    different: str = ""  # the record of a hit that the model of all hits does not explain
 
 
 def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...], sought: Sought) -> Identification:
@@ -133,9 +142,16 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
 
 
 def _all_opposed(found: FrfModes) -> bool:
-    fits = [(window.fit, i) for window in found.windows for i in window.inside() if window.fit is not None]
-    heights = [float(fit.residues[0, i].real / fit.zeta[i]) for fit, i in fits if fit.zeta[i] < _NO_VIBRATION]
-    return sum(heights) < 0.0
+    """Whether the modes that stand out go against the push, all that is supported counted."""
+    with_it = [_height(mode) for mode in found.modes if not mode.refusal]
+    against = [_height(mode) for mode in found.modes if mode.refusal == _AGAINST]
+    return sum(against) > sum(with_it)
+
+
+def _height(mode: IdentifiedMode) -> float:
+    """Height of the peak of the mobility, up to a factor."""
+    assert mode.mass_kg is not None
+    return 1.0 / (mode.damping_ratio.value * mode.frequency_hz.value * mode.mass_kg.value)
 
 
 def _chosen(
@@ -150,7 +166,7 @@ def _chosen(
                     f"{first.source}: {name} is {getattr(first, name)}; {other.source}: {getattr(other, name)}: "
                     "must be the same in all files"
                 )
-    used = list(responses)
+    used = [_of_lines(each, each.response != 0.0) for each in responses]  # what is exactly 0 was not measured
     if band_hz is not None:
         lowest, highest = (float(end(each.frequency_hz[i] for each in responses)) for end, i in ((min, 0), (max, -1)))
         if not (band_hz[0] < band_hz[1] and band_hz[0] < highest and band_hz[1] > lowest):
@@ -158,7 +174,15 @@ def _chosen(
                 f"band of {band_hz[0]:g} to {band_hz[1]:g} Hz: must ascend and lie within the lines, {lowest:g} to "
                 f"{highest:g} Hz"
             )
-        used = [_within(each, (1.0 - _BESIDE) * band_hz[0], (1.0 + _BESIDE) * band_hz[1]) for each in responses]
+        used = [_within(each, (1.0 - _BESIDE) * band_hz[0], (1.0 + _BESIDE) * band_hz[1]) for each in used]
+    first_hz, last_hz = (np.array([each.frequency_hz[end] for each in used]) for end in (0, -1))
+    common, whole = last_hz.min() - first_hz.max(), last_hz.max() - first_hz.min()
+    if common < _COMMON * whole:
+        raise RecordError(
+            f"{used[0].source} and {len(used) - 1} more have {max(common, 0.0):.4g} Hz of {whole:.4g} Hz in common: "
+            "identify responses of different bands apart"
+        )
+    used = [_within(each, first_hz.max(), last_hz.min()) for each in used]
     alike = all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:])
     mean = np.mean([each.response for each in used], axis=0) if alike else None
     one_point = len(used) > 1 and mean is not None and all(
@@ -168,7 +192,12 @@ def _chosen(
 
 
 def _within(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
-    inside = (each.frequency_hz >= low_hz) & (each.frequency_hz <= high_hz)
+    return _of_lines(each, (each.frequency_hz >= low_hz) & (each.frequency_hz <= high_hz))
+
+
+def _of_lines(each: FrequencyResponse, inside: npt.NDArray[np.bool_]) -> FrequencyResponse:
+    if bool(np.all(inside)):
+        return each
     coherence = None if each.coherence is None else each.coherence[inside]
     return replace(each, frequency_hz=each.frequency_hz[inside], response=each.response[inside], coherence=coherence)
 
@@ -241,6 +270,11 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
     fitted = [np.zeros(len(each)) for each in responses]
     for samples, start, course in zip(fitted, measured.hits.starts, courses, strict=True):
         samples[start : start + len(course)] = course
+    left = np.where(inside, measured.hits.response - found_modes.model[0] * measured.hits.force, 0.0)
+    shares = np.linalg.norm(left, axis=1) / np.linalg.norm(np.where(inside, measured.hits.response, 0.0), axis=1)
+    worst = int(np.argmax(shares))
+    if len(shares) > 1 and shares[worst] > _DIFFERENT:
+        found_modes = replace(found_modes, different=ready.records[worst].source)
     return found_modes, fitted
 
 
@@ -279,10 +313,8 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
     if sought.modes is not None and len(supported) < sought.modes:
         raise RecordError(f"{sought.modes} modes are asked for, and the data hold no more than {len(supported)}")
     most = sought.modes or sought.max_modes or _MAX_MODES
-    height = {id(mode): mode.damping_ratio.value * (mode.mass_kg.value if mode.mass_kg else 1.0) for mode in supported}
-    over = {id(mode) for mode in sorted(supported, key=lambda mode: height[id(mode)])[most:]}
-    why = f"{most} modes of higher peaks were asked for"
-    return [replace(mode, refusal=why) if id(mode) in over else mode for mode in modes]
+    over = {id(mode) for mode in sorted(supported, key=_height, reverse=True)[most:]}
+    return [replace(mode, refusal=_BEYOND) if id(mode) in over else mode for mode in modes]
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
@@ -330,7 +362,8 @@ def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float
     inside = _inside(lines, measured)
     if measured.excitation is not None:
         inside &= measured.excitation >= _EXCITED
-    if not np.any(inside):
+    inside &= lines.weight * np.abs(lines.response) > _OUT_OF_NOISE
+    if np.count_nonzero(inside) < 3:
         return None
     level = np.log(np.maximum(height[inside], 1e-300))
     tops, _ = find_peaks(level, prominence=np.log(_RISES))
@@ -339,16 +372,18 @@ def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float
     top = float(lines.omega[inside][tops[int(np.argmax(level[tops]))]]) / (2.0 * np.pi)
     for mode in modes:
         width = mode.frequency_hz.value * (2.0 * mode.damping_ratio.value + 0.01)
-        if not mode.refusal and abs(mode.frequency_hz.value - top) < width:
+        if mode.refusal in ("", _BEYOND) and abs(mode.frequency_hz.value - top) < width:
             return None
     return top
 
 
 def doubt_of(found: FrfModes) -> str:
     """Why the modes should not be used; empty: they may."""
+    if found.different:
+        return f"{found.different} answers differently from the other hits: another point, axis or sign"
     if found.missing_peak_hz is not None:
-        return f"the highest peak of the response, at {found.missing_peak_hz:.4g} Hz, belongs to no supported mode"
-    if found.fit_percent < _POOR:
+        return f"the highest peak of the mobility, at {found.missing_peak_hz:.4g} Hz, belongs to no supported mode"
+    if found.fit_percent < 100.0 * (1.0 - POOR):
         return f"the model explains {found.fit_percent:.0f} % of the response in the band only"
     return ""
 
@@ -399,7 +434,14 @@ def _other_fits(window: Window) -> list[ModalFit]:
         columns = (2 + 1 + complex_modes) * len(starts) + 6
         if min(2 * len(lines.s) * lines.independent for lines in parts) > _ENOUGH * columns:
             found.append(fitted(parts, starts, complex_modes=complex_modes))
-    return [each for each in found if each is not None]
+    share = min(lines.independent for lines in window.parts)
+    # Real modes in place of complex ones count only where the data do not rule them out; complex ones hold real ones.
+    limit = evidence_of(fit, share) + _NEAR
+    return [
+        each
+        for each in found
+        if each is not None and (each.complex_modes or not fit.complex_modes or evidence_of(each, share) < limit)
+    ]
 
 
 def _logarithms(
@@ -503,7 +545,7 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
             "spindle), or a record too short for a mode of so little damping"
         )
     mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
-    if lasting > _HUM and abs(mains - hertz) < _HUM_WIDTH * measured.resolution_hz:
+    if lasting > _HUM and abs(mains - hertz) < min(_HUM_WIDTH * measured.resolution_hz, _MAINS_WIDTH_HZ):
         return f"beside {mains:g} Hz, a harmonic of the mains, and still at {100.0 * lasting:.0f} %: it may be hum"
     assert measured.excitation is not None
     excitation = float(np.interp(2.0 * np.pi * hertz, measured.parts[0].omega, measured.excitation))
@@ -520,7 +562,7 @@ def _response_refusal(residues: ComplexArray) -> str:
     if len(residues) > 1:  # points other than the one of the force may move either way
         return ""
     if first.real < 0.0:
-        return "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
+        return _AGAINST
     if abs(first.imag) > _TURNED * first.real:
         return (
             f"its phase is {np.degrees(np.angle(first)):.0f}° off that of hammer and sensor at one point (limit 45°): "

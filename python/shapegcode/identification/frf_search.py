@@ -207,10 +207,10 @@ def _fit_window(
         best = _selected(wide, starts_of(best), spare, room, _ROUNDS)
     best = fitted(wide, starts_of(best), _FULL)
     if best is not None:
-        turned = fitted(wide, starts_of(best), _FULL, complex_modes=True)
+        real = fitted(wide, starts_of(best), _FULL, complex_modes=False)
         share = min(lines.independent for lines in wide)
-        if turned is not None and evidence_of(turned, share) < evidence_of(best, share) and not _twins(turned):
-            best = turned
+        if real is not None and evidence_of(real, share) < evidence_of(best, share) and not _twins(real):
+            best = real
     return Window(low, high, tuple(wide), best)
 
 
@@ -319,7 +319,7 @@ def _empty(parts: Sequence[Lines], share: float) -> float:
 
 
 def fitted(
-    parts: Sequence[Lines], starts: Starts, effort: tuple[int, float] = _FULL, *, complex_modes: bool = False
+    parts: Sequence[Lines], starts: Starts, effort: tuple[int, float] = _FULL, *, complex_modes: bool = True
 ) -> ModalFit | None:
     """A fit, or None where there are no starts or too few lines for them."""
     if not starts:

@@ -13,8 +13,8 @@ from scipy.signal import resample_poly
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
-from shapegcode.identification.checks import Prepared, prepare
-from shapegcode.identification.frf_fit import FrfModes, doubt_of, find_frf_modes, find_hit_modes
+from shapegcode.identification.checks import Prepared, RecordUse, prepare
+from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
 from shapegcode.identification.model_search import (
     ACCEPTED_PERCENT,
     MAX_MODES,
@@ -187,10 +187,11 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: Sought) -> Ident
             "an exponential window of a free decay cannot be told from its damping: state it with the force"
         )
     if isinstance(problem, Taps) and (windowed or (sought.modes is None and not are_blows(ready))):
-        many, fitted = find_hit_modes(ready, sought)
-        few = None if windowed else _few(ready, problem, many)
+        long = _of_similar_length(ready)
+        many, fitted = find_hit_modes(long, sought)
+        few = None if windowed else _few(ready, problem, many, sought.band_hz is not None)
         if few is None:
-            return _many(ready, files, many, fitted)
+            return _many(long, files, many, fitted)
         sought = replace(sought, max_modes=min(sought.max_modes or MAX_MODES, few + _MORE))
     models = search(problem, sought)
     sought.order(models)
@@ -200,7 +201,7 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: Sought) -> Ident
     return _result(ready, files, problem, models, others, sought)
 
 
-def _few(ready: Prepared, problem: Taps, many: FrfModes) -> int | None:
+def _few(ready: Prepared, problem: Taps, many: FrfModes, narrow: bool) -> int | None:
     """Number of modes that explain the whole record, down to its noise, if a fit in time tells so few best."""
     starts = [
         (2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in many.modes if not mode.refusal
@@ -208,7 +209,7 @@ def _few(ready: Prepared, problem: Taps, many: FrfModes) -> int | None:
     power = np.mean([np.mean(record.response**2) for record in ready.records])
     noise = np.mean([(each.response_noise or 0.0) ** 2 for each in ready.usable]) / power
     limit = max(_EXPLAINED**2, _NOISE_SHARE**2 * noise)
-    if starts and problem.samples > _SAMPLES_IN_TIME:
+    if problem.samples > _SAMPLES_IN_TIME and (starts or narrow):
         return None
     quick: Fit | None = None
     while len(starts) <= _FEW_MODES:
@@ -223,6 +224,16 @@ def _few(ready: Prepared, problem: Taps, many: FrfModes) -> int | None:
             return len(starts) if quick is None else None
         starts = [*(starts_of(quick) if quick is not None else []), (peaks[0], _START_DAMPING)]
     return None if any(mode.refusal == "" for mode in many.modes) else _FEW_MODES
+
+
+def _of_similar_length(ready: Prepared) -> Prepared:
+    """The hits whose records are at least half as long as the longest: over frequency all are cut to the shortest."""
+    longest = max(len(record.response) for record in ready.records)
+    short = [each for each in ready.usable if 2 * len(each.record.response) < longest]
+    why = "shorter than half of the longest record"
+    refused = tuple(RecordUse(each.record.source, False, why) for each in short)
+    usable = tuple(each for each in ready.usable if each not in short)
+    return replace(ready, usable=usable, refused=(*ready.refused, *refused))
 
 
 def _many(ready: Prepared, files: tuple[str, ...], many: FrfModes, fitted: Sequence[FloatArray]) -> Identification:
@@ -321,6 +332,9 @@ def _result(
         fit_percent=100.0 * (1.0 - left),
         noise_rms=float(np.sqrt(fit.sum_of_squares / (fit.samples - fit.parameters))),
         mass_check=_mass_check(problem, fit),
+        doubt=f"the model explains {100.0 * (1.0 - left):.0f} % of the response only"
+        if coloured and left > POOR
+        else "",
         warnings=tuple(warnings),
         fitted=tuple(np.real(part) for part in fit.fitted),
     )
