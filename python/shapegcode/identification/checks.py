@@ -287,7 +287,7 @@ _SMOOTH_FALL = 6.0
 _NEARLY_TOP = 0.95
 _FLAT_SHARE = 0.5
 _FLAT_RUN = 5
-_EXCITED = 0.1  # Where the force's spectrum has fallen to this share (-20 dB), noise counts tenfold
+EXCITED = 0.1  # Where the force's spectrum has fallen to this share (-20 dB), noise counts tenfold
 #: A half sine falls to that share at this many over its duration: cos(pi x) / (1 - 4 x²) = 0.1 in size.
 EXCITED_HALF_SINE = 1.3033
 #: Periods that tell a damping ratio though the response has not decayed; fewer do not tell decay from beat.
@@ -350,11 +350,11 @@ def excited_hz(force_n: FloatArray, period_s: float) -> float:
         return 0.0
     count = max(4096, 16 * len(pulse))
     spectrum = np.abs(np.fft.rfft(pulse, count))
-    low = np.flatnonzero(spectrum < _EXCITED * spectrum[0])
+    low = np.flatnonzero(spectrum < EXCITED * spectrum[0])
     if not low.size:
         return 0.5 / period_s
     at = int(low[0])
-    above, below = spectrum[at - 1] - _EXCITED * spectrum[0], spectrum[at] - _EXCITED * spectrum[0]
+    above, below = spectrum[at - 1] - EXCITED * spectrum[0], spectrum[at] - EXCITED * spectrum[0]
     return float(at - below / (below - above)) / (count * period_s)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,11 +11,11 @@ from scipy import stats
 from scipy.signal import find_peaks
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.checks import Prepared
+from shapegcode.identification.checks import EXCITED, Prepared
 from shapegcode.identification.frf_model import Lines, ModalFit
 from shapegcode.identification.frf_search import (
+    STABLE,
     StablePole,
-    Starts,
     Uncertainty,
     Window,
     candidates_of,
@@ -37,7 +36,20 @@ from shapegcode.identification.lines import (
     steady_sines,
     weighted,
 )
-from shapegcode.identification.model_search import MIN_SWINGS, Sought, interval_refusal, mode_estimates
+from shapegcode.identification.model_search import (
+    LASTING,
+    LOGARITHMS,
+    MIN_SWINGS,
+    OPPOSED,
+    SCATTER_PROBABILITY,
+    Sought,
+    Starts,
+    chart_of,
+    interval_refusal,
+    lasting_refusal,
+    lasting_share,
+    mode_estimates,
+)
 from shapegcode.identification.plscf import Pole
 from shapegcode.identification.result import ChartPole, Identification, IdentifiedMode, by_support
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
@@ -46,25 +58,21 @@ from shapegcode.io.record import FloatArray
 _BESIDE = 0.25  # lines beside the band asked for that are fitted along, as a share of its ends
 _COMMON = 0.5  # share of the band that several responses must have in common
 _FURTHER = 1.3  # lines are fitted up to so far above what the hits excite
-_EXCITED = 0.1  # -20 dB: what is excited less is not supported
+_SAME_POINT = 0.1  # responses of one point differ by no more than this share
 _MIN_WIDTH = 1.0  # a resonance narrower than so many distances of two lines is not told from the record's length
-_LASTING = 0.8  # what has not fallen to this share at the end of the record does not decay
-_HUM = 0.1  # ... and beside a harmonic of the mains what has not fallen to this one may be hum
+_HUM = 0.1  # beside a harmonic of the mains, what has not fallen to this share at the end of the record may be hum
 _MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # the width in resolutions
 _MAINS_WIDTH_HZ = 2.0
 _VERY_CLEAR = 6.0  # evidence beyond that for a mode without a peak of its own or without a stable pole
-_STABLE = 0.34  # share of the orders that have the pole of a mode
 _LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % left unexplained, within so many half-power widths
 _TURNED = 1.0  # tan of the phase of a residue: beyond it hammer and sensor are not at the same point
 _ACCEPTED_PERCENT = 50.0  # a damping ratio less certain than this is refused
 _MAX_MODES, _IN_WINDOW = 40, 24  # of a structure unless asked otherwise; of a window
 _NO_VIBRATION = 0.3  # damping ratio of what is background, not a mode
-_AGAINST = "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
 _BEYOND = "beyond the number of modes that were asked for: its peak is lower"
 _DIFFERENT = 0.5  # share of a hit's response that the model of all hits leaves: another point, axis or sign
 _OUT_OF_NOISE = 5.0
 _NEAR = 20.0  # evidence within which a fit with the other kind of modes says how sure the values are
-_SCATTER = 0.01  # probability by noise alone of hits that differ as much
 _ENOUGH = 3.0  # independent samples a parameter of a fit that another one is held against
 _PEAK = 0.5  # half-power widths
 _RISES = 2.0  # a peak rises by this factor out of its surroundings
@@ -113,7 +121,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
             "damping, unless --exponential-window states it"
         )
     measured = _of_responses(merged, sought.exponential_window_s)
-    found = find(measured, sought)
+    found = _in_responses(measured, sought)
     turned: list[str] = []
     if _all_opposed(found):
         turned.append(
@@ -123,7 +131,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
         merged = [replace(each, response=-each.response) for each in merged]
         used = [replace(each, response=-each.response) for each in used]
         measured = _of_responses(merged, sought.exponential_window_s)
-        found = find(measured, sought)
+        found = _in_responses(measured, sought)
     lines = [found.model[0]] * len(used) if one_point and len(used) > 1 else list(found.model)
     left = np.concatenate([each.response - model for each, model in zip(used, lines, strict=True)])
     return Identification(
@@ -144,7 +152,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
 def _all_opposed(found: FrfModes) -> bool:
     """Whether the modes that stand out go against the push, all that is supported counted."""
     with_it = [_height(mode) for mode in found.modes if not mode.refusal]
-    against = [_height(mode) for mode in found.modes if mode.refusal == _AGAINST]
+    against = [_height(mode) for mode in found.modes if mode.refusal == OPPOSED]
     return sum(against) > sum(with_it)
 
 
@@ -186,7 +194,7 @@ def _chosen(
     alike = all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:])
     mean = np.mean([each.response for each in used], axis=0) if alike else None
     one_point = len(used) > 1 and mean is not None and all(
-        float(np.linalg.norm(each.response - mean)) < 0.1 * float(np.linalg.norm(mean)) for each in used
+        float(np.linalg.norm(each.response - mean)) < _SAME_POINT * float(np.linalg.norm(mean)) for each in used
     )  # fmt: skip
     return used, one_point
 
@@ -218,15 +226,8 @@ def _of_responses(responses: Sequence[FrequencyResponse], applied_s: float | Non
     return _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
 
 
-def hits_measured(ready: Prepared, sought: Sought) -> _Measured:
-    """Hits as they are fitted, without what oscillates throughout."""
-    responses = [each.record.response for each in ready.usable]
-    period = ready.records[0].period_s
-    responses = [each - steady_sines(each, period)[0] for each in responses]
-    return _of_hits(ready, responses, sought)
-
-
-def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -> _Measured:
+def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -> tuple[_Measured, Hits]:
+    """Hits with these responses as they are fitted."""
     period = ready.records[0].period_s
     duration = min(len(each) for each in responses) * period
     excited = min(max(each.excited_hz or 0.0 for each in ready.usable), 0.45 / period)
@@ -237,7 +238,7 @@ def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -
     hits = hits_of(ready.usable, responses, low_hz / (1.0 + _BESIDE), highest, sought.exponential_window_s)
     force = np.sqrt(np.sum(np.abs(hits.force) ** 2, axis=0))
     low, high = (2.0 * np.pi * each for each in (low_hz, min(1.1 * high_hz, 0.49 / period)))
-    return _Measured((hits.lines,), low, high, duration, 1.0 / duration, hits, force / float(np.max(force)))
+    return _Measured((hits.lines,), low, high, duration, 1.0 / duration, hits, force / float(np.max(force))), hits
 
 
 def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[FloatArray]]:
@@ -245,62 +246,57 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
 
     What oscillates throughout is looked for once more in what a first model leaves.
     """
-    measured = hits_measured(ready, sought)
+    period = ready.records[0].period_s
+    quiet = [each.record.response - steady_sines(each.record.response, period)[0] for each in ready.usable]
+    measured, hits = _of_hits(ready, quiet, sought)
     pool, poles = candidates_of(measured.parts)
     windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
-    hits = measured.hits
-    assert hits is not None
-    model = _model(measured.parts, windows)[0]
-    inside = (measured.parts[0].omega >= measured.low) & (measured.parts[0].omega < measured.high)
-    left = hits.in_time(np.where(inside, hits.response - model * hits.force, 0.0))
-    responses, found = [], False
-    for each, start, rest in zip(ready.usable, hits.starts, left, strict=True):
-        response = each.record.response - steady_sines(each.record.response, hits.period_s)[0]
-        sines, hertz = steady_sines(rest, hits.period_s)
-        found = found or bool(hertz)
-        response = response.copy()
-        response[start : start + hits.count] -= sines
-        responses.append(response)
-    if found:
-        measured = _of_hits(ready, responses, sought)
-    found_modes = find(measured, sought, pool, poles, modes_of(windows))
-    assert measured.hits is not None
-    inside = (measured.parts[0].omega >= measured.low) & (measured.parts[0].omega < measured.high)
-    courses = measured.hits.in_time(np.where(inside, found_modes.model[0] * measured.hits.force, 0.0))
-    fitted = [np.zeros(len(each)) for each in responses]
-    for samples, start, course in zip(fitted, measured.hits.starts, courses, strict=True):
+    left = hits.in_time(_left(measured, hits, _model(measured.parts, windows)[0]))
+    steady = [steady_sines(rest, period) for rest in left]
+    if any(hertz for _, hertz in steady):
+        for response, start, (sines, _) in zip(quiet, hits.starts, steady, strict=True):
+            response[start : start + hits.count] -= sines
+        measured, hits = _of_hits(ready, quiet, sought)
+    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, modes_of(windows))
+    found = _tested(measured, windows, pool, poles, sought)
+    rest = _left(measured, hits, found.model[0])
+    inside = _inside(measured.parts[0], measured)
+    courses = hits.in_time(np.where(inside, found.model[0] * hits.force, 0.0))
+    fitted = [np.zeros(len(each)) for each in quiet]
+    for samples, start, course in zip(fitted, hits.starts, courses, strict=True):
         samples[start : start + len(course)] = course
-    left = np.where(inside, measured.hits.response - found_modes.model[0] * measured.hits.force, 0.0)
-    shares = np.linalg.norm(left, axis=1) / np.linalg.norm(np.where(inside, measured.hits.response, 0.0), axis=1)
+    shares = np.linalg.norm(rest, axis=1) / np.linalg.norm(np.where(inside, hits.response, 0.0), axis=1)
     worst = int(np.argmax(shares))
     if len(shares) > 1 and shares[worst] > _DIFFERENT:
-        found_modes = replace(found_modes, different=ready.records[worst].source)
-    return found_modes, fitted
+        found = replace(found, different=ready.records[worst].source)
+    return found, fitted
 
 
-def find(
-    measured: _Measured,
-    sought: Sought,
-    pool: Sequence[StablePole] | None = None,
-    poles: Sequence[Pole] = (),
-    starts: Starts | None = None,
+def _left(measured: _Measured, hits: Hits, model: ComplexArray) -> ComplexArray:
+    """(hits, n) what a model leaves of the responses of hits, in the band."""
+    return np.where(_inside(measured.parts[0], measured), hits.response - model * hits.force, 0.0)
+
+
+def _in_responses(measured: _Measured, sought: Sought) -> FrfModes:
+    """Search twice, with the lines weighed by what is left in between, and test every mode."""
+    pool, poles = candidates_of(measured.parts)
+    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+    models = _model(measured.parts, windows)
+    parts = tuple(_weighed(lines, model) for lines, model in zip(measured.parts, models, strict=True))
+    windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, modes_of(windows))
+    windows = [_with_correlation(window) for window in windows]
+    return _tested(replace(measured, parts=parts), windows, pool, poles, sought)
+
+
+def _tested(
+    measured: _Measured, windows: Sequence[Window], pool: Sequence[StablePole], poles: Sequence[Pole], sought: Sought
 ) -> FrfModes:
-    """Search twice, weigh the lines by what is left in between, and test every mode."""
-    parts = measured.parts
-    if pool is None:
-        pool, poles = candidates_of(parts)
-        windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, None)
-        starts = modes_of(windows)
-        parts = tuple(_weighed(lines, model) for lines, model in zip(parts, _model(parts, windows), strict=True))
-    windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, starts)
-    if measured.hits is None:
-        windows = [_with_correlation(window) for window in windows]
-    measured = replace(measured, parts=parts)
+    """Every mode of the windows with its refusal, if any, and what the model explains."""
     modes = [mode for window in windows for mode in _modes(window, measured, pool, sought)]
     low_hz, high_hz = sought.band_hz or (0.0, np.inf)
     modes = [each for each in modes if low_hz <= each.frequency_hz.value <= high_hz]
     modes = _strongest(modes, sought)
-    model = _model(parts, windows)
+    model = _model(measured.parts, windows)
     return FrfModes(
         tuple(sorted(modes, key=lambda mode: mode.frequency_hz.value)), tuple(windows), _chart(poles), tuple(model),
         _explained(measured, model), _missing_peak(measured, modes),
@@ -341,7 +337,8 @@ def _model(parts: Sequence[Lines], windows: Sequence[Window]) -> list[ComplexArr
     return found
 
 
-def _inside(lines: Lines, measured: _Measured) -> Any:
+def _inside(lines: Lines, measured: _Measured) -> npt.NDArray[np.bool_]:
+    """Which lines the modes that count are looked for in."""
     return (lines.omega >= measured.low) & (lines.omega < measured.high)
 
 
@@ -361,7 +358,7 @@ def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float
     height = np.abs(lines.response * lines.s ** (1 - lines.power))
     inside = _inside(lines, measured)
     if measured.excitation is not None:
-        inside &= measured.excitation >= _EXCITED
+        inside &= measured.excitation >= EXCITED
     inside &= lines.weight * np.abs(lines.response) > _OUT_OF_NOISE
     if np.count_nonzero(inside) < 3:
         return None
@@ -389,19 +386,11 @@ def doubt_of(found: FrfModes) -> str:
 
 
 def _chart(poles: Sequence[Pole]) -> tuple[ChartPole, ...]:
-    """Poles with what the model of one order less has of them."""
-    by_order: dict[int, list[Pole]] = {}
+    """Poles of all bands by the order of their model."""
+    by_order: dict[int, Starts] = {}
     for pole in poles:
-        by_order.setdefault(pole.order, []).append(pole)
-    found = []
-    for order, now in sorted(by_order.items()):
-        before = np.array([(pole.omega, pole.zeta) for pole in by_order.get(order - 1, [])]).reshape(-1, 2)
-        for pole in now:
-            near = np.abs(before[:, 0] / pole.omega - 1.0) <= 0.01
-            alike = near & (np.abs(before[:, 1] / pole.zeta - 1.0) <= 0.05)
-            hertz = pole.omega / (2.0 * np.pi)
-            found.append(ChartPole(order, hertz, pole.zeta, bool(np.any(near)), bool(np.any(alike))))
-    return tuple(found)
+        by_order.setdefault(pole.order, []).append((pole.omega, pole.zeta))
+    return chart_of(sorted(by_order.items()))
 
 
 # --- The modes of a window --------------------------------------------------------------------------------------------
@@ -455,7 +444,7 @@ def _logarithms(
     base = np.array([np.log(omega), np.log(zeta), np.log(max(residue, 1e-300))])
     scale = np.array([1.0, 1.0, 1.0 / max(residue, 1e-300)])
     covariance = _misfit(fit, window.parts, index) * known.each[0, index] * np.outer(scale, scale)
-    change = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]], dtype=np.float64)
+    change = LOGARITHMS
     values = change @ base + np.array([-np.log(2.0 * np.pi), 0.0, 0.0, np.log(2.0), 0.0])
     half = float(stats.t.ppf(0.975, known.freedom)) * np.sqrt(np.maximum(np.diag(change @ covariance @ change.T), 0.0))
     for other in others:
@@ -475,7 +464,7 @@ def _misfit(fit: ModalFit, parts: Sequence[Lines], index: int) -> float:
     omega, width = float(fit.omega[index]), 2.0 * float(fit.zeta[index] * fit.omega[index])
     around, count = 0.0, 0
     for lines, left in zip(parts, fit.left, strict=True):
-        near = np.abs(lines.omega - omega) <= max(width, 3.0 * (lines.omega[1] - lines.omega[0]))
+        near = lines.near(omega, width)
         around += float(np.sum(np.abs(left[near]) ** 2))
         count += int(np.count_nonzero(near))
     return max(1.0, around / max(count, 1) * sum(map(len, fit.left)) / max(fit.squares, 1e-300))
@@ -503,7 +492,7 @@ def _scatter(
     moved = (change * scale) @ (rows @ stacked.T)
     spread = np.sqrt(count / (count - 1.0) * np.sum((moved - moved.mean(axis=1, keepdims=True)) ** 2, axis=1))
     expected = np.sqrt(np.maximum(np.diag(change @ (known.each[0, index] * np.outer(scale, scale)) @ change.T), 1e-300))
-    limit = np.sqrt(stats.chi2.ppf(1.0 - _SCATTER, count - 1) / (count - 1))
+    limit = np.sqrt(stats.chi2.ppf(1.0 - SCATTER_PROBABILITY, count - 1) / (count - 1))
     return np.asarray(np.where(spread > limit * expected, stats.t.ppf(0.975, count - 1) * spread, 0.0))
 
 
@@ -538,18 +527,15 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
             f"its half-power width of {width:.3g} Hz is less than the {measured.resolution_hz:.3g} Hz between two "
             "lines: window and length of the record make such a peak; needed is a finer resolution, or the time record"
         )
-    lasting = float(np.exp(-2.0 * np.pi * hertz * zeta * measured.record_s))
-    if lasting > _LASTING:
-        return (
-            f"still at {100.0 * lasting:.0f} % after {measured.record_s:.3g} s: a steady disturbance (mains, pump, "
-            "spindle), or a record too short for a mode of so little damping"
-        )
+    lasting = lasting_share(hertz, zeta, measured.record_s)
+    if lasting > LASTING:
+        return lasting_refusal(lasting, measured.record_s)
     mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
     if lasting > _HUM and abs(mains - hertz) < min(_HUM_WIDTH * measured.resolution_hz, _MAINS_WIDTH_HZ):
         return f"beside {mains:g} Hz, a harmonic of the mains, and still at {100.0 * lasting:.0f} %: it may be hum"
     assert measured.excitation is not None
     excitation = float(np.interp(2.0 * np.pi * hertz, measured.parts[0].omega, measured.excitation))
-    if excitation < _EXCITED:
+    if excitation < EXCITED:
         return (
             f"the hit excites it at {20.0 * np.log10(max(excitation, 1e-9)):.0f} dB of its largest force only (limit "
             "-20 dB): take a harder tip"
@@ -562,7 +548,7 @@ def _response_refusal(residues: ComplexArray) -> str:
     if len(residues) > 1:  # points other than the one of the force may move either way
         return ""
     if first.real < 0.0:
-        return _AGAINST
+        return OPPOSED
     if abs(first.imag) > _TURNED * first.real:
         return (
             f"its phase is {np.degrees(np.angle(first)):.0f}° off that of hammer and sensor at one point (limit 45°): "
@@ -583,12 +569,10 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
     without = fitted(window.parts, starts, effort, complex_modes=fit.complex_modes)
     gain = np.inf if without is None else evidence_of(without, share) - evidence_of(fit, share)
-    stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega and each.share >= _STABLE for each in pool)
+    stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega and each.share >= STABLE for each in pool)
     lines, left = window.parts[0], fit.left[0]
     modelled_lines = (lines.response - left / lines.weight) * lines.s ** (1 - lines.power)
-    near = np.flatnonzero(
-        np.abs(lines.omega - omega) <= max(_PEAK * 2.0 * zeta * omega, lines.omega[1] - lines.omega[0])
-    )
+    near = np.flatnonzero(lines.near(omega, _PEAK * 2.0 * zeta * omega, steps=1.0))
     course = np.abs(modelled_lines.real)
     peak = any(0 < i < len(course) - 1 and course[i] >= course[i - 1] and course[i] > course[i + 1] for i in near)
     needed = 0.0 if peak and stable else _VERY_CLEAR
@@ -605,7 +589,7 @@ def _local_refusal(window: Window, omega: float, width: float) -> str:
     assert fit is not None
     left = total = 0.0
     for lines, rest in zip(window.parts, fit.left, strict=True):
-        near = np.abs(lines.omega - omega) <= max(_LOCAL_WIDTHS * width, 3.0 * (lines.omega[1] - lines.omega[0]))
+        near = lines.near(omega, _LOCAL_WIDTHS * width)
         left += float(np.sum(np.abs(rest[near]) ** 2))
         total += float(np.sum(np.abs((lines.weight * lines.response)[near]) ** 2))
     percent = 100.0 * float(np.sqrt(left / max(total, 1e-300)))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.frequency_response import ComplexArray
@@ -13,7 +14,7 @@ from shapegcode.io.record import FloatArray
 
 POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _LARGEST_STEP = 0.3  # of ln omega and ln zeta in one iteration
-_STEP_FLOOR, _GAIN_FLOOR = 1e-10, 1e-9
+_STEP_FLOOR = 1e-10
 _MIN_DAMPING, _MAX_DAMPING = 1e-6, 0.99
 
 
@@ -32,6 +33,19 @@ class Lines:
     def omega(self) -> FloatArray:
         """Angular frequencies."""
         return np.asarray(self.s.imag, dtype=np.float64)
+
+    @property
+    def goal(self) -> FloatArray:
+        """(2n,) weighted response."""
+        return stacked(np.asarray(self.weight * self.response, dtype=np.complex128))
+
+    def weighted(self, columns: ComplexArray) -> FloatArray:
+        """(2n, k) weighted columns."""
+        return stacked(np.asarray(self.weight[:, None] * columns, dtype=np.complex128))
+
+    def near(self, omega: float, reach: float, steps: float = 3.0) -> npt.NDArray[np.bool_]:
+        """Which lines lie within a reach of an angular frequency, some steps between lines at least."""
+        return np.asarray(np.abs(self.omega - omega) <= max(reach, steps * float(self.omega[1] - self.omega[0])))
 
     @property
     def independent(self) -> float:
@@ -93,14 +107,12 @@ def _linearised(parts: Sequence[Lines], theta: FloatArray, complex_modes: bool) 
     modes = len(omega)
     linear, jacobians, projected, residuals = [], [], [], []
     for lines in parts:
-        weight = lines.weight[:, None]
         column, to_omega, to_zeta = mode_columns(lines, omega, zeta)
         blocks = [column]
         if complex_modes:  # a second column per mode: numerator of first degree
             turn = lines.s[:, None] / omega
             blocks.append(column * turn)
-        columns = stacked(np.asarray(weight * np.hstack([*blocks, lines.background]), dtype=np.complex128))
-        goal = stacked(np.asarray(lines.weight * lines.response, dtype=np.complex128))
+        columns, goal = lines.weighted(np.hstack([*blocks, lines.background])), lines.goal
         norms = np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
         basis, triangle = np.linalg.qr(columns / norms)
         factors = np.linalg.lstsq(triangle, basis.T @ goal, rcond=1e-12)[0] / norms
@@ -109,7 +121,7 @@ def _linearised(parts: Sequence[Lines], theta: FloatArray, complex_modes: bool) 
         along: ComplexArray = to_omega * gain
         if complex_modes:
             along = along - column * turn * factors[modes : 2 * modes]
-        moved[:, ::2], moved[:, 1::2] = stacked(weight * along), stacked(weight * (to_zeta * gain))
+        moved[:, ::2], moved[:, 1::2] = lines.weighted(along), lines.weighted(to_zeta * gain)
         linear.append(factors)
         jacobians.append(np.hstack((columns, moved)))
         projected.append(moved - basis @ (basis.T @ moved))
@@ -122,9 +134,9 @@ def fit_modes(
     parts: Sequence[Lines],
     starts: Sequence[tuple[float, float]],
     iterations: int,
+    gain_floor: float,
     *,
-    complex_modes: bool = False,
-    gain_floor: float = _GAIN_FLOOR,
+    complex_modes: bool,
 ) -> ModalFit:
     """Fit modes to lines: sum over modes of residue s^q / (s² + 2 zeta omega s + omega²), and the background.
 

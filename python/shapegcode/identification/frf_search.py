@@ -9,12 +9,11 @@ import numpy as np
 
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.frf_model import Lines, ModalFit, fit_modes, mode_columns, modelled
+from shapegcode.identification.model_search import Starts
 from shapegcode.identification.plscf import Pole, band_poles
 from shapegcode.io.frequency_response import ComplexArray
 from shapegcode.io.record import FloatArray
 
-Starts = list[tuple[float, float]]
-"""Natural frequency (rad/s) and damping ratio of each mode."""
 _BAND = 1.8  # upper end of a band of poles over its lower end
 _STEP = 1.3  # from band to band
 _EDGE = 1.05  # poles so near to an end of a band are left to the next one
@@ -22,7 +21,7 @@ _SAME, _SAME_DAMPING = 0.35, 0.4  # one pole: distance in half-power half widths
 _CORE = 1.35  # upper end of a window over its lower end
 _MARGIN = 1.3  # the lines of a window reach so far beyond its ends
 _BESIDE = 0.02, 3.0  # modes that count beyond the lines: share of the frequency, and damping ratios
-_STABLE = 0.34  # share of the higher orders that have a pole which is fitted from the start
+STABLE = 0.34  # share of the higher orders that have a pole which is fitted from the start
 _SEEN = 0.12  # ... which is tried
 _QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain below which they end
 _TRIED, _WEAKEST = 3, 2
@@ -30,7 +29,7 @@ _UNUSUAL = 2.0  # times the median of what a fit leaves: around a mode that may 
 _LINES_PER_MODE = 4
 _FEW = 350  # lines of a window that trials take
 _BAND_LINES = 48  # a band or window has at least so many
-_ROUNDS = 4  # changes that are tried with all lines, behind those with few
+_MAX_CHANGES, _ROUNDS = 60, 4  # with few lines, and behind those with all
 _FEWEST = 12  # lines below which a window is left out
 _DEGREE = 2  # of the background of a window
 CLEAR = 6.0  # by so much beyond Bayes' criterion a mode must better the fit
@@ -116,8 +115,8 @@ def search(
     spare = [(each.omega, each.zeta) for each in candidates]
     final = starts is not None
     if starts is None:
-        starts = [(each.omega, each.zeta) for each in candidates if each.share >= _STABLE]
-        spare = [(each.omega, each.zeta) for each in candidates if each.share < _STABLE]
+        starts = [(each.omega, each.zeta) for each in candidates if each.share >= STABLE]
+        spare = [(each.omega, each.zeta) for each in candidates if each.share < STABLE]
     known = _linear(parts, starts)
     windows, begin = [], low
     while begin < high:
@@ -158,11 +157,9 @@ def _linear(parts: Sequence[Lines], starts: Starts) -> ComplexArray:
     omega, zeta = np.array(starts, dtype=np.float64).reshape(-1, 2).T
     for lines in parts:
         top = lines.s**lines.power
-        columns = lines.weight[:, None] * np.column_stack((mode_columns(lines, omega, zeta)[0], top, top / lines.s**2))
-        goal = lines.weight * lines.response
-        stacked = np.vstack((columns.real, columns.imag))
-        norms = np.maximum(np.sqrt(np.sum(stacked**2, axis=0)), 1e-300)
-        factors = np.linalg.lstsq(stacked / norms, np.concatenate((goal.real, goal.imag)), rcond=1e-10)[0] / norms
+        columns = lines.weighted(np.column_stack((mode_columns(lines, omega, zeta)[0], top, top / lines.s**2)))
+        norms = np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
+        factors = np.linalg.lstsq(columns / norms, lines.goal, rcond=1e-10)[0] / norms
         found.append(factors[: len(omega)])
     return np.array(found, dtype=np.complex128)
 
@@ -224,7 +221,9 @@ def _thinned(lines: Lines) -> Lines:
     )  # fmt: skip
 
 
-def _selected(parts: Sequence[Lines], starts: Starts, spare: Starts, room: int, rounds: int = 60) -> ModalFit | None:
+def _selected(
+    parts: Sequence[Lines], starts: Starts, spare: Starts, room: int, rounds: int = _MAX_CHANGES
+) -> ModalFit | None:
     """From some modes on, with one more or one less as long as the data speak for it."""
     share = min(lines.independent for lines in parts)
     best = fitted(parts, starts, _QUICK)
@@ -251,13 +250,10 @@ def _pruned(parts: Sequence[Lines], starts: Starts, share: float) -> Starts:
     omega, zeta = np.array(starts).T
     gram, goal, squares, samples = [], [], 0.0, 0.0
     for lines in parts:
-        columns = lines.weight[:, None] * np.hstack((lines.background, mode_columns(lines, omega, zeta)[0]))
-        stacked = np.vstack((columns.real, columns.imag))
-        stacked /= np.maximum(np.sqrt(np.sum(stacked**2, axis=0)), 1e-300)
-        weighted = lines.weight * lines.response
-        wanted = np.concatenate((weighted.real, weighted.imag))
-        gram.append(stacked.T @ stacked + 1e-13 * np.eye(stacked.shape[1]))
-        goal.append(stacked.T @ wanted)
+        columns, wanted = lines.weighted(np.hstack((lines.background, mode_columns(lines, omega, zeta)[0]))), lines.goal
+        columns /= np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
+        gram.append(columns.T @ columns + 1e-13 * np.eye(columns.shape[1]))
+        goal.append(columns.T @ wanted)
         squares += float(wanted @ wanted)
         samples += len(wanted) * share
     kept, fixed = list(range(len(starts))), parts[0].background.shape[1]
@@ -292,10 +288,17 @@ def _split(parts: Sequence[Lines], fit: ModalFit, share: float, evidence: float)
         starts = starts_of(fit)
         omega, zeta = starts.pop(index)
         pair = [(omega * (1.0 - 0.5 * zeta), 0.8 * zeta), (omega * (1.0 + 0.5 * zeta), 0.8 * zeta)]
-        found = fitted(parts, [*starts, *pair], _QUICK)
-        if found is not None and not _twins(found) and evidence_of(found, share) < evidence:
-            return found, evidence_of(found, share)
+        better = _better(parts, [*starts, *pair], share, evidence)
+        if better is not None and not _twins(better[0]):
+            return better
     return None
+
+
+def _better(parts: Sequence[Lines], starts: Starts, share: float, evidence: float) -> tuple[ModalFit, float] | None:
+    """A fit from these modes on and its evidence, if that is better than the one given."""
+    found = fitted(parts, starts, _QUICK)
+    reached = np.inf if found is None else evidence_of(found, share)
+    return (found, reached) if found is not None and reached < evidence else None
 
 
 def evidence_of(fit: ModalFit, share: float) -> float:
@@ -309,11 +312,9 @@ def evidence_of(fit: ModalFit, share: float) -> float:
 def _empty(parts: Sequence[Lines], share: float) -> float:
     squares, samples, columns = 0.0, 0.0, 0
     for lines in parts:
-        goal = lines.weight * lines.response
-        basis = lines.weight[:, None] * lines.background
-        stacked, wanted = np.vstack((basis.real, basis.imag)), np.concatenate((goal.real, goal.imag))
-        squares += float(np.sum((wanted - stacked @ np.linalg.lstsq(stacked, wanted, rcond=None)[0]) ** 2))
-        samples += len(wanted) * share
+        basis, goal = lines.weighted(lines.background), lines.goal
+        squares += float(np.sum((goal - basis @ np.linalg.lstsq(basis, goal, rcond=None)[0]) ** 2))
+        samples += len(goal) * share
         columns += basis.shape[1]
     return float(samples * np.log(max(squares, 1e-300)) + columns * np.log(samples))
 
@@ -325,7 +326,7 @@ def fitted(
     if not starts:
         return None
     try:
-        fit = fit_modes(parts, starts, effort[0], complex_modes=complex_modes, gain_floor=effort[1])
+        fit = fit_modes(parts, starts, *effort, complex_modes=complex_modes)
     except (ArgumentError, np.linalg.LinAlgError):
         return None
     return fit if np.isfinite(fit.squares) else None
@@ -340,7 +341,7 @@ def _grown(
     parts: Sequence[Lines], fit: ModalFit | None, spare: Starts, share: float, evidence: float
 ) -> tuple[ModalFit, float] | None:
     """The fit with one mode more for which the data speak: of the pool, or where most is left."""
-    left = [lines.weight * lines.response for lines in parts] if fit is None else fit.left
+    left: Sequence[ComplexArray] = [lines.weight * lines.response for lines in parts] if fit is None else fit.left
     highest = float(parts[0].omega[int(np.argmax(np.convolve(np.abs(left[0]), np.ones(3), "same")))])
     tried = [*spare, *((highest, zeta) for zeta in _START_DAMPING)]
     gains = []
@@ -358,11 +359,9 @@ def _grown(
         # Poles move and residues with them: a mode may come to explain some times more than at its start.
         if samples * np.log(max(1.0 - 3.0 * gains[index] / squares, 1e-9)) + 4.0 * np.log(samples) > 0.0:
             break
-        found = fitted(parts, [*starts_of(fit), tried[index]], _QUICK)
-        if found is not None and not _twins(found):
-            better = evidence_of(found, share)
-            if better < evidence:
-                return found, better
+        better = _better(parts, [*starts_of(fit), tried[index]], share, evidence)
+        if better is not None and not _twins(better[0]):
+            return better
     return None
 
 
@@ -396,9 +395,9 @@ def _reduced(
         if not starts:
             empty = _empty(parts, share)
             return (None, empty) if empty < evidence else None
-        found = fitted(parts, starts, _QUICK)
-        if found is not None and evidence_of(found, share) < evidence:
-            return found, evidence_of(found, share)
+        better = _better(parts, starts, share, evidence)
+        if better is not None:
+            return better
     return None
 
 
@@ -417,7 +416,6 @@ def _residue_spread(fit: ModalFit) -> FloatArray:
 class Uncertainty:
     """Covariances of the modes of a window."""
 
-    poles: FloatArray  # (m, 2, 2) of ln omega and ln zeta
     each: FloatArray  # (responses, m, 3, 3) of ln omega, ln zeta and the residue's real part
     freedom: float  # independent samples, less the parameters
     step: FloatArray  # (p, 2n) residual to parameters; for the scatter of hits
@@ -453,13 +451,10 @@ def uncertainty_of(window: Window) -> Uncertainty:
     whole = variance * (inverse @ spread @ inverse) / np.outer(norms, norms)
     freedom = max(sum(count * lines.independent for count, lines in zip(rows, parts, strict=True)) - size, 2.0)
     first = sum(counts)
-    poles = np.array(
-        [whole[first + 2 * i : first + 2 * i + 2, first + 2 * i : first + 2 * i + 2] for i in range(modes)]
-    )
     begins = np.cumsum([0, *counts[:-1]])
     chosen = [[[first + 2 * i, first + 2 * i + 1, int(begin) + i] for i in range(modes)] for begin in begins]
     each = np.array([[whole[np.ix_(index, index)] for index in row] for row in chosen])
-    return Uncertainty(poles, each, freedom, (inverse @ scaled.T) / norms[:, None])
+    return Uncertainty(each, freedom, (inverse @ scaled.T) / norms[:, None])
 
 
 def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArray:

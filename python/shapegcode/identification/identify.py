@@ -245,13 +245,18 @@ def _many(ready: Prepared, files: tuple[str, ...], many: FrfModes, fitted: Seque
         fit_percent=many.fit_percent,
         noise_rms=float(np.sqrt(np.mean(np.square(noise)))) if noise else None,
         doubt=doubt_of(many),
-        warnings=(*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)),
+        warnings=tuple(_warnings_of(ready)),
         notes=(*ready.notes, _MANY),
         prepared=ready,
         chart=many.chart,
         fitted=tuple(fitted),
         fitted_records=ready.records,
     )
+
+
+def _warnings_of(ready: Prepared) -> list[str]:
+    """What the user should know of the records, those that are not used too."""
+    return [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
 
 
 def _choose_course(problem: Taps, models: Search, sought: Sought) -> tuple[Taps, Search, list[Fit]]:
@@ -287,7 +292,7 @@ def _result(
     sought: Sought,
 ) -> Identification:
     order = sought.order(models)
-    warnings = [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
+    warnings = _warnings_of(ready)
     squares = sum(float(np.sum(response**2)) for response in problem.responses)
     without = Identification(
         files=files,

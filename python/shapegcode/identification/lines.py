@@ -18,8 +18,6 @@ _END = 1e-2  # of the exponential window
 _LEAD = 4  # samples before a pulse
 _LAGS = 64
 _QUIETEST = 1e-6  # of the largest line: no sensor has less noise
-
-
 _LATE = 0.4  # a steady disturbance is looked for behind this share of the record
 _STANDS_OUT = 8.0  # times the median of the spectrum there
 _STEADY = (0.8, 1.25)  # amplitude of the last quarter over that of the one before
@@ -106,10 +104,8 @@ def hits_of(
         return np.asarray(fft.rfft(np.array(cuts), axis=1)[:, kept], dtype=np.complex128)
 
     whole = window * np.exp(-applied * period * np.arange(count))
-    force, response = (
-        transformed([np.asarray(each.record.force_n) for each in usable], whole),
-        transformed(responses, window),
-    )
+    force = transformed([np.asarray(each.record.force_n) for each in usable], whole)
+    response = transformed(responses, window)
     power = np.sum(np.abs(force) ** 2, axis=0)
     noise = np.mean([(each.response_noise or 0.0) ** 2 for each in usable]) * np.sum(window**2)
     level = max(float(np.sqrt(noise)), _QUIETEST * float(np.max(np.abs(response))))
@@ -129,7 +125,6 @@ def hits_of(
 _SMOOTH_LINES, _SMOOTH_SHARE = 31, 0.02
 _MIN_NOISE = 1e-5  # a line counts for no more than a noise of this share of the largest one would have it
 _THIRD_DIFFERENCE = 20.0  # squared third difference of white noise, over its variance: 1 + 9 + 9 + 1
-_SAME_POINT = 0.1  # responses of one point differ by no more than this share
 
 
 def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
@@ -144,10 +139,8 @@ def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
         rough = np.abs(np.diff(each.response, 3)) ** 2 / _THIRD_DIFFERENCE
         noise = smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)), omega, quantity)
     applied = 0.0 if applied_s is None else 1.0 / applied_s
-    plane, nothing = (
-        np.asarray(applied + 1j * omega, dtype=np.complex128),
-        np.zeros((len(omega), 0), dtype=np.complex128),
-    )
+    plane = np.asarray(applied + 1j * omega, dtype=np.complex128)
+    nothing = np.zeros((len(omega), 0), dtype=np.complex128)
     alone = np.ones(1, dtype=np.complex128)
     return weighted(Lines(plane, each.response, np.ones(len(omega)), quantity, nothing, alone), noise)
 

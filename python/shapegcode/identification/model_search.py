@@ -6,7 +6,7 @@ only the last digits need) to them or to what is left of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -42,7 +42,7 @@ Fit = _core.ModalFit | _core.DecayFit
 
 
 class FitProblem(Protocol):
-    """Records of one point, over time or over frequency."""
+    """Records of one point over time."""
 
     # ruff: noqa: D102
     @property
@@ -141,14 +141,20 @@ def _chart_modes(problem: FitProblem) -> Iterator[Starts]:
 
 def stabilisation_chart(problem: FitProblem) -> tuple[ChartPole, ...]:
     """Poles of models with 1, 2, ... modes, each held against the model one order lower."""
+    return chart_of(enumerate(_chart_modes(problem), start=1))
+
+
+def chart_of(models: Iterable[tuple[int, Starts]]) -> tuple[ChartPole, ...]:
+    """Poles of models by ascending order, each held against the model before."""
     chart: list[ChartPole] = []
-    before: Starts = []
-    for order, now in enumerate(_chart_modes(problem), start=1):
+    before = np.empty((0, 2))
+    for order, now in models:
+        omega, zeta = before.T
         for w, z in now:
-            near = [(wb, zb) for wb, zb in before if abs(w / wb - 1.0) <= _STABLE_FREQUENCY]
-            damped_alike = any(abs(z - zb) <= _STABLE_DAMPING * zb for _, zb in near)
-            chart.append(ChartPole(order, w / (2.0 * np.pi), z, bool(near), damped_alike))
-        before = now
+            near = np.abs(w / omega - 1.0) <= _STABLE_FREQUENCY
+            damped_alike = near & (np.abs(z - zeta) <= _STABLE_DAMPING * zeta)
+            chart.append(ChartPole(order, w / (2.0 * np.pi), z, bool(np.any(near)), bool(np.any(damped_alike))))
+        before = np.array(now).reshape(-1, 2)
     return tuple(chart)
 
 
@@ -218,13 +224,13 @@ _NOT_AT_ALL_PERCENT = 1000.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
 MIN_SWINGS = 2.0  # Swings of a mode in the record: fewer do not tell its frequency
 #: What has not fallen to this share at the end of the record does not decay: mains hum, a pump, a turning spindle.
-_LASTING = 0.8
+LASTING = 0.8
 #: A model with one mode more counts as a rival while it fits better by more than chance alone does in one case of 20.
 _RIVAL_PROBABILITY = 0.05
 _UNKNOWN = 7.0  # half width of a logarithm that says nothing: a factor of a thousand
-_SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
+SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
 _VALUES = ("frequency_hz", "damping_ratio", "mass_kg", "damping_n_s_per_m", "stiffness_n_per_m")
-_OPPOSED = "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
+OPPOSED = "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +272,7 @@ def estimates_of(
             spread = np.maximum(spread, np.abs(apart.values - row.values) + _half_widths(apart, quantile))
         if len(alone) > 1:
             spread = np.maximum(spread, _scatter([_logarithms(one, mode) for one in alone], white_share))
-        found.append(mode_estimates(row.values, spread, _OPPOSED if row.opposed else ""))
+        found.append(mode_estimates(row.values, spread, OPPOSED if row.opposed else ""))
     return found
 
 
@@ -280,6 +286,10 @@ def mode_estimates(values: FloatArray, spread: FloatArray, refusal: str = "") ->
         for value, half in zip(np.exp(values), np.minimum(spread, _UNKNOWN), strict=True)
     ]
     return IdentifiedMode(**dict(zip(_VALUES, estimates, strict=False)), refusal=refusal)
+
+
+#: ln of f, zeta, m, c = 2 zeta omega m, k = omega² m from ln omega, ln zeta, ln 1/m, but for constants.
+LOGARITHMS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]], dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,8 +307,7 @@ def _logarithms(fit: Fit, mode: int) -> _Logarithms:
     if not isinstance(fit, _core.DecayFit):
         residue = float(fit.inverse_mass[mode])
         scale = np.array([1.0 / omega, 1.0 / zeta, 1.0 / residue])
-        # ln of f, zeta, m, c = 2 zeta omega m, k = omega^2 m from ln omega, ln zeta, ln 1/m.
-        change = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]], dtype=np.float64)
+        change = LOGARITHMS
         mass = -np.log(abs(residue))
         values += [mass, np.log(2.0 * zeta * omega) + mass, 2.0 * np.log(omega) + mass]
     else:
@@ -324,7 +333,7 @@ def _scatter(taps: Sequence[_Logarithms], white_share: float) -> FloatArray:
     expected = np.mean([np.diag(tap.covariance) for tap in taps], axis=0) / white_share
     seen = np.var(values, axis=0, ddof=1)
     ratio = seen / np.maximum(expected, np.finfo(float).tiny)
-    more = ratio > stats.chi2.ppf(1.0 - _SCATTER_PROBABILITY, len(taps) - 1) / (len(taps) - 1)
+    more = ratio > stats.chi2.ppf(1.0 - SCATTER_PROBABILITY, len(taps) - 1) / (len(taps) - 1)
     half = stats.t.ppf(0.975, len(taps) - 1) * np.sqrt(seen / len(taps))
     return np.where(more, half, 0.0)
 
@@ -359,12 +368,9 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
             f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
             f"{MIN_SWINGS:g} or more are needed"
         )
-    lasting = float(np.exp(-2.0 * np.pi * frequency.value * damping.value * doubts.record_s))
-    if lasting > _LASTING:
-        return (
-            f"still at {100.0 * lasting:.0f} % after {doubts.record_s:.3g} s: a steady disturbance (mains, pump, "
-            "spindle), or a record too short for a mode of so little damping"
-        )
+    lasting = lasting_share(frequency.value, damping.value, doubts.record_s)
+    if lasting > LASTING:
+        return lasting_refusal(lasting, doubts.record_s)
     folded = 100.0 * doubts.aliased(frequency.value)
     refusal = interval_refusal(mode, doubts.limit_percent, folded)
     if refusal:
@@ -388,6 +394,19 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
                 f"(limit {doubts.limit_percent:g} %): more taps or less noise"
             )
     return ""
+
+
+def lasting_share(frequency_hz: float, damping_ratio: float, record_s: float) -> float:
+    """What is left of a mode at the end of a record."""
+    return float(np.exp(-2.0 * np.pi * frequency_hz * damping_ratio * record_s))
+
+
+def lasting_refusal(lasting: float, record_s: float) -> str:
+    """Why what does not decay is refused."""
+    return (
+        f"still at {100.0 * lasting:.0f} % after {record_s:.3g} s: a steady disturbance (mains, pump, "
+        "spindle), or a record too short for a mode of so little damping"
+    )
 
 
 def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent: float = 0.0) -> str:
