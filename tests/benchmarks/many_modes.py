@@ -20,10 +20,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 
 from table import markdown
 
-from hard_records import RATE_HZ, HardRecord, bounds, hard_record
+from hard_records import RATE_HZ, HardRecord, hard_record, is_meant, to_find
 from shapegcode.identification.identify import identify
 from shapegcode.identification.result import IdentifiedMode
-from tap_truth import TrueMode
 
 
 @dataclass
@@ -43,15 +42,15 @@ class Tally:
         """Count one draw; modes as frequency, damping ratio and estimate, if there is one."""
         left = list(modes)
         self.supported += len(modes)
-        for mode, bound in zip(hard.modes, bounds(hard), strict=True):
-            wanted = mode.frequency_hz < excited_hz and bound[0] < 0.01 and bound[1] < 0.2
-            self.wanted += wanted
-            near = [each for each in left if _same(mode, each)]
+        told = to_find(hard, excited_hz)
+        self.wanted += len(told)
+        for mode in hard.modes:
+            near = [each for each in left if is_meant(mode, *each[:2])]
             if not near:
                 continue
             best = min(near, key=lambda each: abs(each[0] - mode.frequency_hz))
             left.remove(best)
-            self.found += wanted
+            self.found += mode in told
             self.errors.append((abs(best[0] / mode.frequency_hz - 1.0), abs(best[1] / mode.damping_ratio - 1.0)))
             if best[2] is not None:
                 pairs = ((best[2].frequency_hz, mode.frequency_hz), (best[2].damping_ratio, mode.damping_ratio))
@@ -75,11 +74,6 @@ HEAD = [
     "", "modes to find", "found", "false", "median error f / zeta", "95 % intervals cover f / zeta", "use", "CPU time",
     "longest",
 ]  # fmt: skip
-
-
-def _same(mode: TrueMode, found: tuple[float, float, IdentifiedMode | None]) -> bool:
-    apart = abs(found[0] / mode.frequency_hz - 1.0)
-    return apart < max(0.02, 0.5 * mode.damping_ratio) and abs(np.log(found[1] / mode.damping_ratio)) < np.log(2.0)
 
 
 def ours(hard: HardRecord, tally: Tally) -> float:

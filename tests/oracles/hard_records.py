@@ -159,3 +159,15 @@ def bounds(hard: HardRecord) -> FloatArray:
     inverse = np.linalg.pinv(gram / np.outer(scale, scale), hermitian=True, rcond=1e-13) / np.outer(scale, scale)
     spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     return np.array([[spread[3 * i], spread[3 * i + 1]] for i in range(len(hard.modes))])
+
+
+def to_find(hard: HardRecord, excited_hz: float) -> list[TrueMode]:
+    """Modes that a test tells: excited, and with bounds below 1 % in frequency and 20 % in damping ratio."""
+    told = zip(hard.modes, bounds(hard), strict=True)
+    return [mode for mode, bound in told if mode.frequency_hz < excited_hz and bound[0] < 0.01 and bound[1] < 0.2]
+
+
+def is_meant(mode: TrueMode, frequency_hz: float, damping_ratio: float) -> bool:
+    """Whether an estimate is meant to be a true mode: within half of its damping ratio, and a factor of two of it."""
+    apart = abs(frequency_hz / mode.frequency_hz - 1.0)
+    return apart < max(0.02, 0.5 * mode.damping_ratio) and 0.5 < damping_ratio / mode.damping_ratio < 2.0

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 import shapegcode as sg
-from hard_records import accelerance, bounds, hard_record
+from hard_records import accelerance, hard_record, is_meant, to_find
 from shapegcode.cli import main
 from shapegcode.identification.identify import identify
 from shapegcode.identification.lines import steady_sines
@@ -22,8 +22,7 @@ FloatArray = npt.NDArray[np.float64]
 
 def near(mode: TrueMode, found: IdentifiedMode) -> bool:
     """Whether an estimate is meant to be a true mode."""
-    apart = abs(found.frequency_hz.value / mode.frequency_hz - 1.0)
-    return apart < max(0.02, 0.5 * mode.damping_ratio) and 0.5 < found.damping_ratio.value / mode.damping_ratio < 2.0
+    return is_meant(mode, found.frequency_hz.value, found.damping_ratio.value)
 
 
 def hold(seed: int) -> tuple[int, int, int, list[bool]]:
@@ -32,11 +31,7 @@ def hold(seed: int) -> tuple[int, int, int, list[bool]]:
     result = identify(list(hard.records))
     assert result.prepared is not None
     excited = max(each.excited_hz or 0.0 for each in result.prepared.usable)
-    wanted = [
-        mode
-        for mode, bound in zip(hard.modes, bounds(hard), strict=True)
-        if mode.frequency_hz < excited and bound[0] < 0.01 and bound[1] < 0.2
-    ]
+    wanted = to_find(hard, excited)
     found = sum(any(near(mode, each) for each in result.modes) for mode in wanted)
     false = sum(not any(near(mode, each) for mode in hard.modes) for each in result.modes)
     inside = [
