@@ -345,8 +345,8 @@ class CommandParser(argparse.ArgumentParser):
         if not lines:
             return self.epilog
         # What a command's exit codes mean stands in its description, where it is not the usual.
-        settings = (self.description or "").lower()
-        codes = "" if "exit code 0" in settings else f"\n\nexit codes: {_EXIT_CODES}."
+        description = (self.description or "").lower()
+        codes = "" if "exit code 0" in description else f"\n\nexit codes: {_EXIT_CODES}."
         return "\n".join(["examples:", *(f"  {line}" for line in lines)]) + codes + (self.epilog or "")
 
 

@@ -262,7 +262,7 @@ def add_modes_arguments(parser: argparse.ArgumentParser, keep: str) -> None:
     )
 
 
-def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], settings: str) -> tuple[str, str]:
+def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], introduction: str) -> tuple[str, str]:
     """What the options say, and at a terminal the answers to a question for each axis that they leave open."""
     keep, rigid = args.keep_modes or "", args.rigid or ""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
@@ -270,7 +270,7 @@ def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], setti
     for axis, modes in open_modes.items():
         if axis in keep or axis in rigid:
             continue
-        question = f"{settings} {axis.upper()} has {modes}: [k]eep, [r]igid, or leave [o]pen? "
+        question = f"{introduction} {axis.upper()} has {modes}: [k]eep, [r]igid, or leave [o]pen? "
         print(question, end="", file=sys.stderr, flush=True)
         answer = sys.stdin.readline().strip().lower()[:1]
         keep += axis if answer == "k" else ""

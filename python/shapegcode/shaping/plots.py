@@ -39,7 +39,10 @@ def plots_of(result: Recommendation) -> dict[str, Plot]:
         "shaper-impulses": partial(plot_impulses, result),
         "shaper-steps": partial(plot_steps, result),
     }
-    return found | ({} if _branches(result) is None else {"shaper-branches": partial(plot_branches, result)})
+    branches = _branches(result)
+    if branches is not None:
+        found["shaper-branches"] = partial(_draw_branches, branches, result)
+    return found
 
 
 def selected(result: Recommendation) -> list[Design]:
@@ -275,6 +278,10 @@ def plot_branches(result: Recommendation, ax: Axes | None = None) -> Axes:
     branches = _branches(result)
     if branches is None:
         raise ValueError(f"{len(result.modes)} modes have no branches to draw: there are some of two")
+    return _draw_branches(branches, result, ax)
+
+
+def _draw_branches(branches: MinimalBranches, result: Recommendation, ax: Axes | None = None) -> Axes:
     slow, fast = sorted(band.mode.frequency_hz for band in result.modes)
     panel = plot.axes(ax, size_inch=(9.0, 5.0), title=f"Minimal shapers of two modes, the slower one at {slow:g} Hz")
     negative = (branches.amplitudes < 0.0).any(axis=2)
