@@ -314,7 +314,10 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
-    return weighted(lines, smoothed(np.abs(lines.response - model) ** 2 + 1e-300, lines.omega, lines.power))
+    left = np.abs(lines.response - model) ** 2
+    # Lines without a mode nearby have no model: their noise stays what it was taken to be.
+    left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)
+    return weighted(lines, smoothed(left, lines.omega, lines.power))
 
 
 def _with_correlation(window: Window) -> Window:

@@ -128,16 +128,16 @@ _THIRD_DIFFERENCE = 20.0  # squared third difference of white noise, over its va
 
 
 def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
-    """Lines of a measured response, weighted by its coherence, or by how rough the neighbours are."""
+    """Lines of a measured response, weighted by how rough the neighbours are, and by its coherence."""
     omega = 2.0 * np.pi * each.frequency_hz
     power = np.abs(each.response) ** 2
     quantity = POWERS[each.quantity]
+    rough = np.abs(np.diff(each.response, 3)) ** 2 / _THIRD_DIFFERENCE
+    noise = smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)), omega, quantity)
     if each.coherence is not None and np.any(each.coherence < 1.0):
         coherence = np.clip(each.coherence, 1e-3, 1.0)
-        noise = smoothed(power * (1.0 - coherence) / coherence, omega, quantity)
-    else:
-        rough = np.abs(np.diff(each.response, 3)) ** 2 / _THIRD_DIFFERENCE
-        noise = smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)), omega, quantity)
+        # A coherence may claim less noise than neighbouring lines show: fitted so, noise would become modes.
+        noise = np.maximum(noise, smoothed(power * (1.0 - coherence) / coherence, omega, quantity))
     applied = 0.0 if applied_s is None else 1.0 / applied_s
     plane = np.asarray(applied + 1j * omega, dtype=np.complex128)
     nothing = np.zeros((len(omega), 0), dtype=np.complex128)
