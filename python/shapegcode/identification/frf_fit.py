@@ -23,6 +23,7 @@ from shapegcode.identification.frf_search import (
     evidence_of,
     fitted,
     modes_of,
+    residues_of,
     search,
     starts_of,
     uncertainty_of,
@@ -72,7 +73,6 @@ _NO_VIBRATION = 0.3  # damping ratio of what is background, not a mode
 _BEYOND = "beyond the number of modes that were asked for: its peak is lower"
 _DIFFERENT = 0.5  # share of a hit's response that the model of all hits leaves: another point, axis or sign
 _OUT_OF_NOISE = 5.0
-_NEAR = 20.0  # evidence within which a fit with the other kind of modes says how sure the values are
 _ENOUGH = 3.0  # independent samples a parameter of a fit that another one is held against
 _PEAK = 0.5  # half-power widths
 _RISES = 2.0  # a peak rises by this factor out of its surroundings
@@ -103,6 +103,7 @@ class FrfModes:
     fit_percent: float
     missing_peak_hz: float | None  # the highest peak of the mobility, if no supported mode is there
     different: str = ""  # the record of a hit that the model of all hits does not explain
+    steady: bool = False  # something oscillates throughout the records and was taken out
 
 
 def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...], sought: Sought) -> Identification:
@@ -247,7 +248,8 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
     What oscillates throughout is looked for once more in what a first model leaves.
     """
     period = ready.records[0].period_s
-    quiet = [each.record.response - steady_sines(each.record.response, period)[0] for each in ready.usable]
+    at_first = [steady_sines(each.record.response, period) for each in ready.usable]
+    quiet = [each.record.response - sines for each, (sines, _) in zip(ready.usable, at_first, strict=True)]
     measured, hits = _of_hits(ready, quiet, sought)
     pool, poles = candidates_of(measured.parts)
     windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
@@ -259,6 +261,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
         measured, hits = _of_hits(ready, quiet, sought)
     windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, modes_of(windows))
     found = _tested(measured, windows, pool, poles, sought)
+    found = replace(found, steady=any(hertz for _, hertz in (*at_first, *steady)))
     rest = _left(measured, hits, found.model[0])
     inside = _inside(measured.parts[0], measured)
     courses = hits.in_time(np.where(inside, found.model[0] * hits.force, 0.0))
@@ -310,7 +313,7 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
         raise RecordError(f"{sought.modes} modes are asked for, and the data hold no more than {len(supported)}")
     most = sought.modes or sought.max_modes or _MAX_MODES
     over = {id(mode) for mode in sorted(supported, key=_height, reverse=True)[most:]}
-    return [replace(mode, refusal=_BEYOND) if id(mode) in over else mode for mode in modes]
+    return [replace(mode, refusal=_BEYOND, left_out=True) if id(mode) in over else mode for mode in modes]
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
@@ -409,8 +412,9 @@ def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], soug
             continue
         values, spread = _logarithms(window, known, index, measured, others)
         mode = mode_estimates(values, spread)
+        dull = _excitation_refusal(mode.frequency_hz.value, measured)
         refusal = _refusal(window, index, mode, measured, pool, sought)
-        found.append(replace(mode, refusal=refusal))
+        found.append(replace(mode, refusal=dull or refusal, left_out=bool(dull)))
     return found
 
 
@@ -419,21 +423,15 @@ def _other_fits(window: Window) -> list[ModalFit]:
     fit = window.fit
     assert fit is not None
     starts = starts_of(fit)
-    narrow = [cut(lines, window.low / 1.15, window.high * 1.15, 1) for lines in window.parts]
-    tried = ((narrow, fit.complex_modes), (window.parts, not fit.complex_modes))
+    kind, ends = fit.complex_modes, (float(window.parts[0].omega[0]), float(window.parts[0].omega[-1]))
+    narrow = [cut(lines, window.low / 1.15, window.high * 1.15, kind, 1) for lines in window.parts]
+    other = [cut(lines, *ends, not kind) for lines in window.parts]
     found = []
-    for parts, complex_modes in tried:
-        columns = (2 + 1 + complex_modes) * len(starts) + 6
+    for parts in (narrow, other):
+        columns = (2 + 1 + parts[0].complex_modes) * len(starts) + 6
         if min(2 * len(lines.s) * lines.independent for lines in parts) > _ENOUGH * columns:
-            found.append(fitted(parts, starts, complex_modes=complex_modes))
-    share = min(lines.independent for lines in window.parts)
-    # Real modes in place of complex ones count only where the data do not rule them out; complex ones hold real ones.
-    limit = evidence_of(fit, share) + _NEAR
-    return [
-        each
-        for each in found
-        if each is not None and (each.complex_modes or not fit.complex_modes or evidence_of(each, share) < limit)
-    ]
+            found.append(fitted(parts, starts))
+    return [each for each in found if each is not None]
 
 
 def _logarithms(
@@ -442,7 +440,7 @@ def _logarithms(
     """ln of frequency (Hz), damping ratio, mass, viscous damping, stiffness, and half of their 95 % intervals."""
     fit = window.fit
     assert fit is not None
-    residue = abs(fit.residues[0, index])
+    residue = abs(residues_of(fit)[0, index])
     omega, zeta = float(fit.omega[index]), float(fit.zeta[index])
     base = np.array([np.log(omega), np.log(zeta), np.log(max(residue, 1e-300))])
     scale = np.array([1.0, 1.0, 1.0 / max(residue, 1e-300)])
@@ -451,7 +449,7 @@ def _logarithms(
     values = change @ base + np.array([-np.log(2.0 * np.pi), 0.0, 0.0, np.log(2.0), 0.0])
     half = float(stats.t.ppf(0.975, known.freedom)) * np.sqrt(np.maximum(np.diag(change @ covariance @ change.T), 0.0))
     for other in others:
-        size = abs(other.residues[0, index])
+        size = abs(residues_of(other)[0, index])
         moved = np.array([np.log(other.omega[index]), np.log(other.zeta[index]), np.log(max(size, 1e-300))]) - base
         half = np.hypot(half, np.abs(change @ moved))
     if measured.hits is not None:
@@ -514,7 +512,7 @@ def _refusal(
     hertz, width = omega / (2.0 * np.pi), 2.0 * zeta * omega
     return (
         _record_refusal(hertz, zeta, measured)
-        or _response_refusal(fit.residues[:, index])
+        or _response_refusal(residues_of(fit)[:, index])
         or _evidence_refusal(window, index, hertz, pool)
         or _local_refusal(window, omega, width)
         or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or _ACCEPTED_PERCENT)
@@ -536,14 +534,19 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
     mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
     if lasting > _HUM and abs(mains - hertz) < min(_HUM_WIDTH * measured.resolution_hz, _MAINS_WIDTH_HZ):
         return f"beside {mains:g} Hz, a harmonic of the mains, and still at {100.0 * lasting:.0f} %: it may be hum"
-    assert measured.excitation is not None
-    excitation = float(np.interp(2.0 * np.pi * hertz, measured.parts[0].omega, measured.excitation))
-    if excitation < EXCITED:
-        return (
-            f"the hit excites it at {20.0 * np.log10(max(excitation, 1e-9)):.0f} dB of its largest force only (limit "
-            "-20 dB): take a harder tip"
-        )
     return ""
+
+
+def _excitation_refusal(hertz: float, measured: _Measured) -> str:
+    if measured.excitation is None:
+        return ""
+    excitation = float(np.interp(2.0 * np.pi * hertz, measured.parts[0].omega, measured.excitation))
+    if excitation >= EXCITED:
+        return ""
+    return (
+        f"the hit excites it at {20.0 * np.log10(max(excitation, 1e-9)):.0f} dB of its largest force only (limit "
+        "-20 dB): take a harder tip"
+    )
 
 
 def _response_refusal(residues: ComplexArray) -> str:
@@ -570,7 +573,7 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     apart = np.abs(fit.omega - omega) > zeta * omega + fit.zeta * fit.omega
     # Where another mode lies within its width, that one must not take its part.
     effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
-    without = fitted(window.parts, starts, effort, complex_modes=fit.complex_modes)
+    without = fitted(window.parts, starts, effort)
     gain = np.inf if without is None else evidence_of(without, share) - evidence_of(fit, share)
     stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega and each.share >= STABLE for each in pool)
     lines, left = window.parts[0], fit.left[0]

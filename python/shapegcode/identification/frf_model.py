@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg.lapack import dtrtrs
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.frequency_response import ComplexArray
@@ -15,6 +17,7 @@ from shapegcode.io.record import FloatArray
 POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _LARGEST_STEP = 0.3  # of ln omega and ln zeta in one iteration
 _STEP_FLOOR = 1e-10
+_RANK = 1e-12  # columns nearer to each other than this share are one
 _MIN_DAMPING, _MAX_DAMPING = 1e-6, 0.99
 
 
@@ -28,20 +31,29 @@ class Lines:
     power: int  # of s in the numerator of a mode: 0 displacement, 1 velocity, 2 acceleration
     background: ComplexArray  # (n, k) columns with real factors for what lies outside the lines
     correlation: ComplexArray  # (m,) of the noise of two lines 0, 1, 2, ... apart
+    complex_modes: bool = True  # residues are complex
 
     @property
     def omega(self) -> FloatArray:
         """Angular frequencies."""
         return np.asarray(self.s.imag, dtype=np.float64)
 
-    @property
+    @cached_property
     def goal(self) -> FloatArray:
         """(2n,) weighted response."""
         return stacked(np.asarray(self.weight * self.response, dtype=np.complex128))
 
+    @cached_property
+    def weighted_background(self) -> FloatArray:
+        """(2n, k) weighted columns of the background."""
+        return self.weighted(self.background)
+
     def weighted(self, columns: ComplexArray) -> FloatArray:
         """(2n, k) weighted columns."""
-        return stacked(np.asarray(self.weight[:, None] * columns, dtype=np.complex128))
+        found = np.empty((2 * len(columns), columns.shape[1]))
+        np.multiply(columns.real, self.weight[:, None], out=found[: len(columns)])
+        np.multiply(columns.imag, self.weight[:, None], out=found[len(columns) :])
+        return found
 
     def near(self, omega: float, reach: float, steps: float = 3.0) -> npt.NDArray[np.bool_]:
         """Which lines lie within a reach of an angular frequency, some steps between lines at least."""
@@ -82,8 +94,8 @@ def mode_columns(lines: Lines, omega: FloatArray, zeta: FloatArray) -> tuple[Com
     """Responses of modes of 1 kg, (n, m), and their derivatives to ln omega and ln zeta."""
     s = lines.s[:, None]
     damping = 2.0 * zeta * omega * s
-    below = s**2 + damping + omega**2
-    column = s**lines.power / below
+    below = s * s + damping + omega**2
+    column = (s * s if lines.power == 2 else s**lines.power) / below
     shared = -column / below
     return column, shared * (damping + 2.0 * omega**2), shared * damping
 
@@ -102,25 +114,26 @@ class _Linearised:
     squares: float
 
 
-def _linearised(parts: Sequence[Lines], theta: FloatArray, complex_modes: bool) -> _Linearised:
+def _linearised(parts: Sequence[Lines], theta: FloatArray) -> _Linearised:
+    complex_modes = parts[0].complex_modes
     omega, zeta = np.exp(theta[::2]), np.exp(theta[1::2])
     modes = len(omega)
     linear, jacobians, projected, residuals = [], [], [], []
     for lines in parts:
         column, to_omega, to_zeta = mode_columns(lines, omega, zeta)
-        blocks = [column]
+        goal, blocks = lines.goal, [lines.weighted(column)]
         if complex_modes:  # a second column per mode: numerator of first degree
             turn = lines.s[:, None] / omega
-            blocks.append(column * turn)
-        columns, goal = lines.weighted(np.hstack([*blocks, lines.background])), lines.goal
-        norms = np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
+            blocks.append(lines.weighted(column * turn))
+        columns = np.hstack([*blocks, lines.weighted_background])
+        norms = np.maximum(np.sqrt(np.einsum("ij,ij->j", columns, columns)), 1e-300)
         basis, triangle = np.linalg.qr(columns / norms)
-        factors = np.linalg.lstsq(triangle, basis.T @ goal, rcond=1e-12)[0] / norms
+        factors = _solved(triangle, basis.T @ goal) / norms
         gain = factors[:modes] + (factors[modes : 2 * modes] * turn if complex_modes else 0.0)
-        moved = np.empty((len(goal), 2 * modes))
         along: ComplexArray = to_omega * gain
         if complex_modes:
-            along = along - column * turn * factors[modes : 2 * modes]
+            along -= column * turn * factors[modes : 2 * modes]
+        moved = np.empty((len(goal), 2 * modes))
         moved[:, ::2], moved[:, 1::2] = lines.weighted(along), lines.weighted(to_zeta * gain)
         linear.append(factors)
         jacobians.append(np.hstack((columns, moved)))
@@ -130,13 +143,18 @@ def _linearised(parts: Sequence[Lines], theta: FloatArray, complex_modes: bool) 
     return _Linearised(linear, jacobians, np.vstack(projected), residual, float(residual @ residual))
 
 
+def _solved(triangle: FloatArray, right: FloatArray) -> FloatArray:
+    size = np.abs(np.diag(triangle))
+    if float(np.min(size)) > _RANK * float(np.max(size)):
+        return np.asarray(dtrtrs(triangle, right)[0])
+    return np.asarray(np.linalg.lstsq(triangle, right, rcond=_RANK)[0])
+
+
 def fit_modes(
     parts: Sequence[Lines],
     starts: Sequence[tuple[float, float]],
     iterations: int,
     gain_floor: float,
-    *,
-    complex_modes: bool,
 ) -> ModalFit:
     """Fit modes to lines: sum over modes of residue s^q / (s² + 2 zeta omega s + omega²), and the background.
 
@@ -144,14 +162,14 @@ def fit_modes(
 
     Source: D. J. Ewins, Modal Testing, 2nd ed., ch. 4; variable projection: G. Golub and V. Pereyra, 2003.
     """
-    theta = np.log(np.array(starts, dtype=np.float64)).ravel()
+    theta, complex_modes = np.log(np.array(starts, dtype=np.float64)).ravel(), parts[0].complex_modes
     modes, samples = len(starts), 2 * sum(len(lines.s) for lines in parts)
     if samples <= 2 * modes + sum((1 + complex_modes) * modes + lines.background.shape[1] for lines in parts) + 1:
         raise ArgumentError(f"{samples // 2} lines are too few for {modes} modes")
     low = 0.3 * min(float(lines.omega[0]) for lines in parts)
     high = 3.0 * max(float(lines.omega[-1]) for lines in parts)
     bounds = np.log([low, high]), np.log([_MIN_DAMPING, _MAX_DAMPING])
-    at, damping = _linearised(parts, theta, complex_modes), 1e-3
+    at, damping = _linearised(parts, theta), 1e-3
     for _ in range(iterations):
         gram = at.projected.T @ at.projected
         scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
@@ -164,7 +182,7 @@ def fit_modes(
         for index, (least, most) in enumerate(bounds):
             tried[index::2] = np.clip(tried[index::2], least, most)
         moved = float(np.max(np.abs(tried - theta)))
-        following = _linearised(parts, tried, complex_modes)
+        following = _linearised(parts, tried)
         gained = at.squares - following.squares
         if gained >= -1e-13 * at.squares:
             theta, at, damping = tried, following, 0.1 * damping

@@ -22,9 +22,11 @@ _CORE = 1.35  # upper end of a window over its lower end
 _MARGIN = 1.3  # the lines of a window reach so far beyond its ends
 _BESIDE = 0.02, 3.0  # modes that count beyond the lines: share of the frequency, and damping ratios
 STABLE = 0.34  # share of the higher orders that have a pole which is fitted from the start
+_CLEARLY = 40.0  # times ln of the samples: by so much less a fit without a mode explains, before the others move
 _SEEN = 0.12  # ... which is tried
 _QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain below which they end
 _TRIED, _WEAKEST = 3, 2
+_MORE_REAL = 2  # real modes may be half as many again as complex ones, and so many more: more cost more than they tell
 _UNUSUAL = 2.0  # times the median of what a fit leaves: around a mode that may be two
 _LINES_PER_MODE = 4
 _FEW = 350  # lines of a window that trials take
@@ -171,44 +173,60 @@ def _without(lines: Lines, modes: Starts, residues: ComplexArray) -> Lines:
     return replace(lines, response=lines.response - modelled(lines, omega, zeta, residues))
 
 
-def cut(lines: Lines, low: float, high: float, degree: int = _DEGREE) -> Lines:
-    """The lines between two angular frequencies, with a polynomial as background."""
+def cut(lines: Lines, low: float, high: float, complex_modes: bool, degree: int = _DEGREE) -> Lines:
+    """The lines between two angular frequencies, with a polynomial as background.
+
+    With real modes goes a column for a delay between the channels, which turns them all: `residues_of`.
+    """
     inside = (lines.omega >= low) & (lines.omega <= high)
     place = (lines.omega[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
     powers = place[:, None] ** np.arange(degree + 1)
+    delay = lines.s[inside, None] * lines.response[inside, None]
     return replace(
         lines, s=lines.s[inside], response=lines.response[inside], weight=lines.weight[inside],
-        background=np.hstack((powers, 1j * powers)),
+        background=np.hstack((powers, 1j * powers, delay[:, : not complex_modes])), complex_modes=complex_modes,
     )  # fmt: skip
+
+
+def residues_of(fit: ModalFit) -> ComplexArray:
+    """(responses, m) residues, real ones turned by the delay of each response."""
+    if fit.complex_modes:
+        return fit.residues
+    delay_s = -np.array([factors[-1:] for factors in fit.background])
+    return np.asarray(fit.residues / (1.0 + 1j * delay_s * fit.omega), dtype=np.complex128)
 
 
 def _fit_window(
     parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, most: int, final: bool
 ) -> Window:
     """The modes of a window by evidence: from those near it, without what explains nothing, with what is left."""
-    wide = [cut(lines, low / _MARGIN, high * _MARGIN) for lines in parts]
-    if min(len(lines.s) for lines in wide) <= _FEWEST:
-        return Window(low, high, (), None)
-    room = min(most, min(len(lines.s) for lines in wide) // _LINES_PER_MODE)
+    found: list[tuple[float, Window]] = []
+    for complex_modes in (True, False) if final else (True,):
+        wide = tuple(cut(lines, low / _MARGIN, high * _MARGIN, complex_modes) for lines in parts)
+        if min(len(lines.s) for lines in wide) <= _FEWEST:
+            return Window(low, high, (), None)
+        room = min(most, min(len(lines.s) for lines in wide) // _LINES_PER_MODE)
+        best = _best_of(wide, near, spare, room, final)
+        if best is None:
+            break
+        near, most = starts_of(best), len(best.omega) + len(best.omega) // 2 + _MORE_REAL
+        found.append((evidence_of(best, min(lines.independent for lines in wide)), Window(low, high, wide, best)))
+    return min(found, key=lambda each: each[0])[1] if found else Window(low, high, wide, None)
+
+
+def _best_of(wide: Sequence[Lines], near: Starts, spare: Starts, room: int, final: bool) -> ModalFit | None:
     fewer = [_thinned(lines) for lines in wide]
     share = min(lines.independent for lines in fewer)
     both = [_selected(fewer, near[:room], spare, room)]
-    pruned = _pruned(fewer, [*near, *spare], share)[:room]
+    # Complex modes are the second time searched from those of the first.
+    pruned = near[:room] if final and wide[0].complex_modes else _pruned(fewer, [*near, *spare], share)[:room]
     if sorted(pruned) != sorted(near[:room]):
         both.append(_selected(fewer, pruned, spare, room))
     usable = [each for each in both if each is not None]
     best = min(usable, key=lambda fit: evidence_of(fit, share)) if usable else None
-    if not final:
-        return Window(low, high, tuple(wide), fitted(wide, starts_of(best), _QUICK))
-    if fewer[0] is not wide[0]:
+    if final and fewer[0] is not wide[0]:
         best = _selected(wide, starts_of(best), spare, room, _ROUNDS)
-    best = fitted(wide, starts_of(best), _FULL)
-    if best is not None:
-        real = fitted(wide, starts_of(best), _FULL, complex_modes=False)
-        share = min(lines.independent for lines in wide)
-        if real is not None and evidence_of(real, share) < evidence_of(best, share) and not _twins(real):
-            best = real
-    return Window(low, high, tuple(wide), best)
+    return fitted(wide, starts_of(best), _FULL if final else _QUICK)
 
 
 def _thinned(lines: Lines) -> Lines:
@@ -319,14 +337,12 @@ def _empty(parts: Sequence[Lines], share: float) -> float:
     return float(samples * np.log(max(squares, 1e-300)) + columns * np.log(samples))
 
 
-def fitted(
-    parts: Sequence[Lines], starts: Starts, effort: tuple[int, float] = _FULL, *, complex_modes: bool = True
-) -> ModalFit | None:
+def fitted(parts: Sequence[Lines], starts: Starts, effort: tuple[int, float] = _FULL) -> ModalFit | None:
     """A fit, or None where there are no starts or too few lines for them."""
     if not starts:
         return None
     try:
-        fit = fit_modes(parts, starts, *effort, complex_modes=complex_modes)
+        fit = fit_modes(parts, starts, *effort)
     except (ArgumentError, np.linalg.LinAlgError):
         return None
     return fit if np.isfinite(fit.squares) else None
@@ -389,8 +405,11 @@ def _reduced(
     parts: Sequence[Lines], fit: ModalFit, share: float, evidence: float
 ) -> tuple[ModalFit | None, float] | None:
     """The fit without the mode that explains least, if the data do not speak for it."""
-    order = np.argsort(np.max(np.abs(fit.residues) / _residue_spread(fit), axis=0))
-    for index in order[:_WEAKEST]:
+    samples = 2 * sum(len(part) for part in fit.left) * share
+    squares = np.max((np.abs(fit.residues) / _residue_spread(fit)) ** 2, axis=0) / fit.squares
+    for index in np.argsort(squares)[:_WEAKEST]:
+        if samples * np.log1p(squares[index]) > _CLEARLY * np.log(samples):
+            break
         starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
         if not starts:
             empty = _empty(parts, share)

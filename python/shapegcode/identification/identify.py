@@ -209,7 +209,8 @@ def _few(ready: Prepared, problem: Taps, many: FrfModes, narrow: bool) -> int | 
     power = np.mean([np.mean(record.response**2) for record in ready.records])
     noise = np.mean([(each.response_noise or 0.0) ** 2 for each in ready.usable]) / power
     limit = max(_EXPLAINED**2, _NOISE_SHARE**2 * noise)
-    if problem.samples > _SAMPLES_IN_TIME and (starts or narrow):
+    # A model in time would take what oscillates throughout for modes.
+    if many.steady or (problem.samples > _SAMPLES_IN_TIME and (starts or narrow)):
         return None
     quick: Fit | None = None
     while len(starts) <= _FEW_MODES:

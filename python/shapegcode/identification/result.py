@@ -65,6 +65,7 @@ class IdentifiedMode:
         damping_n_s_per_m: equivalent viscous damping; None for a free decay.
         stiffness_n_per_m: equivalent stiffness; None for a free decay.
         refusal: why the data do not support this mode; empty: they do.
+        left_out: refused, but no fault of the test: beyond what the hits excite, or beyond the number asked for.
     """
 
     frequency_hz: Estimate
@@ -73,6 +74,7 @@ class IdentifiedMode:
     damping_n_s_per_m: Estimate | None = None
     stiffness_n_per_m: Estimate | None = None
     refusal: str = ""
+    left_out: bool = False
 
 
 _SKEWED = 1.2
@@ -292,9 +294,13 @@ class Identification(Result):
         return (*used, *self.prepared.refused)
 
     @property
+    def _unsupported(self) -> list[IdentifiedMode]:
+        return [mode for mode in self.refused if not mode.left_out]
+
+    @property
     def ok(self) -> bool:
-        """Whether there are modes to use, and all that stands out of the noise is supported."""
-        return bool(self.modes) and not self.refused and not self.doubt
+        """Whether there are modes to use, and all that stands out of the noise is supported or left out."""
+        return bool(self.modes) and not self._unsupported and not self.doubt
 
     @property
     def exit_code(self) -> int:
@@ -306,8 +312,8 @@ class Identification(Result):
         """Red: do not use; amber: some of it is not supported, or there are warnings."""
         if self.doubt or not self.modes:
             return "red", self.doubt or self.reason
-        if self.refused:
-            return "amber", f"{len(self.refused)} more not supported by the data"
+        if self._unsupported:
+            return "amber", f"{len(self._unsupported)} more not supported by the data"
         return super().light
 
     @property
@@ -321,16 +327,15 @@ class Identification(Result):
         hertz = ", ".join(f"{mode.frequency_hz.value:.4g}" for mode in self.modes)
         use = f"do not use: {self.doubt}; " if self.doubt else "use: "
         said = f"{use}{count}{axis} in {self._counted()}: {hertz} Hz; the model explains {self.fit_percent:.1f} %"
-        if not self.refused:
-            return said
-        return f"{said}; {len(self.refused)} more {'is' if len(self.refused) == 1 else 'are'} NOT supported by the data"
+        more = len(self._unsupported)
+        return f"{said}; {more} more {'is' if more == 1 else 'are'} NOT supported by the data" if more else said
 
     @property
     def next_step(self) -> str:
         """The one thing to do next."""
         if not self.modes:
             return "shapegcode identify --tap-plan says how to do the test"
-        if self.refused or self.doubt:
+        if self._unsupported or self.doubt:
             return "tap again, longer or more often, for what is not supported (shapegcode identify --tap-plan)"
         if self.machine_file is not None:
             return f"shapegcode shaper -m {self.machine_file.path}"
@@ -349,7 +354,8 @@ class Identification(Result):
         if self.modes:
             found.append(Table("modes, each ± 95 %", _MODE_COLUMNS, self.modes, caption=self._check_line()))
         if self.refused:
-            found.append(Table("not supported by the data", _REFUSAL_COLUMNS, self.refused))
+            title = "not supported by the data" if self._unsupported else "left out"
+            found.append(Table(title, _REFUSAL_COLUMNS, self.refused))
         if self.records:
             found.append(Table("records", _RECORD_COLUMNS, self.records))
         return found
