@@ -41,7 +41,8 @@ CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Pyth
 # Notebooks call the command and the compiler.
 SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going -n -q -c docs
 # Tests of a file stay in one process, for what they share, until another process has nothing left to do.
-PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+# Each process works alone: threads of BLAS on small matrices would wait for each other.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .PHONY: help demo test test-all lint bench bench-full bench-realtime coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
         build-packages test-packages package dev tidy tidy-all release plain sanitize threads wheel stub-check \

@@ -3,7 +3,8 @@
 Run from the root of the repository: ``python tests/benchmarks/many_modes.py --draws 200`` (``tests/oracles/
 hard_records.py`` says what is drawn). Counted as to be found: modes within what the hits excite (-20 dB) whose
 Cramér-Rao bounds are below 1 % in frequency and 20 % in damping. Found: supported, within half of the damping ratio in
-frequency and a factor of two in damping. Coverage is that of the modes to be found. ``--pyema``: sdypy-EMA (``pip install sdypy-EMA``) on the same records.
+frequency and a factor of two in damping. Coverage: of those to be found. ``--pyema``: sdypy-EMA (``pip install
+sdypy-EMA``) on the same records.
 """
 
 from __future__ import annotations

@@ -31,6 +31,7 @@ def hold(seed: int) -> tuple[int, int, int, list[bool]]:
     hard = hard_record(seed)
     result = identify(list(hard.records))
     assert result.prepared is not None
+    assert all(mode.left_out == ("harder tip" in mode.refusal) for mode in result.refused)
     excited = max(each.excited_hz or 0.0 for each in result.prepared.usable)
     wanted = to_find(hard, excited)
     found = sum(any(near(mode, each) for each in result.modes) for mode in wanted)
@@ -126,6 +127,8 @@ def test_no_more_modes_than_asked_for() -> None:
     two = identify([point], max_modes=2)
     assert len(two.modes) == 2
     assert sum("its peak is lower" in mode.refusal for mode in two.refused) == 2
+    assert two.exit_code == 0
+    assert "NOT supported" not in two.answer
     with pytest.raises(sg.RecordError, match="9 modes are asked for, and the data hold no more than 4"):
         identify([point], modes=9)
 

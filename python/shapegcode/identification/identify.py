@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import resample_poly
+from threadpoolctl import threadpool_limits
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
@@ -100,9 +101,22 @@ def identify(
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
     window_s = None if options is None else options.exponential_window_s
     sought = Sought(band_hz, max_modes, modes, accepted_percent, window_s)
+    # The matrices are small: further threads of BLAS would wait for each other, up to twenty times as long.
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _identify(sources, names, sought, options or ReadOptions(), start_s, strict)
+
+
+def _identify(
+    sources: Sequence[Any],
+    names: tuple[str, ...],
+    sought: Sought,
+    options: ReadOptions,
+    start_s: float | None,
+    strict: bool,
+) -> Identification:
     ready: Prepared | None = None
     try:
-        swept = _swept(sources, options or ReadOptions())
+        swept = _swept(sources, options)
         if swept is not None:
             return find_swept_modes(swept, names, sought)
         records: list[Record] = []
@@ -120,7 +134,7 @@ def identify(
             )
         if responses:
             return find_frf_modes(responses, names, sought)
-        ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
+        ready = prepare(records, band_hz=None if sought.band_hz is None else sought.band_hz[1], start_s=start_s)
         return find_modes(ready, names, sought)
     except (ArgumentError, NumericError) as error:
         if strict:

@@ -229,7 +229,6 @@ LASTING = 0.8
 _RIVAL_PROBABILITY = 0.05
 _UNKNOWN = 7.0  # half width of a logarithm that says nothing: a factor of a thousand
 SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
-_VALUES = ("frequency_hz", "damping_ratio", "mass_kg", "damping_n_s_per_m", "stiffness_n_per_m")
 OPPOSED = "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
 
 
@@ -285,7 +284,9 @@ def mode_estimates(values: FloatArray, spread: FloatArray, refusal: str = "") ->
         Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
         for value, half in zip(np.exp(values), np.minimum(spread, _UNKNOWN), strict=True)
     ]
-    return IdentifiedMode(**dict(zip(_VALUES, estimates, strict=False)), refusal=refusal)
+    frequency, damping, *physical = estimates
+    mass, viscous, stiffness = physical or (None, None, None)
+    return IdentifiedMode(frequency, damping, mass, viscous, stiffness, refusal)
 
 
 #: ln of f, zeta, m, c = 2 zeta omega m, k = omega² m from ln omega, ln zeta, ln 1/m, but for constants.
