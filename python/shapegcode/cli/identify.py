@@ -64,7 +64,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add = parser.add_argument
     add(
-        "files", metavar="FILE", nargs="*", help="CSV, UFF (dataset 58), WAV, .frf, .mat; several of one point together"
+        "files",
+        metavar="FILE",
+        nargs="*",
+        help="CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML); several of one point together",
     )
     along = "use the response along this axis; where the file names none, it is this one"
     add("--axis", choices=("x", "y", "z"), help=along)

@@ -71,6 +71,7 @@ _ACCEPTED_PERCENT = 50.0  # a damping ratio less certain than this is refused
 _MAX_MODES, _IN_WINDOW = 40, 24  # of a structure unless asked otherwise; of a window
 _NO_VIBRATION = 0.3  # damping ratio of what is background, not a mode
 _BEYOND = "beyond the number of modes that were asked for: its peak is lower"
+_SMALL = 0.02  # of the highest supported peak: what is refused and lower is left out
 _DIFFERENT = 0.5  # share of a hit's response that the model of all hits leaves: another point, axis or sign
 _OUT_OF_NOISE = 5.0
 _ENOUGH = 3.0  # independent samples a parameter of a fit that another one is held against
@@ -133,11 +134,16 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
         used = [replace(each, response=-each.response) for each in used]
         measured = _of_responses(merged, sought.exponential_window_s)
         found = _in_responses(measured, sought)
+    modes = found.modes
+    if not responses[0].scaled:
+        modes = tuple(
+            IdentifiedMode(m.frequency_hz, m.damping_ratio, refusal=m.refusal, left_out=m.left_out) for m in modes
+        )
     lines = [found.model[0]] * len(used) if one_point and len(used) > 1 else list(found.model)
     left = np.concatenate([each.response - model for each, model in zip(used, lines, strict=True)])
     return Identification(
         files=files,
-        **by_support(found.modes),
+        **by_support(modes),
         order=len(modes_of(found.windows)),
         fit_percent=found.fit_percent if found.modes else 0.0,
         noise_rms=float(np.sqrt(np.mean(np.abs(left) ** 2))),
@@ -169,7 +175,7 @@ def _chosen(
     """The lines that are fitted, and whether they are of one point."""
     first = responses[0]
     for other in responses[1:]:
-        for name in ("quantity", "axis"):
+        for name in ("quantity", "axis", "scaled"):
             if getattr(first, name) != getattr(other, name):
                 raise RecordError(
                     f"{first.source}: {name} is {getattr(first, name)}; {other.source}: {getattr(other, name)}: "
@@ -312,8 +318,15 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
     if sought.modes is not None and len(supported) < sought.modes:
         raise RecordError(f"{sought.modes} modes are asked for, and the data hold no more than {len(supported)}")
     most = sought.modes or sought.max_modes or _MAX_MODES
-    over = {id(mode) for mode in sorted(supported, key=_height, reverse=True)[most:]}
-    return [replace(mode, refusal=_BEYOND, left_out=True) if id(mode) in over else mode for mode in modes]
+    supported.sort(key=_height, reverse=True)
+    over = {id(mode) for mode in supported[most:]}
+    least = _SMALL * max(map(_height, supported), default=0.0)
+    return [
+        replace(mode, refusal=_BEYOND, left_out=True)
+        if id(mode) in over
+        else replace(mode, left_out=mode.left_out or bool(mode.refusal and _height(mode) < least))
+        for mode in modes
+    ]
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:

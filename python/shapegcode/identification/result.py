@@ -65,7 +65,8 @@ class IdentifiedMode:
         damping_n_s_per_m: equivalent viscous damping; None for a free decay.
         stiffness_n_per_m: equivalent stiffness; None for a free decay.
         refusal: why the data do not support this mode; empty: they do.
-        left_out: refused, but no fault of the test: beyond what the hits excite, or beyond the number asked for.
+        left_out: refused, but no fault of the test: beyond what the hits excite, beyond the number asked for, or with a
+            peak below 2 % of the highest one.
     """
 
     frequency_hz: Estimate

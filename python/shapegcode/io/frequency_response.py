@@ -41,6 +41,7 @@ class FrequencyResponse:
         axis: "x", "y" or "z" where the file says it.
         warnings: what reading the file had to assume.
         notes: what reading the file left out.
+        scaled: False: of the force only the course is known (a motor's torque), so that no mass follows.
     """
 
     source: str
@@ -51,6 +52,7 @@ class FrequencyResponse:
     axis: str | None = None
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    scaled: bool = True
 
     def __post_init__(self) -> None:
         count = len(self.frequency_hz)

@@ -14,6 +14,7 @@ from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.frf_files import is_frf_text, is_mat, read_frf_mat, read_frf_text
 from shapegcode.io.record import FloatArray, ReadOptions, Record
 from shapegcode.io.sampling import STATED_RATE_TOLERANCE
+from shapegcode.io.servo_tuning import is_xml, read_servo_tuning
 from shapegcode.io.taps import is_klipper, klipper_options, read_csv
 from shapegcode.io.uff import is_frf_uff, read_frf_uff, read_uff
 
@@ -53,6 +54,8 @@ def read_measurement(path: str | Path, options: ReadOptions | None = None) -> li
     head = _head(path)
     if is_mat(path, head):
         return read_frf_mat(path, options)
+    if is_xml(head):
+        return read_servo_tuning(path, options)
     if _is_uff(head):
         return read_frf_uff(path, options) if is_frf_uff(path, options) else read_records(path, options)
     if head[:4] not in _WAV and path.suffix.lower() not in _NO_TEXT and is_frf_text(path, options):
