@@ -128,11 +128,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--draws", type=int, default=100)
     parser.add_argument("--first", type=int, default=1000)
+    parser.add_argument("--delay-us", type=float, default=0.0, help="of the response behind the force")
+    parser.add_argument("--tangent", type=float, default=0.0, help="standard deviation of the phases of complex modes")
     parser.add_argument("--pyema", action="store_true")
     args = parser.parse_args()
     mine, peer = Tally(), Tally()
     for seed in range(args.first, args.first + args.draws):
-        hard = hard_record(seed)
+        hard = hard_record(seed, 1e-6 * args.delay_us, args.tangent)
         excited = ours(hard, mine)
         if args.pyema:
             theirs(hard, excited, peer)

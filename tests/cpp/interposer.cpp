@@ -77,7 +77,7 @@ COUNTED(locks, void, _ZNSt18condition_variable10notify_allEv, (void* condition),
 long __real_syscall(long number, long a, long b, long c, long d, long e, long f);
 // Its callers pass fewer than the six arguments that it hands on, which AddressSanitizer would take for a mistake.
 long __wrap_syscall(long number, ...);
-[[gnu::no_sanitize("address", "undefined")]] long __wrap_syscall(long number, ...) {
+[[gnu::no_sanitize_address]] long __wrap_syscall(long number, ...) {
   count(locks);
   std::va_list rest;
   va_start(rest, number);

@@ -37,13 +37,21 @@ class HardRecord:
     forces: tuple[FloatArray, ...]  # without noise
 
 
-def accelerance(modes: tuple[TrueMode, ...], rigid_mass_kg: float | None, s: ComplexArray) -> ComplexArray:
-    """Acceleration over force of the structure at points of the Laplace plane."""
+def accelerance(
+    modes: tuple[TrueMode, ...], rigid_mass_kg: float | None, s: ComplexArray, tangents: FloatArray | None = None
+) -> ComplexArray:
+    """Acceleration over force of the structure at points of the Laplace plane; `tangents`: phases of complex modes."""
+    turns = np.zeros(len(modes)) if tangents is None else tangents
     total = (
         np.zeros(len(s), dtype=np.complex128) if rigid_mass_kg is None else np.full(len(s), 1.0 / rigid_mass_kg + 0j)
     )
-    for mode in modes:
-        total += s**2 / mode.mass_kg / (s**2 + 2.0 * mode.damping_ratio * mode.omega * s + mode.omega**2)
+    for mode, tangent in zip(modes, turns, strict=True):
+        total += (
+            s**2
+            / mode.mass_kg
+            * (1.0 + tangent * s / mode.omega)
+            / (s**2 + 2.0 * mode.damping_ratio * mode.omega * s + mode.omega**2)
+        )
     return total
 
 
@@ -73,8 +81,8 @@ def structure(rng: np.random.Generator) -> tuple[tuple[TrueMode, ...], float | N
     return tuple(modes), (None if rng.random() < 0.5 else total * float(rng.uniform(0.5, 3.0)))
 
 
-def hard_record(seed: int) -> HardRecord:
-    """A random test."""
+def hard_record(seed: int, delay_s: float = 0.0, tangent: float = 0.0) -> HardRecord:
+    """A random test, with a response that comes late, and modes that are complex by a random tangent of their phase."""
     rng = np.random.default_rng(seed)
     modes, rigid = structure(rng)
     tip_hz = float(np.exp(rng.uniform(np.log(800.0), np.log(5000.0))))
@@ -85,7 +93,8 @@ def hard_record(seed: int) -> HardRecord:
     sigma = 12.0 * RATE_HZ / count
     s = sigma + 2j * np.pi * np.fft.rfftfreq(count, 1.0 / RATE_HZ)
     grow = np.exp(sigma * np.arange(SAMPLES) / RATE_HZ)
-    response_of = accelerance(modes, rigid, s)
+    tangents = tangent * np.random.default_rng((seed, 1)).standard_normal(len(modes))
+    response_of = accelerance(modes, rigid, s, tangents) * np.exp(-s * delay_s)
 
     def pulse(begin_s: float, peak_n: float) -> ComplexArray:
         turn = 2.0 * np.pi / length_s
