@@ -330,10 +330,13 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
+    """The same lines with weights for what a model leaves: even, as high as the response, or half of each."""
     left = np.abs(lines.response - model) ** 2
     # Lines without a mode nearby have no model: their noise stays what it was taken to be.
     left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)
-    return weighted(lines, smoothed(left, lines.omega, lines.power))
+    even, high = (shape * smoothed(left / shape) for shape in (1.0 / lines.weight**2, np.abs(model) ** 2 + 1e-300))
+    noise = min((even, high, 0.5 * (even + high)), key=lambda each: float(np.sum(np.log(each) + left / each)))
+    return weighted(lines, noise)
 
 
 def _with_correlation(window: Window) -> Window:

@@ -132,12 +132,13 @@ def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
     omega = 2.0 * np.pi * each.frequency_hz
     power = np.abs(each.response) ** 2
     quantity = POWERS[each.quantity]
+    course = omega ** (2.0 * (2.0 - quantity))  # noise is even as an acceleration's
     rough = np.abs(np.diff(each.response, 3)) ** 2 / _THIRD_DIFFERENCE
-    noise = smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)), omega, quantity)
+    noise = smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)) * course) / course
     if each.coherence is not None and np.any(each.coherence < 1.0):
         coherence = np.clip(each.coherence, 1e-3, 1.0)
         # A coherence may claim less noise than neighbouring lines show: fitted so, noise would become modes.
-        noise = np.maximum(noise, smoothed(power * (1.0 - coherence) / coherence, omega, quantity))
+        noise = np.maximum(noise, power * smoothed((1.0 - coherence) / coherence))
     applied = 0.0 if applied_s is None else 1.0 / applied_s
     plane = np.asarray(applied + 1j * omega, dtype=np.complex128)
     nothing = np.zeros((len(omega), 0), dtype=np.complex128)
@@ -153,12 +154,11 @@ def weighted(lines: Lines, noise: FloatArray) -> Lines:
     return replace(lines, weight=np.asarray(1.0 / np.sqrt(np.maximum(noise, least)), dtype=np.float64))
 
 
-def smoothed(power: FloatArray, omega: FloatArray, quantity: int) -> FloatArray:
-    """Running mean of a power over neighbouring lines, as an acceleration's, its peaks levelled by a median first."""
-    course = omega ** (2.0 * (2.0 - quantity))
+def smoothed(power: FloatArray) -> FloatArray:
+    """Running mean of a power over neighbouring lines, its peaks levelled by a median first."""
     width = max(_SMOOTH_LINES, int(_SMOOTH_SHARE * len(power))) | 1
-    level = median_filter(power * course, width, mode="nearest") / np.log(2.0)
-    return np.asarray(uniform_filter1d(level, width, mode="nearest") / course, dtype=np.float64)
+    level = median_filter(power, width, mode="nearest") / np.log(2.0)
+    return np.asarray(uniform_filter1d(level, width, mode="nearest"), dtype=np.float64)
 
 
 def neighbours_correlation(left: Sequence[ComplexArray]) -> ComplexArray:
