@@ -79,7 +79,7 @@ def test_the_planned_acceleration_is_that_of_an_independent_simulation(tmp_path:
         hertz = np.fft.rfftfreq(len(a), period_s)
         inside = (hertz >= 0.95 * band.low_hz) & (hertz <= 1.05 * band.high_hz)
         power = 2.0 * np.sum(np.abs(np.fft.rfft(a)[inside]) ** 2) / len(a) ** 2
-        moving_s = band.duration_s - 2.0
+        moving_s = band.duration_s - 3.5
         expected = np.sqrt(2.0 * power * len(a) * period_s / moving_s)
         assert band.acceleration_mm_s2 == pytest.approx(expected, rel=0.03)
         assert band.acceleration_mm_s2 > 500.0, "each band is excited"

@@ -21,7 +21,7 @@ from shapegcode.program import Program
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-_PAUSE_S = 1.0  # behind each rise and each fall: what it excited decays
+_PAUSE_S = 1.0, 2.5  # behind each rise, and behind each fall: what both excited decays
 _BEFORE_S = 2.0  # at rest, before the first
 _BANDS_PER_OCTAVE = 2.0
 _DESIGNED_PER_OCTAVE = 3.0  # frequencies whose strokes are planned; between them they are interpolated
@@ -355,7 +355,7 @@ def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) 
         "(FEED HOLD STOPS IT AT ANY TIME: THE PART BEFORE REMAINS GOOD)",
         "G21 G17 G91 G94 G64", f"G04 P{round(1e3 * _BEFORE_S)}",
     ]  # fmt: skip
-    for band in bands:
+    for count, band in enumerate(bands):
         feed = None
         for stroke in band:
             new = f"{stroke.feed_mm_per_min:.{machine.controller.feed_decimals_mm}f}"
@@ -364,7 +364,7 @@ def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) 
             word = "" if new == feed else f" F{new}"
             lines += [f"{'G01 ' if feed is None else ''}{axis.upper()}{size}{word}", f"{axis.upper()}-{size}"]
             feed = new
-        lines.append(f"G04 P{round(1e3 * _PAUSE_S)}")
+        lines.append(f"G04 P{round(1e3 * _PAUSE_S[count % 2])}")
     return "\n".join([*lines, "G90", "M30", "%"]) + "\n"
 
 
@@ -378,12 +378,12 @@ def _swept(bands: list[list[_Stroke]], x_mm: FloatArray, period_s: float) -> tup
     found = []
     for rising, (first, _), (_, end) in zip(bands[::2], moves[::2], moves[1::2], strict=True):
         low, high = rising[0].hertz, rising[-1].hertz
-        lasts_s = (end - first) * period_s - _PAUSE_S
+        lasts_s = (end - first) * period_s - _PAUSE_S[0]
         size = amplitude(x_mm[first:end], period_s, (0.95 * low, 1.05 * high), lasts_s)
         found.append(
             SweptBand(
                 low, high, max(each.length_mm for each in rising), max(each.feed_mm_per_min for each in rising), size,
-                4 * len(rising), lasts_s + 2.0 * _PAUSE_S,
+                4 * len(rising), lasts_s + sum(_PAUSE_S),
             )
         )  # fmt: skip
     return tuple(found)
