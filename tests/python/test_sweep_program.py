@@ -54,13 +54,15 @@ def test_a_sweep_stays_within_its_limits_and_ends_where_it_began(tmp_path: Path)
         positions = np.cumsum([length for length, feed in strokes])
         assert abs(positions[-1]) < 1e-9
         assert positions.min() > -1e-9
-        assert 0.5 < positions.max() <= 0.8
+        assert 0.1 < positions.max() <= 0.8
         lasting = [abs(length) / feed * 60.0 for length, feed in strokes if length]
         assert min(lasting) > 0.8 * VX500.controller.block_time_s
         assert max(feed for length, feed in strokes if length) <= VX500.axes.x.max_feed_mm_per_min
         assert all(band.acceleration_mm_s2 <= 0.3 * 5000.0 for band in found.bands)
         assert found.bands[0].low_hz == 8.0
         assert 80.0 < found.bands[-1].high_hz <= 100.0
+        if machine is VX500:  # no reversal asks for a ramp, even if the control's speed difference is 20 % smaller
+            assert 2.0 * max(feed for length, feed in strokes if length) <= 0.8 * 500.0
         words = {word[0] for line in file.read_text().splitlines() if line[0] not in "%(O" for word in line.split()}
         assert words <= {"G", "F", "P", "M", axis.upper()}
 

@@ -33,7 +33,7 @@ _CLOCK = 0.025  # the logger's clock may be off by this share
 _COARSE_STEP, _FINE_STEP = 0.001, 5e-5
 _COARSE_HZ = 40.0  # start and clock are first looked for in what lies below
 _AFTER_S = 3.0  # of the record behind the last part
-_EXCITED = 0.05  # of the median of the command's spectrum, in amplitude: lines below are not used
+_EXCITED = 0.2  # of the median of the command's spectrum, in amplitude: lines below are not used
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # of a part against the others
 _EXPLAINED = 0.5  # share of a part's power that the others must explain
@@ -43,6 +43,7 @@ _NARROWEST = 8.0  # highest line over the lowest
 _HELD = 0.002  # share of samples at an end of the range that stand beside another one
 _LOUD = 0.1  # of the loudest part: below 40 Hz
 _QUIET = 0.01
+_LEVELLED_HZ = 1.0
 _SAME_START_S = 0.15
 _ROUNDS = 2
 _AWAY_S, _STANDS_OUT = 0.5, 2.0
@@ -254,7 +255,13 @@ class _Clock:
         )
         used = np.flatnonzero(energy > _LOUD * energy.max())
         size = 1 << int(np.ceil(np.log2(len(values) + len(smooth) * (times[1] - times[0]) / step + 1)))
+        # A mode that rings for long would be most of the record: every frequency counts alike.
         spectrum = np.fft.fft(values, size)
+        level = uniform_filter1d(np.abs(spectrum), max(1, round(_LEVELLED_HZ * size * step)), mode="wrap")
+        hertz = np.abs(np.fft.fftfreq(size, step))
+        inside = (hertz >= _LOWEST_HZ) & (hertz <= min(_COARSE_HZ, 0.4 / step))
+        spectrum = np.where(inside, spectrum / np.maximum(level, _QUIET * np.max(level)), 0.0)
+        values = np.fft.ifft(spectrum).real[: len(values)]
         power = np.concatenate(([0.0], np.cumsum(np.concatenate((values**2, np.zeros(size - len(values)))))))
         best = (-1.0, 0.0, 0.0, np.zeros(len(self.windows)))
         for rate in np.arange(-_CLOCK, _CLOCK + 1e-9, _COARSE_STEP):
@@ -287,7 +294,7 @@ class _Clock:
         for _ in range(_ROUNDS):
             self._refine(spectra.of(rows), rows)
             spectra = self._spectra(band_hz)
-            rows = np.flatnonzero((self.shares >= _CORRELATED) | _in_place(spectra))
+            rows = _in_place(spectra, self.shares >= _CORRELATED)
         while True:
             lags = _lags(spectra.of(rows))
             explained = _explained(spectra.of(rows).late(lags))
@@ -374,11 +381,13 @@ class _Clock:
         if missing:
             begin = self.windows[missing[0]][0]
             after = missing == list(range(missing[0], len(self.windows)))
-            what = f"from {begin:.1f} s on" if after else f"{len(missing)} of {len(self.windows)} parts"
-            notes.append(
-                f"{self.record.source}: {what} the record does not go with the program (feed hold, another override, a "
-                "jump of the logger's clock, or the record is short): not used"
+            cause = (
+                "feed hold, another override, a jump of the logger's clock, a short record, or too little motion"
+                if after
+                else "little of it was recorded, or the control does not move as its machine file says"
             )
+            what = f"from {begin:.1f} s on" if after else f"in {len(missing)} of {len(self.windows)} parts"
+            notes.append(f"{self.record.source}: {what} the record does not go with the program ({cause}): not used")
         return notes
 
     def _response(self, spectra: _Spectra) -> FrequencyResponse:
@@ -408,14 +417,16 @@ class _Clock:
         return FrequencyResponse(self.record.source, hertz, -ratio, "acceleration", coherence, self.command.axis)
 
 
-def _in_place(spectra: _Spectra) -> npt.NDArray[np.bool_]:
-    """Whether each part correlates with its command best where it should be."""
+def _in_place(spectra: _Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+    """Parts that are clear, or correlate with their command best where they should be and stand out or are between."""
     lags = np.linspace(-_AWAY_S, _AWAY_S, 401)
     crossed = spectra.response * np.conj(spectra.command)
     height = np.abs(crossed @ np.exp(spectra.turn[:, None] * lags))
-    best = np.argmax(height, axis=1)
-    stands_out = height.max(axis=1) > _STANDS_OUT * np.sqrt(np.mean(height**2, axis=1))
-    return np.asarray(stands_out & (np.abs(lags[best]) < _SAME_START_S))
+    near = np.abs(lags[np.argmax(height, axis=1)]) < _SAME_START_S
+    clear = clear | (near & (height.max(axis=1) > _STANDS_OUT * np.sqrt(np.mean(height**2, axis=1))))
+    rows = np.arange(len(clear))
+    ends = np.flatnonzero(clear)[[0, -1]]
+    return np.flatnonzero(clear | (near & (rows > ends[0]) & (rows < ends[1])))
 
 
 def _lags(spectra: _Spectra) -> FloatArray:

@@ -30,6 +30,8 @@ _TRIED = 8, 24  # strokes of a trial, and of a longer one
 _LONGEST = 1 << 20
 _REST_S = 0.5
 _ROUNDS = 6
+_OF_STEP = 0.4  # of the corner speed difference, which a reversal has twice: the control's may be 20 % smaller
+_LEAST_AT_ONCE = 100.0  # mm/min; slower strokes excite too little: those with ramps are taken
 _SPARE = 1.15  # Strokes are rounded to increments: none lasts less than the least block time
 _HALVINGS = 14
 _ENOUGH = 0.98  # of the largest amplitude: a higher feed gains no more
@@ -222,6 +224,12 @@ class _Planner:
         self._machine, self._model, self._travel_mm = machine, MachineModel(machine), travel_mm
         self._axis = "xyz".index(axis)
         self._feed = limits.max_feed_mm_per_min
+        controller = machine.controller
+        if controller.motion == "look_ahead" and controller.corner_rule == "speed_difference":
+            # Such a reversal needs no ramp: strokes last length over feed, whatever the time constants really are.
+            at_once = _OF_STEP * getattr(controller.corner_speed_difference_mm_per_min, axis)
+            if at_once >= _LEAST_AT_ONCE:
+                self._feed = min(self._feed, at_once)
         self.allowed = share * limits.max_acceleration_mm_s2
         self.wanted = self.allowed
         self._block_s = max(machine.controller.block_time_s, 2.0 * machine.controller.interpolation_period_s)
