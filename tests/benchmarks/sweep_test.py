@@ -2,8 +2,9 @@
 
 Run from the root of the repository: ``python tests/benchmarks/sweep_test.py --draws 60``. Axis, drive and logger are
 those of ``tests/oracles/shaken_axis.py`` (NumPy alone): one to four modes between 14 and 75 Hz of 1 to 6 % damping, a
-drive of 40 to 120 Hz bandwidth, in half of the draws the lag of a position loop (20 to 60 1/s) that the identification is not told; a
-logger of 12 bits, ± 4 g, 800 samples per second, whose clock is 1 % off and which begins .5 to 15 s earlier.
+drive of 40 to 120 Hz bandwidth, in half of the draws the lag of a position loop (20 to 60 1/s), of which the
+identification is not told; a logger of 12 bits, ± 4 g, 800 samples per second, whose clock is 1 % off and which begins
+.5 to 15 s earlier.
 """
 
 from __future__ import annotations
@@ -47,8 +48,8 @@ def main() -> None:
             _row(name, _draws(args, program, machine, command, lag)) for name, lag in (("no", False), ("yes", True))
         ]
     head = ["lag of the position loop", "modes", "within .5 % and 10 %", "accepted, but farther off",
-            "refused or missed", "false ones", "95 % intervals cover f / ζ", "machines with all modes", "median error f / ζ, %",
-            "CPU time, median and longest, s"]  # fmt: skip
+            "refused or missed", "false ones", "95 % intervals cover f / ζ", "machines with all modes",
+            "median error f / ζ, %", "CPU time, median and longest, s"]  # fmt: skip
     print(markdown(head, rows))
 
 

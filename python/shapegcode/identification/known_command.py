@@ -18,7 +18,6 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import czt, resample_poly
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.checks import is_clipped
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
 from shapegcode.identification.result import Identification, IdentifiedMode, Sweep
@@ -47,6 +46,7 @@ _LEVELLED_HZ = 1.0
 _SAME_START_S = 0.15
 _ROUNDS = 2
 _AWAY_S, _STANDS_OUT = 0.5, 2.0
+_GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
 _LOWEST_SHARE = 0.15  # of the power of the command
 _CORRELATED = 0.25  # squared correlation of a part, below 40 Hz
 _OWN = 0.1  # of the largest line of a part, in power
@@ -218,7 +218,7 @@ class _Clock:
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
             raise RecordError(f"{record.source}: {record.quantity}: a sweep needs an acceleration")
-        if is_clipped(record.response) or _held_at_ends(record.response):
+        if _held_at_ends(record.response):
             raise RecordError(
                 f"{record.source}: overload: the acceleration is cut off at {np.max(np.abs(record.response)):.4g} "
                 "m/s²; needed is a larger range of the sensor, or less acceleration (shapegcode sweep --acceleration)"
@@ -407,10 +407,14 @@ class _Clock:
             raise RecordError(self._no_relation("no line is coherent with the command"))
         used[: good[0]] = used[good[-1] + 1 :] = False
         hertz, ratio, coherence = spectra.hertz[used], ratio[used], coherence[used]
-        # What is left of a delay, by all lines; the sign of the sensor, by the lowest: there the axis moves as one.
+        # What is left of a delay and the lag of a position loop, by all lines: those that bring phases best together.
+        turn, turns = 2j * np.pi * hertz, np.exp(2j * np.pi * hertz * _LAGS_S[:, None])
+        loops = [np.ones(len(hertz), dtype=np.complex128), *(1.0 + turn / gain for gain in _GAINS_PER_S)]
+        sums = [np.abs(turns @ (ratio * loop / np.abs(ratio * loop))) for loop in loops]
+        ratio = ratio * loops[int(np.argmax([np.max(each) for each in sums]))]
         unit = ratio / np.abs(ratio)
-        turns = np.exp(2j * np.pi * hertz * _LAGS_S[:, None])
         best = turns[int(np.argmax(np.abs(turns @ unit)))]
+        # The sign of the sensor, by the lowest lines: there the axis moves as one.
         power = power[used]
         lowest = np.cumsum(power) <= _LOWEST_SHARE * np.sum(power)
         ratio = ratio * best * (np.sign(np.sum((unit * best * power)[lowest].real)) or 1.0)
