@@ -136,6 +136,11 @@ from shapegcode.identification.servo.record import (
     read_servo_record as read_servo_record,
 )
 from shapegcode.identification.servo.result import ServoAxis as ServoAxis, ServoFit as ServoFit
+from shapegcode.identification.sweep_program import (
+    SweepProgram as SweepProgram,
+    SweptBand as SweptBand,
+    write_sweep as write_sweep,
+)
 from shapegcode.identification.update import MachineUpdate as MachineUpdate, update_machine as update_machine
 from shapegcode.io.edge_capture import (
     EdgeAxis as EdgeAxis,

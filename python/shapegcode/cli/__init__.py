@@ -74,6 +74,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("machine", "write or explain a machine file, or import one from the control's parameters"),
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
     Command("identify", "find vibration modes in a tap test or decay, and put them into the machine file"),
+    Command("sweep", "write a program that shakes an axis, for modes without a hammer (identify --sweep)"),
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("batch", "run a command over many programs and machines, and resume where it stopped"),
     Command(

@@ -217,6 +217,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "identify": (
         "shapegcode identify tap1.csv tap2.csv tap3.csv --axis x --update mine.toml --plots plots",
         "shapegcode identify --tap-plan -m mine.toml",
+        "shapegcode identify phone.csv --sweep SWEEP-X.NC -m mine.toml --update mine.toml",
+    ),
+    "sweep": (
+        "shapegcode sweep -m mine.toml --axis x -o SWEEP-X.NC",
+        "shapegcode sweep -m mine.toml --axis y --frequencies 10:80 --acceleration 20% --travel 2 -o SWEEP-Y.NC",
     ),
     "testcut": (
         "shapegcode testcut taper -m vx500 --tool em8.toml -S 1800 -F 216 -a 15 -o TAPER.NC",
@@ -249,7 +254,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "input": (
         "input", "inputs", "files", "dump", "name", "kind", "machine", "set", "program", "against", "shaped", "lines",
         "answers", "base", "programs", "compensation", "cut", "mode", "uncertainty", "axes", "axis", "units", "box",
-        "override", "rapid_override", "part_mass", "shell",
+        "override", "rapid_override", "part_mass", "shell", "sweep",
     ),
     "what to do": ("write", "fit", "servo", "runs", "tap_plan", "list_families"),
     "what to shape": (
@@ -268,7 +273,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "calculation": (
         "plant", "no_full", "look_ahead", "drive", "continuous", "family", "objective", "negative", "taps", "speed",
-        "radius", "modes", "max_modes", "frequencies", "ignore_force", "start", "station", "cutoff", "lambda_s",
+        "radius", "modes", "max_modes", "frequencies", "travel", "acceleration", "seconds", "ignore_force",
+        "start", "station", "cutoff", "lambda_s",
     ),
     "modes that were not measured on this machine": ("keep_modes", "rigid"),
     "what a file does not say": (

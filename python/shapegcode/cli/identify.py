@@ -58,9 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
         "Finds vibration modes in hammer taps or frequency responses (frequency, damping, equivalent mass, damping and "
-        "stiffness), or in the decay after a rapid stop (frequency and damping), each with its 95 % interval, and "
-        "refuses what the data do not support. Exit code 0: all that stands out is supported; 1: some of it is not; "
-        "2: nothing is, or bad input."
+        "stiffness), in the decay after a rapid stop or beside a sweep (frequency and damping), each with its "
+        "95 % interval, and refuses what the data do not support. Exit code 0: all that stands out is supported; 1: "
+        "some of it is not; 2: nothing is, or bad input."
     )
     add = parser.add_argument
     add(
@@ -68,6 +68,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         nargs="*",
         help="CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML); several of one point together",
+    )
+    add(
+        "--sweep", metavar="PROGRAM", help="program that ran beside the sensor (shapegcode sweep), on the control of -m"
     )
     along = "use the response along this axis; where the file names none, it is this one"
     add("--axis", choices=("x", "y", "z"), help=along)
@@ -98,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.tap_plan and args.files:
         raise ArgumentError("--tap-plan says how to do the test and reads no file: leave one of both out")
-    runner.check_files(args)
+    runner.check_files(args, also_read=[] if args.sweep is None else [args.sweep])
     if args.tap_plan:
         from shapegcode.identification.plan import tap_plan
 
@@ -106,8 +109,12 @@ def run(args: argparse.Namespace) -> int:
         return runner.finish(plan, args, notes=["", plan.instructions])
     if not args.files:
         raise ArgumentError("name the file of a tap test or decay, or ask how to do the test: identify --tap-plan")
-    if args.machine is not None or args.set:
-        raise ArgumentError("-m and --set go with --tap-plan; --update names the machine file that takes the modes")
+    if args.sweep is None and (args.machine is not None or args.set):
+        raise ArgumentError(
+            "-m and --set go with --tap-plan and --sweep; --update names the machine file that takes the modes"
+        )
+    if args.sweep is not None and args.machine is None:
+        raise ArgumentError("--sweep needs -m, the machine file of the control that ran the program")
     return _identify(args)
 
 
@@ -119,20 +126,21 @@ def _identify(args: argparse.Namespace) -> int:
     if args.update is not None:
         options.refuse_same_file([Path(args.update)], map(Path, args.files))
         machine = check_updatable(args.update)
-        if args.axis is not None:
+        if args.axis is not None and args.sweep is None:
             _decide(args, machine, args.axis)
+    shaken = {} if args.sweep is None else {"sweep": args.sweep, "machine": options.load_machine(args)}
     said = {field.name: getattr(args, field.name) for field in fields(ReadOptions)}
     said["response_columns"] = tuple(args.response_columns or ())
     with runner.progress(f"fitting {', '.join(args.files)}", args):
         found = identify(
             args.files, ReadOptions(**said), max_modes=args.max_modes, modes=args.modes, band_hz=args.frequencies,
-            start_s=args.start, strict=False,
+            start_s=args.start, strict=False, **shaken,
         )  # fmt: skip
     notes, wrote = list(found.notes), []
     if args.update is not None and found.modes and found.doubt and not args.force:
         notes.append(f"{args.update}: not changed: {found.doubt} (--force writes all the same)")
     elif args.update is not None and found.modes:
-        if args.axis is None:
+        if args.axis is None or args.sweep is not None:
             _decide(args, machine, found.axis)
         update = update_machine(args.update, found, keep_modes=args.keep_modes, rigid=args.rigid)
         write_text(args.update, update.text)

@@ -117,7 +117,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
             f"are of several points: the modes are those of all, masses those at {used[0].source}"
         )  # fmt: skip
         notes.append(f"{len(used)} frequency responses {said}")
-    if sought.exponential_window_s is None:
+    if sought.exponential_window_s is None and sought.phase_known:
         notes.append(
             "a frequency response no longer tells overload, double hits or windows: an exponential window adds its "
             "damping, unless --exponential-window states it"
@@ -528,7 +528,7 @@ def _refusal(
     hertz, width = omega / (2.0 * np.pi), 2.0 * zeta * omega
     return (
         _record_refusal(hertz, zeta, measured)
-        or _response_refusal(residues_of(fit)[:, index])
+        or (_response_refusal(residues_of(fit)[:, index]) if sought.phase_known else "")
         or _evidence_refusal(window, index, hertz, pool)
         or _local_refusal(window, omega, width)
         or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or _ACCEPTED_PERCENT)

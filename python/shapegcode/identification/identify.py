@@ -16,6 +16,7 @@ from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
 from shapegcode.identification.checks import Prepared, RecordUse, prepare
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
+from shapegcode.identification.known_command import find_modes_of_command, known_command
 from shapegcode.identification.model_search import (
     ACCEPTED_PERCENT,
     MAX_MODES,
@@ -40,6 +41,8 @@ from shapegcode.io.read import read_measurement
 from shapegcode.io.record import FloatArray, Quantity, ReadOptions, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.taps import is_klipper, read_sweep
+from shapegcode.machine import Machine
+from shapegcode.program import Program
 
 _LARGEST_MODEL = 99
 _MIN_SAMPLES = 3
@@ -57,6 +60,8 @@ def identify(
     band_hz: tuple[float, float] | None = None,
     start_s: float | None = None,
     accepted_percent: float | None = None,
+    sweep: Program | str | Path | None = None,
+    machine: Machine | str | Path | None = None,
     strict: bool = True,
 ) -> Identification:
     """Modes in one or several taps of a point (with force), in free decays (without), or in frequency responses.
@@ -75,13 +80,16 @@ def identify(
         start_s: time at which a decay begins; None: it is looked for.
         accepted_percent: a mode is refused whose damping ratio is less certain than this (95 %; of a fit over time its
             stiffness too); None: 5 % over time, 50 % over frequency.
+        sweep: the program that ran beside the sensor, of one axis, such as `write_sweep` writes: its command takes the
+            place of the force, start and clock of the logger are found from the record.
+        machine: whose controller ran it.
         strict: raise where no record can be used; False: the result says it, in `reason`.
 
     Returns:
         The modes with their uncertainties, those that were refused and why, and how well they fit.
 
     Raises:
-        ArgumentError: a number of modes that is not from 1 to 99.
+        ArgumentError: a number of modes that is not from 1 to 99; a sweep without its machine.
         RecordError: no record can be used; what was found and what is needed.
         OSError: a file cannot be read.
 
@@ -101,9 +109,11 @@ def identify(
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
     window_s = None if options is None else options.exponential_window_s
     sought = Sought(band_hz, max_modes, modes, accepted_percent, window_s)
+    if sweep is not None and (machine is None or response is not None):
+        raise ArgumentError("a sweep needs the machine whose controller ran it, and files or records")
     # The matrices are small: further threads of BLAS would wait for each other, up to twenty times as long.
     with threadpool_limits(limits=1, user_api="blas"):
-        return _identify(sources, names, sought, options or ReadOptions(), start_s, strict)
+        return _identify(sources, names, sought, options or ReadOptions(), start_s, sweep, machine, strict)
 
 
 def _identify(
@@ -112,10 +122,14 @@ def _identify(
     sought: Sought,
     options: ReadOptions,
     start_s: float | None,
+    sweep: Program | str | Path | None,
+    machine: Machine | str | Path | None,
     strict: bool,
 ) -> Identification:
     ready: Prepared | None = None
     try:
+        if sweep is not None and machine is not None:
+            return find_modes_of_command(known_command(sweep, Machine.of(machine)), sources, options, sought)
         swept = _swept(sources, options)
         if swept is not None:
             return find_swept_modes(swept, names, sought)

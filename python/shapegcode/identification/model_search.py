@@ -78,6 +78,7 @@ class Sought:
     modes: int | None  # their number; None: by evidence
     accepted_percent: float | None  # see `identify.identify`
     exponential_window_s: float | None = None  # applied to the response before it was read
+    phase_known: bool = True  # of the residues: False where a drive lies between what is known and what moves
 
     def order(self, models: Search) -> int:
         """Number of modes that is taken; refused where the data hold fewer than were asked for."""

@@ -159,6 +159,7 @@ class Sweep:
     frequency_hz: FloatArray  # (n,) middles of the bins
     amplitude: FloatArray  # (n,) of the response over the command's course, any unit
     fitted: FloatArray  # (n,) of the model
+    command: str = ""  # program whose command is known; empty: taken from the record
 
 
 @dataclass(frozen=True)
@@ -235,9 +236,9 @@ class Identification(Result):
     @property
     def methods(self) -> tuple[str, ...]:
         """Published methods of the fit that was made."""
-        if self.sweep is not None:
+        if self.sweep is not None and not self.sweep.command:
             return ("modes from a sweep",)
-        over_time = self.evidence and not self.responses
+        over_time = self.evidence and not self.responses and self.sweep is None
         return ("modes from records" if over_time else "modes from frequency responses",)
 
     @property
@@ -334,6 +335,8 @@ class Identification(Result):
     @property
     def next_step(self) -> str:
         """The one thing to do next."""
+        if self.sweep is not None and self.sweep.command and (self._unsupported or self.doubt or not self.modes):
+            return "sweep again, for longer or with more acceleration (shapegcode sweep), or tap"
         if not self.modes:
             return "shapegcode identify --tap-plan says how to do the test"
         if self._unsupported or self.doubt:

@@ -1,0 +1,48 @@
+"""``shapegcode sweep``: a program that shakes an axis, for modes without a hammer."""
+
+from __future__ import annotations
+
+import argparse
+
+from shapegcode.cli import runner
+from shapegcode.cli.arguments import NEEDED, add_options, frequency_band, positive, program_number, ratio
+from shapegcode.cli.options import add_machine_argument, add_result_arguments, load_machine
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.description = (
+        "Writes a program that shakes one axis: strokes there and back whose frequency rises and falls, band by band, "
+        "with pauses. Says before which band the control reaches, and the acceleration of each part, simulated from "
+        "the written program. Beside it any logger of accelerations records; `identify --sweep` finds the modes. Exit "
+        "code 0; 2: bad input, or a band that the control does not reach."
+    )
+    add_machine_argument(parser)
+    add_options(parser, (
+        ("--axis", None, ("x", "y", "z"), "that is shaken (default: %(default)s)", "x"),
+        ("--frequencies", "LOW:HIGH", frequency_band,
+         "of the strokes there and back, Hz (default: from 8 Hz up to what the control reaches, 200 Hz at most)"),
+        ("--travel", "MM", positive,
+         "longest stroke, in the positive direction from the start point (default: 5)", 5.0),
+        ("--acceleration", "SHARE", ratio,
+         "amplitude, of the largest acceleration of the axis: a drive bears some 30%% for as long as it lasts "
+         "(default: 30%%)", 0.3),
+        ("--seconds", "S", positive, "all strokes together last about so long (default: 60)", 60.0),
+        ("-o --output", "OUT.NC", None, "program", NEEDED),
+        ("--program", "O1234", program_number, "number of the program (default: O7201)", 7201),
+    ))  # fmt: skip
+    add_result_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the program."""
+    from shapegcode.identification.sweep_program import write_sweep
+
+    machine = load_machine(args)
+    runner.check_files(args)
+    with runner.progress("planning the strokes", args):
+        found = write_sweep(
+            args.output, machine, args.axis, band_hz=args.frequencies, travel_mm=args.travel,
+            acceleration_share=args.acceleration, seconds=args.seconds, number=args.program,
+        )  # fmt: skip
+    return runner.finish(found, args, wrote=[args.output])

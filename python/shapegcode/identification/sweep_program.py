@@ -1,0 +1,409 @@
+"""A program that shakes one axis with rising and falling frequency, planned on the control's own model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from shapegcode import _core
+from shapegcode.errors import ArgumentError
+from shapegcode.io.atomic import write_text
+from shapegcode.io.record import FloatArray
+from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.stream import stream
+from shapegcode.program import Program
+from shapegcode.results.result import Result
+from shapegcode.results.table import Column, Table
+
+_PAUSE_S = 1.0, 2.5  # behind each rise, and behind each fall: what both excited decays
+_BEFORE_S = 2.0  # at rest, before the first
+_BANDS_PER_OCTAVE = 2.0
+_DESIGNED_PER_OCTAVE = 3.0  # frequencies whose strokes are planned; between them they are interpolated
+_FEEDS = 9
+_TRIED = 8, 24  # strokes of a trial, and of a longer one
+_LONGEST = 1 << 20
+_REST_S = 0.5
+_ROUNDS = 6
+_OF_STEP = 0.4  # of the corner speed difference, which a reversal has twice: the control's may be 20 % smaller
+_LEAST_AT_ONCE = 100.0  # mm/min; slower strokes excite too little: those with ramps are taken
+_SPARE = 1.15  # Strokes are rounded to increments: none lasts less than the least block time
+_HALVINGS = 14
+_ENOUGH = 0.98  # of the largest amplitude: a higher feed gains no more
+_MIN_INCREMENTS = 4  # a stroke is no shorter
+_LEAST_MM_S2 = 20.0  # a sensor of 12 bits and ± 2 g resolves 10 mm/s²
+_LOW_HZ, _HIGH_HZ = 8.0, 200.0
+_MIN_BAND = 1.5  # upper end over lower end
+
+
+@dataclass(frozen=True)
+class SweptBand:
+    """A part of the program, once up and once down.
+
+    Attributes:
+        low_hz: lowest frequency of the strokes there and back.
+        high_hz: highest one.
+        travel_mm: longest stroke.
+        feed_mm_per_min: highest feed.
+        acceleration_mm_s2: amplitude of the commanded acceleration between these frequencies, as simulated.
+        blocks: strokes.
+        duration_s: with its pauses.
+    """
+
+    low_hz: float
+    high_hz: float
+    travel_mm: float
+    feed_mm_per_min: float
+    acceleration_mm_s2: float
+    blocks: int
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class SweepProgram(Result):
+    """A program that shakes an axis.
+
+    Attributes:
+        machine: name of the machine.
+        axis: "x", "y" or "z".
+        file: of the program.
+        bands: ascending.
+        limit: why the band ends where it does.
+        acceleration_percent: the stated limit of the amplitude, of the axis' largest acceleration.
+        duration_s: of the program, as simulated.
+        size_bytes: of the program.
+        warnings: what to know before it runs.
+    """
+
+    machine: str
+    axis: Literal["x", "y", "z"]
+    file: str
+    bands: tuple[SweptBand, ...]
+    limit: str
+    acceleration_percent: float
+    duration_s: float
+    size_bytes: int
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """It can be run."""
+        return True
+
+    @property
+    def answer(self) -> str:
+        """Which axis, which band, how long, how far, and what limits it."""
+        travel = max(band.travel_mm for band in self.bands)
+        return (
+            f"{self.axis.upper()} axis of {self.machine}: {self.bands[0].low_hz:.4g} to {self.bands[-1].high_hz:.4g} "
+            f"Hz in {self.duration_s:.0f} s within {travel:.3g} mm, {self.size_bytes / 1024.0:.0f} KiB; {self.limit}"
+        )
+
+    @property
+    def next_step(self) -> str:
+        """To run it beside a logger, and to identify the record."""
+        return (
+            f"run {self.file} beside a logger on what the {self.axis.upper()} axis moves, then shapegcode identify "
+            f"--sweep {self.file} RECORD.csv -m MACHINE"
+        )
+
+    def tables(self) -> list[Table]:
+        """One row for each band."""
+        columns = (
+            Column("from", "Hz", "low_hz", digits=1),
+            Column("to", "Hz", "high_hz", digits=1),
+            Column("stroke up to", "mm", "travel_mm", digits=3),
+            Column("feed up to", "mm/min", "feed_mm_per_min", digits=0),
+            Column("acceleration", "mm/s²", "acceleration_mm_s2", digits=0),
+            Column("blocks"),
+            Column("lasts", "s", "duration_s", digits=1),
+        )
+        return [Table("planned, as simulated", columns, self.bands)]
+
+
+def write_sweep(
+    file: str | Path,
+    machine: Machine | str | Path,
+    axis: Literal["x", "y", "z"] = "x",
+    *,
+    band_hz: tuple[float, float] | None = None,
+    travel_mm: float = 5.0,
+    acceleration_share: float = 0.3,
+    seconds: float = 60.0,
+    number: int = 7201,
+) -> SweepProgram:
+    """Write a program that shakes one axis over a band of frequencies, for `identify` with `sweep`.
+
+    Strokes there and back (G91, G01), whose frequency rises, then falls, band by band, each behind a pause. Their
+    lengths and feeds are planned on the controller's model: the amplitude of the commanded acceleration stays within
+    the stated share of the axis' limit, the strokes within the travel, the feed within the largest one. The program
+    ends where it begins, and feed hold may stop it at any time.
+
+    Args:
+        file: of the program.
+        machine: whose controller runs it.
+        axis: that is shaken.
+        band_hz: lowest and highest frequency of the strokes; None: from 8 Hz up to what the control reaches.
+        travel_mm: longest stroke, from the start point in the positive direction.
+        acceleration_share: of the axis' largest acceleration that the amplitude may have.
+        seconds: all strokes together last about so long.
+        number: of the program, O.
+
+    Returns:
+        The band that is reached, what limits it, and the excitation of each part, simulated from the written program.
+
+    Raises:
+        ArgumentError: the control does not reach the band within these limits; what it reaches is said.
+        OSError: the file cannot be written.
+    """
+    machine = Machine.of(machine)
+    for name, value in (("travel_mm", travel_mm), ("acceleration_share", acceleration_share), ("seconds", seconds)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise ArgumentError(f"{name} = {value:g}: must be finite and above 0")
+    if acceleration_share > 1.0:
+        raise ArgumentError(f"acceleration_share = {acceleration_share:g}: must be at most 1, the axis' own limit")
+    low, high = band_hz or (_LOW_HZ, _HIGH_HZ)
+    planner = _Planner(machine, axis, travel_mm, acceleration_share)
+    for _ in range(_ROUNDS):
+        strokes, limit = planner.plan(low, high)
+        if band_hz is not None and strokes[-1].hertz < 0.999 * high:
+            raise ArgumentError(f"{high:g} Hz cannot be reached, {strokes[-1].hertz:.4g} Hz can: {limit}")
+        bands = _bands(strokes, machine, seconds)
+        text = _text(bands, machine, axis, number)
+        command, period_s = commanded(Program.from_text(text, machine, source=str(file)), machine)
+        swept = _swept(bands, command[:, "xyz".index(axis)], period_s)
+        over = max(band.acceleration_mm_s2 for band in swept) / planner.allowed
+        if over <= 1.0:
+            break
+        planner.wanted *= 0.99 / over  # What lies between the planned frequencies, and rounding, ask for more
+    else:
+        raise ArgumentError(f"the acceleration stays {over:.2g} times what is allowed: state less (--acceleration)")
+    write_text(file, text)
+    warnings = []
+    if len(text) > machine.controller.program_memory_bytes:
+        warnings.append(
+            f"{len(text)} bytes are more than the memory of {machine.controller.program_memory_bytes} bytes holds "
+            "(controller.program_memory_bytes): run it from a card, or state less time (--seconds)"
+        )
+    return SweepProgram(
+        machine.name,
+        axis,
+        str(file),
+        swept,
+        limit,
+        100.0 * acceleration_share,
+        len(command) * period_s,
+        len(text),
+        tuple(warnings),
+    )
+
+
+def commanded(program: Program, machine: Machine) -> tuple[FloatArray, float]:
+    """Set-points of a program behind every filter of the control, (n, 3) mm, and their period in s."""
+    command = [chunk.command_mm for chunk in stream(program, machine)]
+    return np.concatenate(command), machine.controller.interpolation_period_s
+
+
+@dataclass(frozen=True)
+class _Stroke:
+    hertz: float  # of there and back
+    length_mm: float
+    feed_mm_per_min: float
+
+
+class _Planner:
+    """Strokes of an axis by frequency."""
+
+    def __init__(self, machine: Machine, axis: str, travel_mm: float, share: float) -> None:
+        limits = getattr(machine.axes, axis)
+        self._machine, self._model, self._travel_mm = machine, MachineModel(machine), travel_mm
+        self._axis = "xyz".index(axis)
+        self._feed = limits.max_feed_mm_per_min
+        controller = machine.controller
+        if controller.motion == "look_ahead" and controller.corner_rule == "speed_difference":
+            # Such a reversal needs no ramp: strokes last length over feed, whatever the time constants really are.
+            at_once = _OF_STEP * getattr(controller.corner_speed_difference_mm_per_min, axis)
+            if at_once >= _LEAST_AT_ONCE:
+                self._feed = min(self._feed, at_once)
+        self.allowed = share * limits.max_acceleration_mm_s2
+        self.wanted = self.allowed
+        self._block_s = max(machine.controller.block_time_s, 2.0 * machine.controller.interpolation_period_s)
+        self._least_mm = _MIN_INCREMENTS * machine.controller.least_increment_mm
+
+    def plan(self, low: float, high: float) -> tuple[list[_Stroke], str]:
+        """Strokes from the lowest frequency to the highest that can be reached, and what limits it."""
+        most = 0.5 / (_SPARE * self._block_s)
+        limit = f"a block lasts {1e3 * self._block_s:g} ms or more, so that strokes reach {most:.4g} Hz"
+        if high <= most:
+            limit = f"strokes could reach {most:.4g} Hz, with blocks of {1e3 * self._block_s:g} ms"
+        top = min(high, most)
+        if not top >= _MIN_BAND * low:
+            raise ArgumentError(f"band of {low:g} to {high:g} Hz: must ascend by {_MIN_BAND:g} times or more; {limit}")
+        count = 2 + math.ceil(_DESIGNED_PER_OCTAVE * math.log2(top / low))
+        found: list[_Stroke] = []
+        for hertz in np.geomspace(low, top, count):
+            stroke, amplitude = self._stroke(float(hertz))
+            short = stroke.length_mm < self._least_mm
+            if short or amplitude < _LEAST_MM_S2:
+                limit = f"at {hertz:.4g} Hz " + (
+                    f"a stroke would be {1e3 * stroke.length_mm:.2g} µm, less than {1e3 * self._least_mm:g} µm"
+                    if short
+                    else f"the control commands {amplitude:.2g} mm/s² only, less than {_LEAST_MM_S2:g} mm/s²"
+                )
+                break
+            found.append(stroke)
+        if not found or found[-1].hertz < _MIN_BAND * low:
+            raise ArgumentError(f"band of {low:g} to {high:g} Hz: {limit}")
+        return found, limit
+
+    def _stroke(self, hertz: float) -> tuple[_Stroke, float]:
+        """The stroke with the wanted amplitude, or the largest there is, and its amplitude in mm/s²."""
+        half_s = 0.5 / hertz
+        top = min(self._feed, 60.0 * self._travel_mm / half_s)
+        tried: list[tuple[_Stroke, float]] = []
+        for feed in np.geomspace(top / 100.0, top, _FEEDS):
+            length = self._length(float(feed), half_s)
+            stroke = _Stroke(hertz, length, float(feed))
+            tried.append((stroke, self._amplitude(stroke)))
+        largest = max(amplitude for _, amplitude in tried)
+        goal = min(self.wanted, _ENOUGH * largest)
+        place = next(k for k, (_, amplitude) in enumerate(tried) if amplitude >= goal)
+        if place and tried[place][1] > goal:
+            (below, low), (above, high) = tried[place - 1], tried[place]
+            share = (math.log(goal) - math.log(low)) / (math.log(high) - math.log(low))
+            feed = below.feed_mm_per_min ** (1.0 - share) * above.feed_mm_per_min**share
+            stroke = _Stroke(hertz, self._length(feed, half_s), feed)
+            tried[place] = stroke, self._amplitude(stroke)
+        stroke, amplitude = tried[place]
+        if amplitude > self.wanted:  # The lowest feed asks for too much: shorter strokes would be faster ones
+            factor = self.wanted / amplitude
+            stroke = _Stroke(
+                hertz, self._length(stroke.feed_mm_per_min * factor, half_s), stroke.feed_mm_per_min * factor
+            )
+            amplitude = self._amplitude(stroke)
+        return stroke, amplitude
+
+    def _length(self, feed: float, half_s: float) -> float:
+        """Length of a stroke that lasts half a cycle."""
+        low, high = 0.0, min(feed / 60.0 * half_s, self._travel_mm)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            few, many = (len(self._motion(middle, feed, count)) for count in _TRIED)
+            lasts_s = (many - few) * self._model.period_s / (_TRIED[1] - _TRIED[0])
+            low, high = (middle, high) if lasts_s < half_s else (low, middle)
+        return high
+
+    def _motion(self, length_mm: float, feed: float, count: int) -> FloatArray:
+        """Set-points of strokes there and back, (n,) mm."""
+        step = np.zeros(3)
+        step[self._axis] = length_mm
+        ends = [np.zeros(3), step]
+        path = _core.Path([_core.Segment.line(ends[k % 2], ends[(k + 1) % 2], feed / 60.0) for k in range(count)])
+        read = self._model.ordinary.stream(path, self._model.options(), 0.0).read(_LONGEST)
+        return np.asarray(read.command_mm[:, self._axis], dtype=np.float64)
+
+    def _amplitude(self, stroke: _Stroke) -> float:
+        """Amplitude of the commanded acceleration at the frequency of a stroke, mm/s²."""
+        x = self._motion(stroke.length_mm, stroke.feed_mm_per_min, _TRIED[1])
+        return amplitude(
+            x, self._model.period_s, (0.8 * stroke.hertz, 1.2 * stroke.hertz), _TRIED[1] / 2 / stroke.hertz
+        )
+
+
+def amplitude(command_mm: FloatArray, period_s: float, band_hz: tuple[float, float], lasts_s: float) -> float:
+    """Amplitude of the commanded acceleration in a band, as of a sine that lasts so long, mm/s²."""
+    acceleration = np.diff(command_mm, 2) / period_s**2
+    size = 2 * len(acceleration)
+    hertz = np.fft.rfftfreq(size, period_s)
+    inside = (hertz >= band_hz[0]) & (hertz <= band_hz[1])
+    energy = 2.0 * period_s * float(np.sum(np.abs(np.fft.rfft(acceleration, size)[inside]) ** 2)) / size
+    return math.sqrt(2.0 * energy / lasts_s)
+
+
+def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[list[_Stroke]]:
+    """Strokes there and back of each rise and each fall, on increments and digits of the control."""
+    hertz, length, feed = (
+        np.array([getattr(each, name) for each in strokes]) for name in ("hertz", "length_mm", "feed_mm_per_min")
+    )
+    octaves = math.log2(hertz[-1] / hertz[0])
+    edges = np.geomspace(hertz[0], hertz[-1], 1 + math.ceil(_BANDS_PER_OCTAVE * octaves))
+    lasts_s = 0.5 * seconds / (len(edges) - 1)
+    step, digits = machine.controller.least_increment_mm, machine.controller.feed_decimals_mm
+    found, carried = [], 0.0
+    for low, high in pairwise(edges):
+        rising, now_s = [], 0.0
+        while now_s < lasts_s:
+            at = low * (high / low) ** (now_s / lasts_s)
+            exact = math.exp(np.interp(math.log(at), np.log(hertz), np.log(length))) + carried
+            rounded = max(round(exact / step), 1) * step
+            carried = exact - rounded
+            rising.append(
+                _Stroke(at, rounded, round(math.exp(np.interp(math.log(at), np.log(hertz), np.log(feed))), digits))
+            )
+            now_s += 1.0 / at
+        found += [rising, rising[::-1]]
+    return found
+
+
+def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) -> str:
+    """The program."""
+    decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
+    reach = max(stroke.length_mm for band in bands for stroke in band)
+    plain = "".join(sign for sign in machine.name.upper() if sign.isalnum() or sign in " -.")[:30]
+    lines = [
+        "%", f"O{number:04d}(SWEEP {axis.upper()})", f"(SHAPEGCODE SWEEP FOR {plain})",
+        f"(SHAKES {axis.upper()}: 0 TO +{reach:.{decimals}f} MM FROM THE START POINT)",
+        "(AIR ONLY: NO SPINDLE, NO OTHER AXIS MOVES, ENDS WHERE IT BEGAN)",
+        "(START THE LOGGER FIRST, STOP IT LAST. OVERRIDE 100 PERCENT)",
+        "(FEED HOLD STOPS IT AT ANY TIME: THE PART BEFORE REMAINS GOOD)",
+        "G21 G17 G91 G94 G64", f"G04 P{round(1e3 * _BEFORE_S)}",
+    ]  # fmt: skip
+    for count, band in enumerate(bands):
+        feed = None
+        for stroke in band:
+            new = f"{stroke.feed_mm_per_min:.{machine.controller.feed_decimals_mm}f}"
+            new = new if "." in new else f"{new}."
+            size = f"{stroke.length_mm:.{decimals}f}".lstrip("0")
+            word = "" if new == feed else f" F{new}"
+            lines += [f"{'G01 ' if feed is None else ''}{axis.upper()}{size}{word}", f"{axis.upper()}-{size}"]
+            feed = new
+        lines.append(f"G04 P{round(1e3 * _PAUSE_S[count % 2])}")
+    return "\n".join([*lines, "G90", "M30", "%"]) + "\n"
+
+
+def _swept(bands: list[list[_Stroke]], x_mm: FloatArray, period_s: float) -> tuple[SweptBand, ...]:
+    """Each rise with its fall, as simulated."""
+    moves = moving_parts(x_mm, period_s)
+    if len(moves) != len(bands):
+        raise ArgumentError(
+            f"{len(moves)} parts move, {len(bands)} were planned: the control's filters bridge the pauses"
+        )
+    found = []
+    for rising, (first, _), (_, end) in zip(bands[::2], moves[::2], moves[1::2], strict=True):
+        low, high = rising[0].hertz, rising[-1].hertz
+        lasts_s = (end - first) * period_s - _PAUSE_S[0]
+        size = amplitude(x_mm[first:end], period_s, (0.95 * low, 1.05 * high), lasts_s)
+        found.append(
+            SweptBand(
+                low, high, max(each.length_mm for each in rising), max(each.feed_mm_per_min for each in rising), size,
+                4 * len(rising), lasts_s + sum(_PAUSE_S),
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def moving_parts(x_mm: FloatArray, period_s: float) -> list[tuple[int, int]]:
+    """First sample and end of each part of a motion between rests of half a second or more."""
+    rows = np.flatnonzero(np.diff(x_mm))
+    if not len(rows):
+        return []
+    cuts = np.flatnonzero(np.diff(rows) * period_s > _REST_S)
+    return [
+        (int(rows[first]), int(rows[last]) + 2)
+        for first, last in zip([0, *(cuts + 1)], [*cuts, len(rows) - 1], strict=True)
+    ]
