@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ import time_intervals
 import shapegcode as sg
 from judge.run_simulator import surface_program, written_program
 from shapegcode.cli import main
+from shapegcode.timing.calibration.calibrate import _scatters
 from shapegcode.timing.calibration.motion import FunctionFit
 from shapegcode.timing.calibration.open_times import function_rows, kind_weights, run_scatter
 from shapegcode.timing.interval import TimeInterval, time_interval
@@ -144,6 +147,21 @@ def test_repeated_runs_scatter_by_their_own_mean() -> None:
     ratios = {f"{program}": (1.03 * (1.0 + 0.004 * generator.normal(size=5))).tolist() for program in range(400)}
     assert run_scatter(ratios) == pytest.approx(0.004, rel=0.05)
     assert run_scatter({"a": [1.1], "b": [0.9]}) == 0.003
+
+
+def test_tool_changes_that_err_alike_show_in_whole_programs() -> None:
+    """Twelve sections, each .1 s late: together they scatter by more than .05 s each."""
+
+    def row(program: str, late_s: float) -> Any:
+        kinds = (SimpleNamespace(name="between cuts", measured_s=30.0 + late_s, predicted_s=30.0),)
+        return SimpleNamespace(use="fit", program=program, error_percent=0.0, kinds=kinds)
+
+    runs: list[Any] = [SimpleNamespace(cut_sections=range(12))] * 2
+    learned: Any = SimpleNamespace(functions=SimpleNamespace(scatter_s=0.05))
+    between_s, _ = _scatters([row("a", 1.2), row("b", -1.2)], runs, learned)
+    assert between_s == pytest.approx(1.2 / math.sqrt(12.0))
+    between_s, _ = _scatters([row("a", 0.1), row("a", -0.1)], runs, learned)
+    assert between_s == 0.05
 
 
 @pytest.fixture

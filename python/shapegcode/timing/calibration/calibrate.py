@@ -138,7 +138,7 @@ def learn_clock(
     ]
     others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
     rows, warnings = _rows(observed, learned, others)
-    with_it, remarks, numbers, not_told = learned_machine(learned, fitted, rivals, run_scatter(_ratios(rows)))
+    with_it, remarks, numbers, not_told = learned_machine(learned, fitted, rivals, _scatters(rows, observed, learned))
     rows = [_with_interval(row, run, with_it) for row, run in zip(rows, observed, strict=True)]
     return LearnedClock(
         machine=machine.name,
@@ -291,13 +291,18 @@ def _row(run: ObservedRun, learned: _Learned, other: _Learned | None) -> Learned
     )
 
 
-def _ratios(rows: Sequence[LearnedRun]) -> dict[str, list[float]]:
-    """Measured over predicted time of the fitted runs, by program."""
-    found: dict[str, list[float]] = defaultdict(list)
-    for row in rows:
+def _scatters(rows: Sequence[LearnedRun], observed: Sequence[ObservedRun], learned: _Learned) -> tuple[float, float]:
+    """What the time between two cuts scatters by, s, and relatively what repeated runs of a program do."""
+    ratios: dict[str, list[float]] = defaultdict(list)
+    late: dict[str, list[float]] = defaultdict(list)
+    for row, run in zip(rows, observed, strict=True):
         if row.use == "fit" and row.error_percent is not None:
-            found[row.program].append(1.0 / (1.0 + row.error_percent / 100.0))
-    return found
+            ratios[row.program].append(1.0 / (1.0 + row.error_percent / 100.0))
+            share = next(each for each in row.kinds if each.name == "between cuts")
+            late[row.program].append((share.measured_s - share.predicted_s) / math.sqrt(max(1, len(run.cut_sections))))
+    # The same codes come again and again: where they err together, whole programs show it.
+    together = float(np.sqrt(np.mean([np.mean(each) ** 2 for each in late.values()]))) if late else 0.0
+    return max(learned.functions.scatter_s, together), run_scatter(ratios)
 
 
 def _with_interval(row: LearnedRun, run: ObservedRun, machine: Machine) -> LearnedRun:
@@ -442,7 +447,7 @@ def learned_machine(
     learned: _Learned,
     runs: Sequence[ObservedRun],
     rivals: Sequence[tuple[MotionFit, FunctionFit, float]],
-    between_runs: float,
+    scatters: tuple[float, float],
 ) -> tuple[Machine, dict[str, str], list[LearnedNumber], list[str]]:
     """The machine with the calibrated parameters, and what the logs leave open of them."""
     motion, functions, machine = learned.motion, learned.functions, learned.machine
@@ -465,8 +470,8 @@ def learned_machine(
         not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
     values["times.scatter"] = {
         "cuts_percent": round(100.0 * cut_scatter(runs, motion, machine), 3),
-        "between_cuts_s": round(functions.scatter_s, 3),
-        "runs_percent": round(100.0 * between_runs, 3),
+        "between_cuts_s": round(scatters[0], 3),
+        "runs_percent": round(100.0 * scatters[1], 3),
     }
     rows = motion_rows(motion, covariance, runs, machine)
     rows += function_rows(functions, partial(_function_values, runs=runs), lambda name: _meaning(name)[1])
