@@ -50,10 +50,11 @@ def machine(rows: list[dict[str, object]], scatter: dict[str, float] | None = No
 
 
 def half_width(time: sg.CycleTime) -> float:
-    """Half of the interval; it lies evenly about the time."""
+    """Half of the interval; it lies evenly about the time, and no time is below 0."""
     assert time.total_low_s is not None and time.total_high_s is not None
-    assert time.total_high_s - time.cycle_time_s == pytest.approx(time.cycle_time_s - time.total_low_s)
-    return time.total_high_s - time.cycle_time_s
+    half = time.total_high_s - time.cycle_time_s
+    assert time.total_low_s == pytest.approx(max(0.0, time.cycle_time_s - half))
+    return half
 
 
 def test_without_calibrated_data_there_is_no_interval() -> None:
