@@ -80,6 +80,14 @@ def test_the_machine_file_times_as_the_result_says(
     timed = sg.cycle_time(run.program, machine)
     assert timed.cycle_time_s == pytest.approx(run.predicted_s, rel=2e-3)
     assert abs(timed.difference_percent or 0.0) < 0.5
+    assert timed.total_low_s is not None and timed.total_high_s is not None
+    assert timed.total_high_s - timed.total_low_s == pytest.approx(run.high_s - run.low_s, rel=5e-3)
+    assert timed.total_low_s < (run.measured_s or 0.0) < timed.total_high_s
+    # A row for each parameter, and one for the block time that this kind does not have.
+    meanings = [number.meaning for number in clock.numbers if number.key != "axes.x|y|z.rapid_mm_per_min"]
+    names = {row.name for row in machine.times.open}
+    assert names - {"time in which a block is read"} <= set(meanings)
+    assert "time in which a block is read" in names
 
 
 @pytest.mark.slow

@@ -166,7 +166,7 @@ def test_builtin_file_names_every_key_and_the_origin_of_every_machine_value(buil
     lines = text.splitlines()
     for value in Machine.load(builtin).values():
         name = value.key.rpartition(".")[2]
-        if name == "modes":
+        if name in ("modes", "open"):  # lists of tables
             continue
         assert any(line.removeprefix("# ").startswith(f"{name} = ") for line in lines), name
     assert Machine.from_toml(text).to_toml().count("\n") == len(lines)

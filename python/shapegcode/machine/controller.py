@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
+from shapegcode.io.data_file import toml_tables
 from shapegcode.settings.keys import (
     AxisRatios,
     AxisTimes,
@@ -17,6 +18,7 @@ from shapegcode.settings.keys import (
     NonNegative,
     Positive,
     PositiveAxisValues,
+    Text,
     TomlTable,
     key,
 )
@@ -357,6 +359,38 @@ class SpindleTimes(InlineTable):
         return list(zip(self.rpm, self.s, strict=True))
 
 
+class TimeScatter(InlineTable):
+    """Standard deviations of times that no parameter explains."""
+
+    cuts_percent: Annotated[NonNegative, Field(le=100)] = key("of the cutting time of a tool")
+    between_cuts_s: Seconds = key("of what lies between two cutting sections")
+    runs_percent: Annotated[NonNegative, Field(le=100)] = key("between repeated runs of a program")
+
+
+class OpenTime(TomlTable):
+    """One direction in which run logs leave the calibrated parameters open."""
+
+    name: Text = key("the parameter that it is of, mainly")
+    values: tuple[Text, ...] = key('the machine a step further in that direction: "KEY = VALUE" of what differs')
+    weight: Positive = key("variance of the direction over the square of that step", default=1.0)
+
+    @model_validator(mode="after")
+    def _readable(self) -> Self:
+        self.by_key()
+        return self
+
+    def by_key(self) -> dict[str, Any]:
+        """The values by their keys."""
+        found = {}
+        for text in self.values:
+            name, _, value = text.partition("=")
+            try:
+                found[name.strip()] = toml_tables(f"value = {value}")["value"]
+            except ValueError as error:
+                raise ValueError(f"{text!r}: must be KEY = VALUE: {error}") from error
+        return found
+
+
 class Times(TomlTable):
     """What takes time beside the motion."""
 
@@ -394,3 +428,9 @@ class Times(TomlTable):
         default=0.0,
         assumed=True,
     )
+    scatter: TimeScatter | None = key(
+        "what calibrated times scatter by, { cuts_percent = 1.1, between_cuts_s = 0.2, runs_percent = 0.3 }; `time` "
+        "gives a 95 % interval where it is stated; left out: none",
+        default=None,
+    )
+    open: tuple[OpenTime, ...] = key("what run logs leave open of the calibrated parameters", default=())

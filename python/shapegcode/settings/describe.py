@@ -55,6 +55,7 @@ class _TomlWriter:
         self.written: dict[str, str] = {}
         self.lines: list[str] = []
         self._short = short
+        self._explains = not short
 
     def _add(self, line: str, key: str) -> None:
         """A line, its remark as the comment behind it: for people, what counts is the table of the origins."""
@@ -77,7 +78,7 @@ class _TomlWriter:
             if (isinstance(value, TomlTable) and not isinstance(value, InlineTable)) or item_type(field):
                 below.append((key, field, value))
             elif not self._short or self._is_kept(key, table, name, field):
-                if not self._short:
+                if self._explains:
                     info = key_info(field, key)
                     unit = f" [{info.unit}]" if info.unit and info.unit != "1" else ""
                     fanuc = f" (FANUC parameter {info.fanuc})" if info.fanuc else ""
@@ -111,8 +112,11 @@ class _TomlWriter:
         if not tables and not self._short:
             self.lines += [f"# {name} = ..." for name, inner in item.model_fields.items() if inner.is_required()]
         for number, table in enumerate(tables, start=1):
+            # The first of a list says what the keys of all are.
+            self._explains = not self._short and number == 1
             meaning = (item.__doc__ or "").rstrip(".") if number == 1 else ""
             self._below(f"[[{key}]]", meaning, table, f"{key}.{number}.")
+        self._explains = not self._short
 
     def _is_kept(self, key: str, table: TomlTable, name: str, field: FieldInfo) -> bool:
         """Whether the file must hold it, or holds it with a word of where it comes from."""

@@ -8,7 +8,7 @@ the check of it.
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from shapegcode.model.machine_model import fanuc_model
 from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.stamp import OVERRIDE_LOCKED
+from shapegcode.timing.interval import LogNext, TimeInterval, time_interval
 from shapegcode.timing.result import PARTS, BlockTime, CycleTime, RegionTime, ToolTime
 
 _KINDS = {kind.value: name for name, kind in _core.BlockKind.__members__.items()}
@@ -34,6 +35,7 @@ def cycle_time(
     full: bool = True,
     feed_override: float | None = None,
     rapid_override: float | None = None,
+    log_next: Sequence[Program | str | Path] = (),
 ) -> CycleTime:
     """Time of a program on a machine as it is: nothing is shaped.
 
@@ -51,13 +53,15 @@ def cycle_time(
         feed_override: scales every programmed feed; None: at which the shop usually runs
             (`times.feed_override_percent`).
         rapid_override: scales the rapid rates; None: likewise.
+        log_next: programs, or their files, that could be logged next: what of the interval each would leave.
 
     Returns:
-        The whole time in s and where it goes: by part, tool, region and, if asked for, block.
+        The whole time in s and where it goes: by part, tool, region and, if asked for, block; with its 95 % interval
+        where the machine was calibrated with run logs.
 
     Raises:
-        ArgumentError: a value that no controller can have, or an override at which full interpolation would take the
-            program beyond `controller.max_program_s`.
+        ArgumentError: a value that no controller can have, an override at which full interpolation would take the
+            program beyond `controller.max_program_s`, or `log_next` with a machine that was not calibrated.
     """
     machine = Machine.of(machine)
     program = given_program(program, machine)
@@ -74,11 +78,23 @@ def cycle_time(
             f"{rapid_override:.4g} of the programmed ones, and at most {limit_s:.10g} s are interpolated "
             "(controller.max_program_s); the closed form alone has no limit (--no-full)"
         )
+    interval = time_interval(program, machine, feed_override, rapid_override)
+    if log_next and interval is None:
+        raise _core.ArgumentError(
+            f"{machine.name} states no times.scatter: what a log would narrow is known of a machine that was "
+            "calibrated with run logs (shapegcode characterize --runs)"
+        )
+    others = [given_program(each, machine) for each in log_next]
     return CycleTime(
         **_parts(timed),
         cycle_time_s=float(timed.total_s),
         program=program.source,
         machine=machine.name,
+        total_low_s=max(0.0, timed.total_s - interval.half_width_s) if interval else None,
+        total_high_s=timed.total_s + interval.half_width_s if interval else None,
+        interval_parts=interval.parts() if interval else (),
+        told_by=interval.told_by() if interval else None,
+        log_next=_log_next(interval, others, machine, (feed_override, rapid_override)),
         full_interpolation_s=_core.interpolate_program(program.core, model).total_s if full else None,
         tools=tuple(
             ToolTime(**_parts(each), duration_s=float(each.total_s), tool=_tool(each.tool), first_line=each.first_line)
@@ -94,6 +110,15 @@ def cycle_time(
         ),
         simulated=SimulatedPrograms(program, machine, labels=("program", "")),
     )
+
+
+def _log_next(
+    interval: TimeInterval | None, programs: Sequence[Program], machine: Machine, overrides: tuple[float, float]
+) -> tuple[LogNext, ...]:
+    """What of an interval is left where one of the programs is logged next, the least first."""
+    found = [(program.source, time_interval(program, machine, *overrides)) for program in programs]
+    left = [LogNext(name, interval.after_logging(other)) for name, other in found if interval and other]
+    return tuple(sorted(left, key=lambda each: each.half_width_s))
 
 
 def _locked(program: Program, feed_override: float) -> Iterator[str]:

@@ -13,6 +13,7 @@ from shapegcode.results.json import hidden
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table, share_percent
+from shapegcode.timing.interval import LogNext, OpenPart
 
 AGREEMENT_PERCENT = 0.5  # Closed form and full interpolation agree if they differ by no more than this
 
@@ -142,6 +143,11 @@ class CycleTime(TimeParts, Result):
         cycle_time_s: the whole, in closed form.
         program: name of the program.
         machine: name of the machine.
+        total_low_s: lower end of the 95 % interval of the whole; None: the machine was not calibrated with run logs.
+        total_high_s: upper end; None: likewise.
+        interval_parts: what the interval is made of, the largest first; empty: likewise.
+        told_by: what a program must hold whose log would narrow the interval most, in words; None: likewise.
+        log_next: programs that could be logged next, the most useful first; empty unless asked for.
         full_interpolation_s: the whole time by giving every set-point; None: not asked for.
         tools: per tool, in the order of first use.
         regions: per region, in order.
@@ -156,6 +162,11 @@ class CycleTime(TimeParts, Result):
     cycle_time_s: float
     program: str
     machine: str
+    total_low_s: float | None
+    total_high_s: float | None
+    interval_parts: tuple[OpenPart, ...]
+    told_by: str | None
+    log_next: tuple[LogNext, ...]
     full_interpolation_s: float | None
     tools: tuple[ToolTime, ...]
     regions: tuple[RegionTime, ...]
@@ -189,7 +200,10 @@ class CycleTime(TimeParts, Result):
     @property
     def answer(self) -> str:
         """The whole time, and whether the check agrees."""
-        sentence = f"{self.program} takes {self.cycle_time_s:.3f} s ({_clock(self.cycle_time_s)}) on {self.machine}"
+        takes = f"{self.program} takes {self.cycle_time_s:.3f} s"
+        if self.total_high_s is not None:
+            takes += f" ± {self.total_high_s - self.cycle_time_s:.1f} s"
+        sentence = f"{takes} ({_clock(self.cycle_time_s)}) on {self.machine}"
         if self.difference_percent is None:
             return sentence
         agrees = "agrees" if self.ok else "DIFFERS"
@@ -265,12 +279,19 @@ class CycleTime(TimeParts, Result):
             found.append(self._tools_table())
         if self.regions or self.blocks:
             found.append(self._slowest_table())
+        if self.interval_parts:
+            found.append(Table("what the interval is made of", _INTERVAL, self.interval_parts[:_SLOWEST]))
+        if self.log_next:
+            found.append(Table("what is left of the interval, logged next", _LOG_NEXT, self.log_next))
         return found
 
     def _parts_table(self) -> Table:
         whole = self.cycle_time_s
         rows = [("cycle time", whole, _clock(whole))]
         rows += [(LABELS[part], getattr(self, part), share_percent(getattr(self, part), whole)) for part in PARTS]
+        if self.total_low_s is not None and self.total_high_s is not None:
+            rows.append(("95 % interval from", self.total_low_s, ""))
+            rows.append(("to", self.total_high_s, ""))
         if self.full_interpolation_s is not None:
             rows.append(("cycle time by full interpolation", self.full_interpolation_s, ""))
         columns = (
@@ -312,6 +333,14 @@ class CycleTime(TimeParts, Result):
         for block in self.blocks:
             cells = astuple(block)
             yield ",".join("" if c is None else f"{c:.6f}" if isinstance(c, float) else str(c) for c in cells) + "\n"
+
+
+_INTERVAL = (
+    Column("source", value="name", text=True),
+    Column("± s by itself", value="half_width_s", digits=2),
+    Column("of the variance", value=lambda part: share_percent(part.share, 1.0)),
+)
+_LOG_NEXT = (Column("program", value="program", text=True), Column("± s", value="half_width_s", digits=2))
 
 
 def tool_name(tool: int | None) -> str:

@@ -30,12 +30,14 @@ class HiddenControl:
     poll: float = 0.13
     feed_factor: float = 60.0  # shown feed over mm/s
     override: float = 1.0
+    block_time: float = 0.0  # no block of a cut is run off faster
+    operator: float = 0.0  # scatter of a tool change, s
 
     def run(self, text: str, seed: int = 0) -> tuple[str, float, dict[int, float]]:
         """Log text, duration in s, and when each line begins."""
-        events = self._events(text)
-        end = events[-1][0]
         generator = random.Random(seed)
+        events = self._events(text, random.Random(seed + 1))
+        end = events[-1][0]
         times = [event[0] for event in events]
         rows = ["2026-03-02T08:00:00.0000Z|Program_Status|ACTIVE"]
         at, shown = generator.random() * self.poll, (None, None)
@@ -53,7 +55,7 @@ class HiddenControl:
         rows.append(f"{_stamp(end)}|Program_Status|PROGRAM_COMPLETED")
         return "\n".join(rows) + "\n", end, {line: begin for begin, line, _ in reversed(events)}
 
-    def _events(self, text: str) -> list[tuple[float, int, object]]:
+    def _events(self, text: str, generator: random.Random) -> list[tuple[float, int, object]]:
         """(time, line, feed or feed as a function of time)."""
         events: list[tuple[float, int, object]] = []
         now, position, known = self.start, [0.0, 0.0, 0.0], [False, False, False]
@@ -90,6 +92,7 @@ class HiddenControl:
                 else:
                     now = max(now, ready)
                 now += self.tool_change if code == 6 else self.m_codes.get(code, 0.0)
+                now += abs(generator.gauss(0.0, self.operator)) if code == 6 and self.operator else 0.0
                 if code == 6:
                     known = [False, False, False]
             if 28 in codes:
@@ -157,7 +160,8 @@ class HiddenControl:
             peak = min(feed, math.sqrt(a * lengths[index] + 0.5 * (low * low + high * high)))
             ramps = (peak * peak - low * low + peak * peak - high * high) / (2.0 * a)
             rows.append((line, now, peak))
-            now += (2.0 * peak - low - high) / a + max(0.0, lengths[index] - ramps) / peak
+            took = (2.0 * peak - low - high) / a + max(0.0, lengths[index] - ramps) / peak
+            now += max(took, self.block_time)
         self._plan_time = now
         return rows
 
@@ -200,3 +204,36 @@ def written_program(seed: int, tools: int = 2, feeds: tuple[float, ...] = (600.0
             lines.append("G0 Z10.")
         lines += ["M5", "G91 G28 Z0. M9", "G90"]
     return "\n".join([*lines, "M30", "%"]) + "\n"
+
+
+def drawn_control(seed: int) -> HiddenControl:
+    """A control with drawn facts: no bell, unlike what is fitted, and a block time that some of it does not have."""
+    generator = random.Random(seed)
+
+    def near(usual: float, times: float) -> float:
+        """Even in the logarithm, from usual / times to usual * times."""
+        return usual * times ** generator.uniform(-1.0, 1.0)
+
+    return HiddenControl(
+        acceleration=near(1000.0, 3.0), corner_step=near(7.0, 3.0), rapid=near(350.0, 1.6), rapid_time=near(0.12, 1.6),
+        arrival=near(0.04, 2.0), tool_change=near(5.0, 1.6), spindle_per_krpm=near(0.25, 2.0), way=near(0.9, 1.5),
+        m_codes={code: generator.uniform(0.0, 2.0) for code in (3, 5, 8, 9, 30)}, start=near(1.3, 2.0),
+        block_time=generator.uniform(0.0, 0.006), operator=0.1,
+    )  # fmt: skip
+
+
+def surface_program(seed: int, rows: int = 9) -> str:
+    """Rows over a wavy surface in moves of .2 to .6 mm, as CAM systems write them."""
+    generator = random.Random(seed)
+    step, height, wave = generator.uniform(0.2, 0.6), generator.uniform(0.5, 2.0), generator.uniform(6.0, 20.0)
+    feed = generator.choice((1500.0, 2500.0))
+    lines = ["%", f"O{2000 + seed}", "G21 G90 G94 G17 G40 G80", "T1 M6", "G0 X0. Y0. S8000 M3", "Z10. M8", "Z2."]
+    lines.append(f"G1 Z-1. F{feed / 2:.0f}")
+    count = int(60.0 / step)
+    for row in range(rows):
+        lines.append(f"G1 Y{0.5 * (row + 1):.3f} F{feed:.0f}")
+        for index in range(1, count + 1):
+            x = step * (index if row % 2 == 0 else count - index)
+            z = height * math.sin(2.0 * math.pi * x / wave) * math.cos(0.4 * row) - 1.0
+            lines.append(f"X{x:.3f} Z{z:.3f}")
+    return "\n".join([*lines, "G0 Z10.", "M5", "G91 G28 Z0. M9", "G90", "M30", "%"]) + "\n"

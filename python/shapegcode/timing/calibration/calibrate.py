@@ -6,6 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,7 @@ from shapegcode.timing.calibration.motion import (
     fit_motion,
     m_codes,
     misfit,
-    parameter_intervals,
-    section_residuals,
+    parameter_covariance,
     sections_of,
     spindle_rows,
     starts_of,
@@ -40,6 +40,15 @@ from shapegcode.timing.calibration.observed import (
     timed_program,
     with_override,
 )
+from shapegcode.timing.calibration.open_times import (
+    cut_scatter,
+    function_rows,
+    is_rival,
+    kind_row,
+    kind_weights,
+    motion_rows,
+    run_scatter,
+)
 from shapegcode.timing.calibration.result import (
     TOLERANCE_PERCENT,
     FamilyScore,
@@ -49,12 +58,12 @@ from shapegcode.timing.calibration.result import (
     LearnedShare,
 )
 from shapegcode.timing.calibration.runs_file import RunsFile, load_runs
+from shapegcode.timing.interval import time_interval
 
 _Hold = tuple[float, float, str]  # begin and length in s, and why
 
 _MAX_FOLDS = 4
 _BETTER = 0.97  # a family further down the list must be better by so much to be taken
-_MIN_SPREAD = 0.005  # of what a machine takes for its cuts: no model is truer
 _MAX_HOLDS = 6  # of one run that may be true
 _CALLS = 2500  # of the misfit that one fit takes, about; for the bar
 
@@ -121,9 +130,16 @@ def learn_clock(
             best = index
     motion = fits[best]
     learned = _Learned(motion, fit_functions(fitted, motion, machine), machine)
+    weights = kind_weights(order, best)
+    rivals = [
+        (fit, fit_functions(fitted, fit, machine), weight)
+        for fit, weight in zip(fits, weights, strict=True)
+        if fit is not motion and is_rival(weight)
+    ]
     others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
     rows, warnings = _rows(observed, learned, others)
-    with_it, remarks, numbers, not_told = learned_machine(machine, motion, learned.functions, fitted)
+    with_it, remarks, numbers, not_told = learned_machine(learned, fitted, rivals, _scatters(rows, observed, learned))
+    rows = [_with_interval(row, run, with_it) for row, run in zip(rows, observed, strict=True)]
     return LearnedClock(
         machine=machine.name,
         family=motion.family.name,
@@ -236,19 +252,7 @@ def _left_out(
 def _rows(
     observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]
 ) -> tuple[list[LearnedRun], list[str]]:
-    spread = _spread(observed, learned, others)
-    rows = [_row(run, learned, others.get(id(run)), spread) for run in observed]
-    # What whole runs left out were off by is in the interval, too: a start that an operator delays, a tool at hand.
-    off = [row.left_out_percent / 100.0 for row in rows if row.left_out_percent is not None]
-    whole = 2.0 * math.sqrt(sum(each**2 for each in off) / len(off)) if off else 0.0
-    rows = [
-        replace(
-            row,
-            low_s=min(row.low_s, row.predicted_s * (1.0 - whole)),
-            high_s=max(row.high_s, row.predicted_s * (1.0 + whole)),
-        )
-        for row in rows
-    ]
+    rows = [_row(run, learned, others.get(id(run))) for run in observed]
     warnings = []
     for row in rows:
         judged = row.judged_percent
@@ -264,15 +268,10 @@ def _rows(
     return rows, warnings
 
 
-def _row(run: ObservedRun, learned: _Learned, other: _Learned | None, spread: float) -> LearnedRun:
+def _row(run: ObservedRun, learned: _Learned, other: _Learned | None) -> LearnedRun:
     starts = learned.starts(run)
     holds = _holds_of(run, starts)
     tools, kinds = _shares(run, starts, holds)
-    # Half of the 95 % interval of its time: cuts err together, what lies between them by itself.
-    lines = (each.lines for each in run.cut_sections)
-    cut = sum(float(starts[last + 1] - starts[first]) for first, last in lines)
-    between = len(run.cut_sections) * learned.functions.scatter_s**2
-    reach = 2.0 * math.sqrt((spread * cut) ** 2 + between)
     return LearnedRun(
         program=str(run.entry.program),
         log=run.log.source,
@@ -280,8 +279,8 @@ def _row(run: ObservedRun, learned: _Learned, other: _Learned | None, spread: fl
         measured_s=run.duration_s,
         held_s=sum(length for _, length, _ in holds),
         predicted_s=float(starts[-1]),
-        low_s=float(starts[-1]) - reach,
-        high_s=float(starts[-1]) + reach,
+        low_s=math.nan,
+        high_s=math.nan,
         left_out_s=float(other.starts(run)[-1]) if other is not None else None,
         feed_override=_feed_override(run),
         rapid_override=run.rapid_override,
@@ -292,24 +291,25 @@ def _row(run: ObservedRun, learned: _Learned, other: _Learned | None, spread: fl
     )
 
 
-def _spread(observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]) -> float:
-    """Root mean square of the relative error of whole sections, of runs left out where there are any."""
-    square = weight = 0.0
-    for run in observed:
-        if run.entry.use != "fit":
-            continue
-        who = others.get(id(run), learned)
-        sections = sections_of([run])
-        holds = _holds_of(run, who.starts(run))
-        for section, residual in zip(sections, section_residuals(sections, who.motion.model(who.machine)), strict=True):
-            begin, end = float(section.time_s[0]), float(section.time_s[-1])
-            if any(since < end and since + length > begin for since, length, _ in holds):
-                continue
-            took = end - begin
-            error = float(np.median(residual[-4:]) - np.median(residual[:4]))
-            square += min(error / took, 0.2) ** 2 * took if took > 0.0 else 0.0
-            weight += took
-    return max(math.sqrt(square / weight) if weight > 0.0 else 0.0, _MIN_SPREAD)
+def _scatters(rows: Sequence[LearnedRun], observed: Sequence[ObservedRun], learned: _Learned) -> tuple[float, float]:
+    """What the time between two cuts scatters by, s, and relatively what repeated runs of a program do."""
+    ratios: dict[str, list[float]] = defaultdict(list)
+    late: dict[str, list[float]] = defaultdict(list)
+    for row, run in zip(rows, observed, strict=True):
+        if row.use == "fit" and row.error_percent is not None:
+            ratios[row.program].append(1.0 / (1.0 + row.error_percent / 100.0))
+            share = next(each for each in row.kinds if each.name == "between cuts")
+            late[row.program].append((share.measured_s - share.predicted_s) / math.sqrt(max(1, len(run.cut_sections))))
+    # The same codes come again and again: where they err together, whole programs show it.
+    together = float(np.sqrt(np.mean([np.mean(each) ** 2 for each in late.values()]))) if late else 0.0
+    return max(learned.functions.scatter_s, together), run_scatter(ratios)
+
+
+def _with_interval(row: LearnedRun, run: ObservedRun, machine: Machine) -> LearnedRun:
+    """A run with the interval that `time` gives its program on the calibrated machine at the overrides of the run."""
+    interval = time_interval(run.timed.program, machine, row.feed_override, row.rapid_override)
+    half = interval.half_width_s * row.predicted_s / interval.total_s if interval and interval.total_s > 0.0 else 0.0
+    return replace(row, low_s=row.predicted_s - half, high_s=row.predicted_s + half)
 
 
 # --- what a model says of a run: when each line begins, where it was held ---------------------------------------------
@@ -434,6 +434,7 @@ def _held(holds: list[_Hold], begin_s: float, end_s: float) -> float:
 # --- the numbers of the machine file ----------------------------------------------------------------------------------
 
 _USUAL = 0.75  # of the time
+_MAX_WAY_S = 10.0  # of times.unknown_move_s
 _KNOWN = 4.0  # an interval that reaches so far from its value to both sides determines nothing
 
 
@@ -443,13 +444,18 @@ def _feed_override(run: ObservedRun) -> float:
 
 
 def learned_machine(
-    machine: Machine, motion: MotionFit, functions: FunctionFit, runs: Sequence[ObservedRun]
+    learned: _Learned,
+    runs: Sequence[ObservedRun],
+    rivals: Sequence[tuple[MotionFit, FunctionFit, float]],
+    scatters: tuple[float, float],
 ) -> tuple[Machine, dict[str, str], list[LearnedNumber], list[str]]:
-    """The machine with the calibrated parameters."""
+    """The machine with the calibrated parameters, and what the logs leave open of them."""
+    motion, functions, machine = learned.motion, learned.functions, learned.machine
     source = f"logs of {len(runs)} runs"
     values = motion.file_values()
     values.update(_function_values(functions, runs))
-    numbers, remarks = _motion_numbers(machine, motion, runs, source)
+    covariance, variances = parameter_covariance(motion, runs, machine)
+    numbers, remarks = _motion_numbers(machine, motion, variances, source)
     if math.isfinite(motion.rapid_mm_per_s):
         rate, had = motion.rapid_mm_per_s * 60.0, machine.axes.x.rapid_mm_per_min
         key, meaning = "axes.x|y|z.rapid_mm_per_min", "rate of rapids, of the fastest axis"
@@ -462,20 +468,32 @@ def learned_machine(
     ]
     if not math.isfinite(motion.rapid_mm_per_s):
         not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
+    values["times.scatter"] = {
+        "cuts_percent": round(100.0 * cut_scatter(runs, motion, machine), 3),
+        "between_cuts_s": round(scatters[0], 3),
+        "runs_percent": round(100.0 * scatters[1], 3),
+    }
+    rows = motion_rows(motion, covariance, runs, machine)
+    rows += function_rows(functions, partial(_function_values, runs=runs), lambda name: _meaning(name)[1])
+    for other, its_functions, weight in rivals:
+        rows += kind_row(other.family.name, weight, values, other.file_values() | _function_values(its_functions, runs))
+    values["times.open"] = rows
     for key in values:
-        remarks.setdefault(key, f"measured ({source})")
+        if key != "times.open":  # beside each value of its rows, once is enough: times.scatter says it
+            remarks.setdefault(key, f"measured ({source})")
     fitted = machine.with_values(values, source=f"{machine.name} with calibrated parameters")
     return fitted.with_remarks(machine.all_remarks() | remarks), remarks, numbers, not_told
 
 
 def _motion_numbers(
-    machine: Machine, motion: MotionFit, runs: Sequence[ObservedRun], source: str
+    machine: Machine, motion: MotionFit, variances: FloatArray, source: str
 ) -> tuple[list[LearnedNumber], dict[str, str]]:
-    intervals = parameter_intervals(motion, runs, machine)
     numbers, remarks = [], {}
-    for parameter in motion.family.parameters:
-        value = motion.values[parameter.name] * parameter.scale
-        low, high = (bound * parameter.scale for bound in intervals[parameter.name])
+    for parameter, variance in zip(motion.family.parameters, variances, strict=True):
+        fitted, ratio = motion.values[parameter.name], math.exp(min(1.96 * math.sqrt(variance), 5.0))
+        value = fitted * parameter.scale
+        low = max(parameter.low, fitted / ratio) * parameter.scale
+        high = min(parameter.high, fitted * ratio) * parameter.scale
         told = low > value / _KNOWN and high < value * _KNOWN
         key = parameter.key.format(axis="|".join(parameter.axes))
         had = _had(machine, parameter.key.format(axis=parameter.axes[:1]))
@@ -508,10 +526,15 @@ _FUNCTIONS = {
 }
 
 
+def _meaning(name: str) -> tuple[str, str, str]:
+    """Key, meaning and unit of a time beside the motion."""
+    return _FUNCTIONS.get(name) or ("times.m_codes", f"M{int(name[1:]):02d}", "s")
+
+
 def _function_numbers(functions: FunctionFit) -> list[LearnedNumber]:
     numbers = []
     for name, value in functions.values.items():
-        key, meaning, unit = _FUNCTIONS.get(name) or ("times.m_codes", f"M{int(name[1:]):02d}", "s")
+        key, meaning, unit = _meaning(name)
         low, high = functions.low[name], functions.high[name]
         numbers.append(_number(key, meaning, (value, low, high), unit, high - low < max(2.0, 2.0 * value)))
     return numbers
@@ -535,7 +558,7 @@ def _had(machine: Machine, key: str) -> float | None:
 def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dict[str, object]:
     values = functions.values
     codes = {code: round(value, 3) for code, value in m_codes(values).items() if round(value, 3) >= 0.005}
-    way_xy, way_z = (round(values.get(name, 0.0), 3) for name in ("move xy", "move z"))
+    way_xy, way_z = (min(round(values.get(name, 0.0), 3), _MAX_WAY_S) for name in ("move xy", "move z"))
     feed = _usual((_feed_override(run), run.duration_s or 0.0) for run in runs)
     rapid = _usual((run.rapid_override, run.duration_s or 0.0) for run in runs)
     found: dict[str, object] = {

@@ -285,6 +285,7 @@ _TYPICAL_SPREAD = 1.0  # in the logarithm
 _SEEN_SPREAD = 0.15  # of a number that the logs show
 _PRIOR = 0.01
 _MIN_STEP = 0.02  # of the numeric derivatives, in the logarithm
+_MIN_NOISE_S = 0.05  # of a window: what two readings scatter by at least
 
 
 def fit_motion(
@@ -307,7 +308,7 @@ def fit_motion(
     high = np.log([parameter.high for parameter in parameters])
     usual = {parameter.name: parameter.start for parameter in parameters} | seen
     typical = np.log([usual[parameter.name] for parameter in parameters])
-    reach = np.array([_SEEN_SPREAD if parameter.name in seen else _TYPICAL_SPREAD for parameter in parameters])
+    reach = typical_spread(parameters, runs)
     calls = 0
 
     def fit(point: FloatArray) -> MotionFit:
@@ -346,15 +347,19 @@ def fit_motion(
     return fit(best[1])
 
 
-def parameter_intervals(
+def parameter_covariance(
     fit: MotionFit, runs: Sequence[ObservedRun], machine: Machine
-) -> dict[str, tuple[float, float]]:
-    """95 % intervals of the numbers of a fit.
+) -> tuple[FloatArray, FloatArray]:
+    """(n, n) Covariance of the logarithms of a fit's parameters, and (n,) variances; 1.96 deviations are 95 %.
 
     From the derivatives of what windows of some seconds take; the scatter is that of the sections, each of which
-    counts as one (a sandwich of clusters), so that an error of the model is in it.
+    counts as one (a sandwich of clusters), so that an error of the model is in it. In the covariance what the runs do
+    not exercise keeps the spread of a usual machine; the variances are those of the runs alone.
     """
-    names = [parameter.name for parameter in fit.family.parameters]
+    from scipy.stats import t as student
+
+    parameters = fit.family.parameters
+    names = [parameter.name for parameter in parameters]
     sections = sections_of(runs)
     windows = [_windows(section) for section in sections]
 
@@ -375,22 +380,28 @@ def parameter_intervals(
         normal += slope.T @ slope
         pull = slope.T @ np.clip(error, -1.0, 1.0)
         scatter += np.outer(pull, pull)
-    inverse = np.linalg.pinv(normal + 1e-12 * np.trace(normal) * np.eye(len(names)))
-    # Few clusters understate the scatter: the usual correction, and Student's t of their number.
-    spread = inverse @ scatter @ inverse * len(centre) / max(1, len(centre) - 1)
-    from scipy.stats import t as student
-
-    reach = float(student.ppf(0.975, max(1, len(centre) - 1)))
     white = np.concatenate(centre) if centre else np.zeros(1)
-    noise = inverse * float(np.mean(np.minimum(white**2, 1.0)))
-    found = {}
-    for index, parameter in enumerate(fit.family.parameters):
-        deviation = math.sqrt(max(spread[index, index], noise[index, index], 0.0))
-        seen = normal[index, index] > 1e-6
-        ratio = math.exp(min(reach * deviation, 5.0)) if seen else math.inf
-        value = fit.values[parameter.name]
-        found[parameter.name] = max(parameter.low, value / ratio), min(parameter.high, value * ratio)
-    return found
+    noise = max(float(np.mean(np.minimum(white**2, 1.0))), _MIN_NOISE_S**2)
+    reach = typical_spread(parameters, runs)
+    # Few clusters understate the scatter: the usual correction, and Student's t of their number. They see no more
+    # directions than there are: the noise of the windows says what is at least open.
+    clusters = max(1, len(centre) - 1)
+    scatter *= len(centre) / clusters * (float(student.ppf(0.975, clusters)) / 1.96) ** 2
+
+    def covariance(known: FloatArray) -> FloatArray:
+        inverse = np.linalg.inv(normal + known)
+        return np.asarray(inverse @ scatter @ inverse + noise * inverse)
+
+    alone = 1e-12 * max(float(np.trace(normal)), 1e-6) * np.eye(len(names))
+    return covariance(noise * np.diag(reach**-2.0)), np.diag(covariance(alone))
+
+
+def typical_spread(parameters: Sequence[Parameter], runs: Sequence[ObservedRun]) -> FloatArray:
+    """(n,) Standard deviation of the logarithm of each parameter over usual machines, or by what the logs show."""
+    seen = math.isfinite(seen_arc_acceleration(runs))
+    return np.array(
+        [_SEEN_SPREAD if seen and parameter.name == "arc_acceleration" else _TYPICAL_SPREAD for parameter in parameters]
+    )
 
 
 def _windows(section: SeenSection) -> IntArray:
@@ -412,6 +423,7 @@ def _windows(section: SeenSection) -> IntArray:
 _READING_S = 0.1  # scatter of the time between two readings
 _OUTLIER = 3.0  # of it: what is further off counts less
 _RIDGE = 0.02  # pull of every number to 0, against its scatter of a reading
+_USUAL_S, _USUAL_KRPM = 2.0, 5.0  # standard deviation of a time, and of where a spindle's begins, over usual machines
 _MAX_S = 60.0
 _UNSEEN = 1e-3  # sum of derivatives, in scatters of a reading
 _TOOL_CHANGE = 6
@@ -428,6 +440,7 @@ class FunctionFit:
     values: dict[str, float]
     low: dict[str, float]  # of the 95 % intervals by name
     high: dict[str, float]
+    covariance: FloatArray  # (n, n) in the order of the values
     last_tool_in_spindle: bool  # whether the tool that a program ends with is in the spindle when it starts anew
     scatter_s: float  # root mean square of what the time between two cuts was otherwise
 
@@ -556,9 +569,13 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     # Each span is counted about twice: as a whole, and in its readings.
     slope = np.asarray(found.jac)
     spread = np.linalg.pinv(slope.T @ slope) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
+    # The same with what is usual in place of the ridge, which is a choice and no knowledge.
+    usual = np.array([_USUAL_KRPM if name.endswith("from") else _USUAL_S for name in names])
+    told = slope[: len(spans)].T @ slope[: len(spans)] / (2.0 * max(1.0, (middle / _READING_S) ** 2))
+    covariance = np.linalg.inv(told + np.diag(usual**-2.0))
     # A parameter that changes nothing is not determined.
     unseen = np.abs(slope[: len(spans)]).sum(axis=0) < _UNSEEN
     reach = np.where(unseen, _MAX_S, 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0)))
     low = {name: max(0.0, values[name] - float(each)) for name, each in zip(names, reach, strict=True)}
     high = {name: min(_MAX_S, values[name] + float(each)) for name, each in zip(names, reach, strict=True)}
-    return FunctionFit(values, low, high, kept, middle)
+    return FunctionFit(values, low, high, covariance, kept, middle)

@@ -1,0 +1,171 @@
+"""What run logs leave open of a calibrated cycle-time model, in the form in which the machine file holds it.
+
+Each row is a step of one standard deviation in one direction, independent of the others: the time of a program changes
+by the root of the sum of squares of what the rows change it by. The directions are those of the symmetric root of the
+covariance, each of which is as near as possible to one parameter (Zuber and Strimmer, 2011, "CAR scores"): so the
+squares say how much each parameter contributes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shapegcode.io.record import FloatArray
+from shapegcode.machine import Machine
+from shapegcode.settings.keys import toml
+from shapegcode.timing.calibration.motion import (
+    FunctionFit,
+    MotionFit,
+    misfit,
+    section_residuals,
+    sections_of,
+)
+from shapegcode.timing.calibration.observed import ObservedRun
+
+_Row = dict[str, object]  # of the table times.open
+
+_NO_STEP = 2e-3  # of a logarithm, or in s: what changes less is left out
+_ALONE, _SMALL = 0.1, 0.2  # steps of others that do not matter, and those within which times are straight lines
+_MIN_PART = 0.05  # of a step that times, none of which is below 0, must leave possible
+_KIND_SPREAD = 0.1  # a kind so much worse on runs left out has exp(-1/2) times the weight
+_MIN_WEIGHT = 0.02
+_BLOCK_TIME = "controller.look_ahead_block_time_s"
+_USUAL_BLOCK_TIME_S = 0.002 * math.e  # one deviation above that of a usual machine
+_NOTICED = 0.01  # of the misfit: what one deviation from a usual machine costs in the fit
+# What a model says wrongly of the cuts of a tool, before any log is seen, and for how many tools that counts
+_USUAL_CUTS, _USUAL_TOOLS = 0.01, 4
+_USUAL_RUNS = 0.003  # scatter between repeated runs where no program was run twice
+
+
+def kind_weights(scores: Sequence[float], best: int) -> list[float]:
+    """Probability of each kind of look-ahead, by what it says of runs left out."""
+    least = max(scores[best], 1e-9)
+    found = [math.exp(-0.5 * (max(0.0, score / least - 1.0) / _KIND_SPREAD) ** 2) for score in scores]
+    return [each / sum(found) for each in found]
+
+
+def is_rival(weight: float) -> bool:
+    """Whether a kind of look-ahead of that probability is worth a row."""
+    return weight >= _MIN_WEIGHT
+
+
+def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedRun], machine: Machine) -> list[_Row]:
+    """A row for each parameter of the motion, and one for a block time that the model does not have."""
+    base, parameters = fit.file_values(), fit.family.parameters
+    rows = []
+    for index, step in enumerate(_symmetric_root(covariance).T):
+        parameter, others = parameters[index], np.delete(np.abs(step), index)
+        # The slower way, and all of it: there a limit shows that nothing has reached yet. But where others must make
+        # up for it they do so for small steps alone.
+        part = 1.0 if others.max(initial=0.0) < _ALONE else min(1.0, _SMALL / float(np.abs(step).max()))
+        part *= 1.0 if parameter.unit == "s" else -1.0
+        values = {
+            each.name: min(max(fit.values[each.name] * math.exp(part * change), each.low), each.high)
+            for each, change in zip(parameters, step, strict=True)
+            if abs(change) > _NO_STEP
+        }
+        rows += _row(parameter.meaning, base, replace(fit, values=fit.values | values).file_values(), part**-2)
+    if fit.family.motion == "look_ahead" and not any(each.key == _BLOCK_TIME for each in parameters):
+        block_time = _unnoticed_block_time(fit, runs, machine)
+        rows += _row("time in which a block is read", base, base | {_BLOCK_TIME: float(f"{block_time:.3g}")})
+    return rows
+
+
+def _unnoticed_block_time(fit: MotionFit, runs: Sequence[ObservedRun], machine: Machine) -> float:
+    """The largest block time that a usual machine has and the logs do not contradict, s."""
+    sections, model = sections_of(runs), fit.model(machine)
+    before, block_time = misfit(sections, model), _USUAL_BLOCK_TIME_S
+    while block_time > 1e-4:
+        limits = model.limits
+        limits.block_time_s = block_time
+        model.limits = limits
+        if misfit(sections, model) <= before + _NOTICED:
+            break
+        block_time /= 1.5
+    return block_time
+
+
+def function_rows(
+    functions: FunctionFit,
+    file_values: Callable[[FunctionFit], Mapping[str, object]],
+    meaning: Callable[[str], str],
+) -> list[_Row]:
+    """A row for each time beside the motion."""
+    names, base = list(functions.values), file_values(functions)
+    value = np.array(list(functions.values.values()))
+    rows = []
+    for name, step in zip(names, _symmetric_root(functions.covariance).T, strict=True):
+        # No time is below 0: a smaller step, or the other way, keeps the sums that the logs tell.
+        parts = {sign: _possible(value, sign * step) for sign in (1.0, -1.0)}
+        sign = max(parts, key=lambda each: parts[each])
+        part = max(min(parts[sign], _SMALL / float(np.abs(step).max())), _MIN_PART)
+        moved = np.maximum(value + sign * part * step, 0.0)
+        changed = replace(functions, values=dict(zip(names, moved.tolist(), strict=True)))
+        rows += _row(meaning(name), base, file_values(changed), weight=part**-2)
+    return rows
+
+
+def _possible(value: FloatArray, step: FloatArray) -> float:
+    """The part of a step, at most 1, that leaves no value below 0."""
+    falls = step < -_NO_STEP
+    return min(1.0, float(np.min(value[falls] / -step[falls], initial=1.0)))
+
+
+def kind_row(name: str, weight: float, base: Mapping[str, object], other: Mapping[str, object]) -> list[_Row]:
+    """The row of another kind of look-ahead."""
+    return _row(f"kind of look-ahead ({name})", base, other, weight=weight)
+
+
+def _row(name: str, base: Mapping[str, object], other: Mapping[str, object], weight: float = 1.0) -> list[_Row]:
+    # A key that the other kind leaves out is one that it does not look at.
+    values = [f"{key} = {toml(value)}" for key, value in other.items() if value is not None and value != base.get(key)]
+    return [{"name": name, "values": values, "weight": float(f"{weight:.4g}")}] if values else []
+
+
+def _symmetric_root(covariance: FloatArray) -> FloatArray:
+    """(n, n) L of the covariance L L^T, whose column i is the direction nearest to parameter i."""
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-18))
+    value, vector = np.linalg.eigh(covariance / np.outer(deviation, deviation))
+    return np.asarray(deviation[:, None] * ((vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T))
+
+
+# --- what no parameter explains ---------------------------------------------------------------------------------------
+
+
+def cut_scatter(runs: Sequence[ObservedRun], fit: MotionFit, machine: Machine) -> float:
+    """Relative standard deviation of what the cuts of a tool take, over the programs and their tools.
+
+    A tool does one kind of work, for which the model may be wrong throughout; of two tools it is wrong independently.
+    """
+    from scipy.stats import t as student
+
+    sums: dict[tuple[int, int], list[float]] = defaultdict(lambda: [0.0, 0.0])
+    for run in runs:
+        sections = sections_of([run])
+        for section, residual in zip(sections, section_residuals(sections, fit.model(machine)), strict=True):
+            took = float(section.time_s[-1] - section.time_s[0])
+            error = float(np.median(residual[-4:]) - np.median(residual[:4]))
+            if took > 0.0:
+                of = sums[id(run.timed), int(run.timed.tools[section.line[0]])]
+                of[0] += max(-0.2 * took, min(error, 0.2 * took))
+                of[1] += took
+    # Each tool counts by its time, together as many as they are.
+    whole = sum(took for _, took in sums.values())
+    square = sum(error**2 / took for error, took in sums.values()) / whole if whole > 0.0 else 0.0
+    freedom = _USUAL_TOOLS + len(sums)
+    pooled = (_USUAL_TOOLS * _USUAL_CUTS**2 + len(sums) * square) / freedom
+    return math.sqrt(pooled) * float(student.ppf(0.975, freedom)) / 1.96
+
+
+def run_scatter(ratios: Mapping[str, Sequence[float]]) -> float:
+    """Relative standard deviation between repeated runs, from measured over predicted time by program."""
+    repeated = [np.asarray(each) for each in ratios.values() if len(each) > 1]
+    freedom = sum(len(each) - 1 for each in repeated)
+    if not freedom:
+        return _USUAL_RUNS
+    return math.sqrt(sum(float(((each / each.mean() - 1.0) ** 2).sum()) for each in repeated) / freedom)
