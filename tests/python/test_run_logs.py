@@ -297,7 +297,7 @@ def test_a_silence_within_a_run_is_a_gap(tmp_path: Path) -> None:
     assert any(note.startswith("line 12: nothing for 3601.0 s before it") for note in run.notes)
 
 
-def test_a_clock_that_was_set_is_told_by_the_control_s_own_seconds(tmp_path: Path) -> None:
+def test_a_clock_that_was_set_is_narrowed_by_the_control_s_own_seconds(tmp_path: Path) -> None:
     """Ten seconds within the run are no gap, but the control did not count them."""
     late = LOG.replace("08:10:05", "08:10:15").replace("08:10:06.25", "08:10:16.25")
     run = only(tmp_path, late.replace("08:10:15", "08:10:15.0Z|Program_Runtime_Seconds|5\n2026-03-02T08:10:15"))

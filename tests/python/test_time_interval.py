@@ -59,7 +59,7 @@ def half_width(time: sg.CycleTime) -> float:
 
 def test_without_calibrated_data_there_is_no_interval() -> None:
     time = sg.cycle_time(PROGRAM, sg.Machine.load("vx500"), full=False)
-    assert (time.total_low_s, time.total_high_s, time.interval_parts, time.told_by) == (None, None, (), None)
+    assert (time.total_low_s, time.total_high_s, time.interval_parts, time.narrowed_by) == (None, None, (), None)
     assert "±" not in time.answer
     with pytest.raises(sg.ArgumentError, match=r"states no times\.scatter"):
         sg.cycle_time(PROGRAM, sg.Machine.load("vx500"), full=False, log_next=[PROGRAM])
@@ -85,7 +85,7 @@ def test_directions_and_scatters_add_by_their_squares() -> None:
     assert time.interval_parts[0].half_width_s == pytest.approx(1.96 * 2.0)
     assert time.interval_parts[0].share == pytest.approx(4.0 / sum(variances))
     assert sum(part.share for part in time.interval_parts) == pytest.approx(1.0)
-    assert "tool change stands alone" in (time.told_by or "")
+    assert "tool change stands alone" in (time.narrowed_by or "")
 
 
 @pytest.mark.parametrize("value", [(5.0, 2.0), (5.0, 0.05), (0.1, 2.0)])
@@ -118,7 +118,7 @@ def test_a_block_time_that_no_log_showed_costs_small_moves_alone() -> None:
     surface = sg.cycle_time(surface_program(1), with_rows, full=False)
     assert half_width(pockets) < 0.002 * pockets.cycle_time_s
     assert half_width(surface) > 0.1 * surface.cycle_time_s
-    assert "many moves below 0." in (surface.told_by or "")
+    assert "many moves below 0." in (surface.narrowed_by or "")
     found = sg.cycle_time(surface_program(1), with_rows, full=False, log_next=[long_moves, surface_program(2)])
     assert found.log_next[0].half_width_s < 0.01 * half_width(surface)
     assert found.log_next[1].half_width_s == pytest.approx(half_width(surface), rel=0.1)

@@ -71,6 +71,6 @@ def run(args: argparse.Namespace) -> int:
         )
         if given is None and percent != 100.0
     ]
-    narrower = [f"to narrow the interval most, log {time.told_by}"] if time.told_by else []
+    narrower = [f"to narrow the interval most, log {time.narrowed_by}"] if time.narrowed_by else []
     notes = [*narrower, *usual, *([shaped] if (shaped := shaped_note(program)) else []), *([note] if free else [])]
     return runner.finish(time if args.blocks else time.without_blocks(), args, tables=time.tables(), notes=notes)

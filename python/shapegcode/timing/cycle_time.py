@@ -93,7 +93,7 @@ def cycle_time(
         total_low_s=max(0.0, timed.total_s - interval.half_width_s) if interval else None,
         total_high_s=timed.total_s + interval.half_width_s if interval else None,
         interval_parts=interval.parts() if interval else (),
-        told_by=interval.told_by() if interval else None,
+        narrowed_by=interval.narrowed_by() if interval else None,
         log_next=_log_next(interval, others, machine, (feed_override, rapid_override)),
         full_interpolation_s=_core.interpolate_program(program.core, model).total_s if full else None,
         tools=tuple(

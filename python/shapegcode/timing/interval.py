@@ -88,7 +88,7 @@ class TimeInterval:
         parts = [OpenPart(name, _DEVIATIONS * math.sqrt(each), each / whole) for name, each in found.items() if each]
         return tuple(sorted(parts, key=lambda part: -part.share))
 
-    def told_by(self) -> str:
+    def narrowed_by(self) -> str:
         """What a program must hold that would narrow it, in words; no log narrows what scatters between runs."""
         name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
         text = next((text for word, text in _TELLS.items() if word in name), f"a program in which {name} stands alone")

@@ -146,7 +146,7 @@ class CycleTime(TimeParts, Result):
         total_low_s: lower end of the 95 % interval of the whole; None: the machine was not calibrated with run logs.
         total_high_s: upper end; None: likewise.
         interval_parts: what the interval is made of, the largest first; empty: likewise.
-        told_by: what a program must hold whose log would narrow the interval most, in words; None: likewise.
+        narrowed_by: what a program must hold whose log would narrow the interval most, in words; None: likewise.
         log_next: programs that could be logged next, the most useful first; empty unless asked for.
         full_interpolation_s: the whole time by giving every set-point; None: not asked for.
         tools: per tool, in the order of first use.
@@ -165,7 +165,7 @@ class CycleTime(TimeParts, Result):
     total_low_s: float | None
     total_high_s: float | None
     interval_parts: tuple[OpenPart, ...]
-    told_by: str | None
+    narrowed_by: str | None
     log_next: tuple[LogNext, ...]
     full_interpolation_s: float | None
     tools: tuple[ToolTime, ...]
