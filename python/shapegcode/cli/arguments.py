@@ -217,7 +217,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "identify": (
         "shapegcode identify tap1.csv tap2.csv tap3.csv --axis x --update mine.toml --plots plots",
         "shapegcode identify --tap-plan -m mine.toml",
-        "shapegcode identify phone.csv --sweep SWEEP-X.NC -m mine.toml --update mine.toml",
     ),
     "sweep": (
         "shapegcode sweep -m mine.toml --axis x -o SWEEP-X.NC",
@@ -254,7 +253,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "input": (
         "input", "inputs", "files", "dump", "name", "kind", "machine", "set", "program", "against", "shaped", "lines",
         "answers", "base", "programs", "compensation", "cut", "mode", "uncertainty", "axes", "axis", "units", "box",
-        "override", "rapid_override", "part_mass", "shell", "sweep",
+        "override", "rapid_override", "part_mass", "shell", "sweep", "log_next",
     ),
     "what to do": ("write", "fit", "servo", "runs", "tap_plan", "list_families"),
     "what to shape": (

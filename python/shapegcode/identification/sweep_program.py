@@ -64,7 +64,7 @@ class SweptBand:
     duration_s: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class SweepProgram(Result):
     """A program that shakes an axis.
 
