@@ -136,9 +136,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
         found = _in_responses(measured, sought)
     modes = found.modes
     if not responses[0].scaled:
-        modes = tuple(
-            IdentifiedMode(m.frequency_hz, m.damping_ratio, refusal=m.refusal, left_out=m.left_out) for m in modes
-        )
+        modes = tuple(replace(m, mass_kg=None, damping_n_s_per_m=None, stiffness_n_per_m=None) for m in modes)
     lines = [found.model[0]] * len(used) if one_point and len(used) > 1 else list(found.model)
     left = np.concatenate([each.response - model for each, model in zip(used, lines, strict=True)])
     return Identification(
@@ -320,7 +318,7 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
     most = sought.modes or sought.max_modes or _MAX_MODES
     supported.sort(key=_height, reverse=True)
     over = {id(mode) for mode in supported[most:]}
-    least = _SMALL * max(map(_height, supported), default=0.0)
+    least = _SMALL * _height(supported[0]) if supported else 0.0
     return [
         replace(mode, refusal=_BEYOND, left_out=True)
         if id(mode) in over
@@ -429,8 +427,8 @@ def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], soug
         values, spread = _logarithms(window, known, index, measured, others)
         mode = mode_estimates(values, spread)
         dull = _excitation_refusal(mode.frequency_hz.value, measured)
-        refusal = _refusal(window, index, mode, measured, pool, sought)
-        found.append(replace(mode, refusal=dull or refusal, left_out=bool(dull)))
+        refusal = dull or _refusal(window, index, mode, measured, pool, sought)
+        found.append(replace(mode, refusal=refusal, left_out=bool(dull)))
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,6 @@ from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
 from shapegcode.identification.checks import Prepared, RecordUse, prepare
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
-from shapegcode.identification.known_command import find_modes_of_command, known_command
 from shapegcode.identification.model_search import (
     ACCEPTED_PERCENT,
     MAX_MODES,
@@ -41,8 +40,10 @@ from shapegcode.io.read import read_measurement
 from shapegcode.io.record import FloatArray, Quantity, ReadOptions, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.taps import is_klipper, read_sweep
-from shapegcode.machine import Machine
-from shapegcode.program import Program
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+    from shapegcode.program import Program
 
 _LARGEST_MODEL = 99
 _MIN_SAMPLES = 3
@@ -111,50 +112,47 @@ def identify(
     sought = Sought(band_hz, max_modes, modes, accepted_percent, window_s)
     if sweep is not None and (machine is None or response is not None):
         raise ArgumentError("a sweep needs the machine whose controller ran it, and files or records")
-    # The matrices are small: further threads of BLAS would wait for each other, up to twenty times as long.
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _identify(sources, names, sought, options or ReadOptions(), start_s, sweep, machine, strict)
-
-
-def _identify(
-    sources: Sequence[Any],
-    names: tuple[str, ...],
-    sought: Sought,
-    options: ReadOptions,
-    start_s: float | None,
-    sweep: Program | str | Path | None,
-    machine: Machine | str | Path | None,
-    strict: bool,
-) -> Identification:
+    options = options or ReadOptions()
     ready: Prepared | None = None
     try:
-        if sweep is not None and machine is not None:
-            return find_modes_of_command(known_command(sweep, Machine.of(machine)), sources, options, sought)
-        swept = _swept(sources, options)
-        if swept is not None:
-            return find_swept_modes(swept, names, sought)
-        records: list[Record] = []
-        responses: list[FrequencyResponse] = []
-        for each in sources:
-            for one in [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options):
-                if isinstance(one, Record):
-                    records.append(one)
-                else:
-                    responses.append(one)
-        if responses and records:
-            raise RecordError(
-                f"{responses[0].source} is a frequency response, {records[0].source} a record over time: identify them "
-                "apart"
-            )
-        if responses:
-            return find_frf_modes(responses, names, sought)
-        ready = prepare(records, band_hz=None if sought.band_hz is None else sought.band_hz[1], start_s=start_s)
-        return find_modes(ready, names, sought)
+        # The matrices are small: further threads of BLAS would wait for each other, up to twenty times as long.
+        with threadpool_limits(limits=1, user_api="blas"):
+            if sweep is not None and machine is not None:
+                # A simulated control, which no tap needs.
+                from shapegcode.identification.known_command import find_modes_of_command, known_command
+
+                return find_modes_of_command(known_command(sweep, machine), sources, options, sought)
+            swept = _swept(sources, options)
+            if swept is not None:
+                return find_swept_modes(swept, names, sought)
+            records, responses = _measured(sources, options)
+            if responses:
+                return find_frf_modes(responses, names, sought)
+            ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
+            return find_modes(ready, names, sought)
     except (ArgumentError, NumericError) as error:
         if strict:
             raise
         told: dict[str, Any] = {} if ready is None else {"warnings": ready.warnings, "notes": ready.notes}
         return Identification(files=names, prepared=ready, reason=str(error), **told)
+
+
+def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record], list[FrequencyResponse]]:
+    """Records over time or frequency responses: either of both is empty."""
+    records: list[Record] = []
+    responses: list[FrequencyResponse] = []
+    for each in sources:
+        for one in [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options):
+            if isinstance(one, Record):
+                records.append(one)
+            else:
+                responses.append(one)
+    if responses and records:
+        raise RecordError(
+            f"{responses[0].source} is a frequency response, {records[0].source} a record over time: identify them "
+            "apart"
+        )
+    return records, responses
 
 
 def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from scipy.signal import czt, resample_poly
 from shapegcode.errors import RecordError
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
-from shapegcode.identification.result import Identification, IdentifiedMode, Sweep
+from shapegcode.identification.result import Identification, Sweep
 from shapegcode.identification.sweep_program import commanded, moving_parts
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_records
@@ -85,8 +86,9 @@ class KnownCommand:
         return np.asarray(np.cumsum(np.cumsum(self.kicks)) * self.period_s)
 
 
-def known_command(program: str | Path | Program, machine: Machine) -> KnownCommand:
+def known_command(program: str | Path | Program, machine: Machine | str | Path) -> KnownCommand:
     """The command of the axis that a program shakes, as the machine's controller makes it."""
+    machine = Machine.of(machine)
     if not isinstance(program, Program):
         program = Program.read(program, machine)
     positions, period_s = commanded(program, machine)
@@ -120,8 +122,6 @@ def find_modes_of_command(
     first, lines = aligned[0], responses[0].frequency_hz
     return replace(
         found,
-        modes=tuple(_massless(mode) for mode in found.modes),
-        refused=tuple(_massless(mode) for mode in found.refused),
         notes=(*(note for each in aligned for note in each.notes), *found.notes),
         responses=(),
         fitted_lines=(),
@@ -143,11 +143,6 @@ def _between(each: FrequencyResponse, low_hz: float, high_hz: float) -> Frequenc
     assert each.coherence is not None
     lines, coherence = each.response[inside], each.coherence[inside]
     return replace(each, frequency_hz=each.frequency_hz[inside], response=lines, coherence=coherence)
-
-
-def _massless(mode: IdentifiedMode) -> IdentifiedMode:
-    """Without a force there is neither mass nor stiffness."""
-    return replace(mode, mass_kg=None, damping_n_s_per_m=None, stiffness_n_per_m=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +175,11 @@ class _Spectra:
         """(n,) i omega."""
         return np.asarray(2j * np.pi * self.hertz)
 
+    @cached_property
+    def power(self) -> FloatArray:
+        """(n,) of the command."""
+        return np.asarray(np.sum(np.abs(self.command) ** 2, axis=0), dtype=np.float64)
+
     def late(self, lags_s: FloatArray) -> _Spectra:
         """The same with the response of each part so much earlier."""
         return replace(self, response=self.response * np.exp(self.turn * lags_s[:, None]))
@@ -190,8 +190,7 @@ class _Spectra:
 
     def ratio(self) -> ComplexArray:
         """(n,) response over command, by least squares over the parts."""
-        power = np.sum(np.abs(self.command) ** 2, axis=0)
-        return np.asarray(np.sum(np.conj(self.command) * self.response, axis=0) / np.maximum(power, 1e-300))
+        return np.asarray(np.sum(np.conj(self.command) * self.response, axis=0) / np.maximum(self.power, 1e-300))
 
     def in_twos(self, rows: npt.NDArray[np.intp]) -> _Spectra:
         """Sums of the parts 0 and 1, 2 and 3, ...: what one leaves in the next is within one window."""
@@ -354,7 +353,7 @@ class _Clock:
 
     def _refine(self, spectra: _Spectra, rows: npt.NDArray[np.intp]) -> None:
         """The rate for which the parts agree best on one response."""
-        power = np.maximum(np.sum(np.abs(spectra.command) ** 2, axis=0), 1e-300)
+        power = np.maximum(spectra.power, 1e-300)
         middles = np.array([np.mean(self.windows[row]) for row in rows])
         middle = float(middles.mean())
         crossed = np.conj(spectra.command) * spectra.response
@@ -392,8 +391,7 @@ class _Clock:
 
     def _response(self, spectra: _Spectra) -> FrequencyResponse:
         """Minus the response over the command where the command excites and parts agree."""
-        ratio = spectra.ratio()
-        power = np.sum(np.abs(spectra.command) ** 2, axis=0)
+        ratio, power = spectra.ratio(), spectra.power
         left = np.sum(np.abs(spectra.response - ratio * spectra.command) ** 2, axis=0) / max(
             len(spectra.command) - 1, 1
         )
@@ -418,7 +416,9 @@ class _Clock:
         power = power[used]
         lowest = np.cumsum(power) <= _LOWEST_SHARE * np.sum(power)
         ratio = ratio * best * (np.sign(np.sum((unit * best * power)[lowest].real)) or 1.0)
-        return FrequencyResponse(self.record.source, hertz, -ratio, "acceleration", coherence, self.command.axis)
+        return FrequencyResponse(
+            self.record.source, hertz, -ratio, "acceleration", coherence, self.command.axis, scaled=False
+        )
 
 
 def _in_place(spectra: _Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -301,14 +301,13 @@ def fit_motion(
     from scipy.optimize import minimize
 
     sections = sections_of(runs)
-    across = seen_arc_acceleration(runs)
-    seen = {"arc_acceleration": across} if math.isfinite(across) else {}
+    seen = _seen(runs)
     parameters = family.parameters
     low = np.log([parameter.low for parameter in parameters])
     high = np.log([parameter.high for parameter in parameters])
     usual = {parameter.name: parameter.start for parameter in parameters} | seen
     typical = np.log([usual[parameter.name] for parameter in parameters])
-    reach = typical_spread(parameters, runs)
+    reach = _typical_spread(parameters, seen)
     calls = 0
 
     def fit(point: FloatArray) -> MotionFit:
@@ -382,7 +381,7 @@ def parameter_covariance(
         scatter += np.outer(pull, pull)
     white = np.concatenate(centre) if centre else np.zeros(1)
     noise = max(float(np.mean(np.minimum(white**2, 1.0))), _MIN_NOISE_S**2)
-    reach = typical_spread(parameters, runs)
+    reach = _typical_spread(parameters, _seen(runs))
     # Few clusters understate the scatter: the usual correction, and Student's t of their number. They see no more
     # directions than there are: the noise of the windows says what is at least open.
     clusters = max(1, len(centre) - 1)
@@ -396,12 +395,15 @@ def parameter_covariance(
     return covariance(noise * np.diag(reach**-2.0)), np.diag(covariance(alone))
 
 
-def typical_spread(parameters: Sequence[Parameter], runs: Sequence[ObservedRun]) -> FloatArray:
+def _seen(runs: Sequence[ObservedRun]) -> dict[str, float]:
+    """Parameters that the logs show, by name."""
+    across = seen_arc_acceleration(runs)
+    return {"arc_acceleration": across} if math.isfinite(across) else {}
+
+
+def _typical_spread(parameters: Sequence[Parameter], seen: Container[str]) -> FloatArray:
     """(n,) Standard deviation of the logarithm of each parameter over usual machines, or by what the logs show."""
-    seen = math.isfinite(seen_arc_acceleration(runs))
-    return np.array(
-        [_SEEN_SPREAD if seen and parameter.name == "arc_acceleration" else _TYPICAL_SPREAD for parameter in parameters]
-    )
+    return np.array([_SEEN_SPREAD if parameter.name in seen else _TYPICAL_SPREAD for parameter in parameters])
 
 
 def _windows(section: SeenSection) -> IntArray:
