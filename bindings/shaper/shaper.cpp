@@ -4,6 +4,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -27,12 +28,14 @@ namespace {
 using shapegcode::Mode;
 using shapegcode::Shaper;
 
-Mode checked_mode(double frequency_hz, double damping_ratio, double participation) {
-  const Mode mode{frequency_hz, damping_ratio, participation};
+Mode checked_mode(double frequency_hz, double damping_ratio, double participation = 1.0,
+                  const std::array<double, 3>& excited_by = {}) {
+  const Mode mode{frequency_hz, damping_ratio, participation, excited_by};
   static_cast<void>(shapegcode::pole(mode));  // checks frequency and damping
-  if (!std::isfinite(participation)) {
+  for (const double share : {participation, excited_by[0], excited_by[1], excited_by[2]}) {
+    if (std::isfinite(share)) continue;
     std::ostringstream message;
-    message << "mode at " << frequency_hz << " Hz has participation " << participation << ", must be finite";
+    message << "mode at " << frequency_hz << " Hz has a participation or excitation of " << share << ", must be finite";
     throw shapegcode::Error(shapegcode::ErrorKind::argument, message.str());
   }
   return mode;
@@ -50,44 +53,56 @@ py::array_t<double> read_only_view(const std::vector<double>& values, const py::
 }
 
 void register_mode(py::module_& m) {
-  py::class_<Mode>(m, "Mode", R"(One vibration mode of one axis, base-excited by the axis command. Immutable.
+  py::class_<Mode>(
+      m, "Mode",
+      R"(One vibration mode as it moves one axis, base-excited by the command of that axis or of others. Immutable.
 
 Args:
     frequency_hz: Undamped natural frequency in Hz, above 0.
     damping_ratio: Damping ratio (no unit), 0 <= zeta < 1.
     participation: Share of this mode's relative deflection in the response (no unit), finite.
+    excited_by: Shares of the accelerations of X, Y and Z that excite it (no unit), finite; all zero: that of the axis
+        which it moves, whole.
 
 Raises:
     ArgumentError: A value is outside its range.)")
       .def(py::init(&checked_mode), py::arg("frequency_hz"), py::arg("damping_ratio") = 0.0,
-           py::arg("participation") = 1.0,
+           py::arg("participation") = 1.0, py::arg("excited_by") = std::array<double, 3>{},
            "Make a mode; ArgumentError if a value is outside the range that the class states.")
       .def_readonly("frequency_hz", &Mode::frequency_hz, "Undamped natural frequency in Hz.")
       .def_readonly("damping_ratio", &Mode::damping_ratio, "Damping ratio, no unit.")
       .def_readonly("participation", &Mode::participation,
                     "Share of this mode's relative deflection in the response, no unit.")
+      .def_readonly("excited_by", &Mode::excited_by,
+                    "Shares of the accelerations of X, Y, Z that excite it; all zero: that of the axis it moves.")
       .def_property_readonly("pole", &shapegcode::pole,
                              "Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (paper 002, eq. 7).")
       .def("__repr__",
            [](const Mode& self) {
              return "Mode(frequency_hz=" + repr(self.frequency_hz) + ", damping_ratio=" + repr(self.damping_ratio) +
-                    ", participation=" + repr(self.participation) + ")";
+                    ", participation=" + repr(self.participation) +
+                    (self.crosses() ? ", excited_by=" + py::repr(py::cast(self.excited_by)).cast<std::string>() : "") +
+                    ")";
            })
       .def(
           "__eq__",
           [](const Mode& self, const Mode& other) {
             return self.frequency_hz == other.frequency_hz && self.damping_ratio == other.damping_ratio &&
-                   self.participation == other.participation;
+                   self.participation == other.participation && self.excited_by == other.excited_by;
           },
           py::is_operator())
       .def("__hash__",
            [](const Mode& self) {
-             return py::hash(py::make_tuple(self.frequency_hz, self.damping_ratio, self.participation));
+             return py::hash(py::make_tuple(self.frequency_hz, self.damping_ratio, self.participation,
+                                            self.excited_by[0], self.excited_by[1], self.excited_by[2]));
            })
       .def(py::pickle(
-          [](const Mode& self) { return py::make_tuple(self.frequency_hz, self.damping_ratio, self.participation); },
+          [](const Mode& self) {
+            return py::make_tuple(self.frequency_hz, self.damping_ratio, self.participation, self.excited_by);
+          },
           [](const py::tuple& state) {
-            return checked_mode(state[0].cast<double>(), state[1].cast<double>(), state[2].cast<double>());
+            return checked_mode(state[0].cast<double>(), state[1].cast<double>(), state[2].cast<double>(),
+                                state[3].cast<std::array<double, 3>>());
           }));
 }
 
@@ -134,7 +149,7 @@ Returns:
 
 Source: paper 002, eq. 8.)")
       .def("residual", py::vectorize([](const Shaper* self, double frequency_hz, double damping_ratio) {
-             return shapegcode::residual_ratio(*self, checked_mode(frequency_hz, damping_ratio, 1.0));
+             return shapegcode::residual_ratio(*self, checked_mode(frequency_hz, damping_ratio));
            }),
            py::arg("frequency_hz"), py::arg("damping_ratio") = 0.0,
            R"(Residual vibration over frequency: `residual_ratio` of modes of these frequencies.
@@ -169,7 +184,7 @@ void register_designs(py::module_& m) {
           if (damping_ratio) throw Error(ErrorKind::argument, "damping_ratio is given, but the mode has its own");
           return shapegcode::zv(*given);
         }
-        return shapegcode::zv(checked_mode(std::get<double>(mode), damping_ratio.value_or(0.0), 1.0));
+        return shapegcode::zv(checked_mode(std::get<double>(mode), damping_ratio.value_or(0.0)));
       },
       py::arg("mode"), py::arg("damping_ratio") = py::none(), release_gil(),
       R"(Zero-vibration shaper of one mode: impulses at 0 and half the damped period.

@@ -33,23 +33,25 @@ class NumericError(ShapegcodeError):
     """
 class Mode:
     """
-    One vibration mode of one axis, base-excited by the axis command. Immutable.
+    One vibration mode as it moves one axis, base-excited by the command of that axis or of others. Immutable.
     
     Args:
         frequency_hz: Undamped natural frequency in Hz, above 0.
         damping_ratio: Damping ratio (no unit), 0 <= zeta < 1.
         participation: Share of this mode's relative deflection in the response (no unit), finite.
+        excited_by: Shares of the accelerations of X, Y and Z that excite it (no unit), finite; all zero: that of the axis
+            which it moves, whole.
     
     Raises:
         ArgumentError: A value is outside its range.
     """
     def __eq__(self, arg0: Mode) -> bool:
         ...
-    def __getstate__(self) -> tuple[float, float, float]:
+    def __getstate__(self) -> tuple[float, float, float, typing.Annotated[list[float], "FixedSize(3)"]]:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, frequency_hz: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, participation: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+    def __init__(self, frequency_hz: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, participation: typing.SupportsFloat | typing.SupportsIndex = 1.0, excited_by: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] = [0.0, 0.0, 0.0]) -> None:
         """
         Make a mode; ArgumentError if a value is outside the range that the class states.
         """
@@ -61,6 +63,11 @@ class Mode:
     def damping_ratio(self) -> float:
         """
         Damping ratio, no unit.
+        """
+    @property
+    def excited_by(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
+        """
+        Shares of the accelerations of X, Y, Z that excite it; all zero: that of the axis it moves.
         """
     @property
     def frequency_hz(self) -> float:

@@ -241,6 +241,40 @@ TEST_CASE("contour solver: refuses what it cannot solve") {
   CHECK_NOTHROW(solve(2, 0));
 }
 
+TEST_CASE("contour kernel: what one axis does to another through a mode") {
+  const Fir shaper = shaper_on_half_grid(0.005);
+  const double h = 0.0025;
+  const std::vector<Mode> modes{{46.0, 0.0, 0.4, {0.0, 0.5, 0.0}}, {70.0, 0.01, 1.0}};
+  CHECK(contour_kernel(shaper, modes, h, ContourTarget::command, {2, 1}).empty());
+  CHECK(contour_kernel(shaper, modes, h, ContourTarget::response, {2, 0}).empty());
+  // Its own axis does not know of the mode that Y excites.
+  const std::vector<Mode> own{modes[1]};
+  CHECK(contour_kernel(shaper, modes, h, ContourTarget::response, {2, 2}) ==
+        contour_kernel(shaper, own, h, ContourTarget::response));
+  const Column kernel = contour_kernel(shaper, modes, h, ContourTarget::response, {2, 1});
+  double sum = 0.0;
+  double moment = 0.0;
+  for (std::size_t k = 0; k < kernel.size(); ++k) {
+    sum += kernel[k];
+    moment += kernel[k] * static_cast<double>(k);
+  }
+  CHECK(std::abs(sum) < 1e-12);  // a steady motion of Y leaves Z where it is
+  CHECK(std::abs(moment) < 1e-9);
+  // As in the case below, times participation and excitation, and without the command itself.
+  const double w = 2.0 * 3.14159265358979323846 * 46.0;
+  const Column plain = contour_kernel(shaper, modes, h, ContourTarget::command);
+  const auto ring = [&](double time) { return time > 0.0 ? std::sin(w * time) / w : 0.0; };
+  for (std::size_t k = 0; k < plain.size(); ++k) {
+    double expected = 0.0;
+    for (std::size_t j = 0; j <= k; ++j) {
+      const double time = static_cast<double>(k - j) * h;
+      expected -= 0.4 * 0.5 * plain[j] / h * (ring(time + h) - 2.0 * ring(time) + ring(time - h));
+    }
+    CAPTURE(k);
+    CHECK(kernel[k] == doctest::Approx(expected).epsilon(0.002));
+  }
+}
+
 TEST_CASE("contour kernel: the shaper's taps, or the response to a unit step of the command seen as increments") {
   const Fir shaper = shaper_on_half_grid(0.005);
   const std::vector<Mode> mode{{46.0, 0.02, 1.0}};

@@ -59,6 +59,7 @@ double command_at(double t) {
 }
 
 AxisModes on_x(std::vector<Mode> modes) { return {std::move(modes), {}, {}}; }
+AxisModes on_z(Mode mode) { return {std::vector<Mode>{}, std::vector<Mode>{}, std::vector<Mode>{mode}}; }
 
 }  // namespace
 
@@ -249,6 +250,39 @@ TEST_CASE("modal: a mode far above the set-point rate is propagated exactly too"
     CHECK(plant.deflection()[0] == doctest::Approx(100.0 * o.after_velocity_jump(i * 5e-3)).epsilon(1e-9));
   }
   CHECK(plant.peak()[0] > 0.97 * 100.0 / o.omega);
+}
+
+TEST_CASE("modal: a mode that other axes excite is that of one axis under their sum") {
+  const Mode mode{46.0, 0.02, 0.7};
+  Mode crossing = mode;
+  crossing.excited_by = {0.5, -2.0, 0.0};
+  const Mode of_y{80.0, 0.03, 1.0};
+  const Mode of_z{30.0, 0.01, 0.2};
+  ModalPlant across(AxisModes{std::vector<Mode>{}, std::vector<Mode>{of_y}, std::vector<Mode>{crossing, of_z}}, 1e-3);
+  ModalPlant alone(AxisModes{std::vector<Mode>{mode}, std::vector<Mode>{of_y}, std::vector<Mode>{of_z}}, 1e-3);
+  across.reset({1.0, 2.0, 3.0});
+  alone.reset({0.5 * 1.0 - 2.0 * 2.0, 2.0, 3.0});
+  for (int k = 1; k <= 400; ++k) {
+    const double t = 1e-3 * k;
+    const Vector3 command(1.0 + command_at(t), 2.0 + std::sin(30.0 * t), 3.0 - 0.1 * command_at(0.5 * t));
+    across.step(command);
+    alone.step({0.5 * command[0] - 2.0 * command[1], command[1], command[2]});
+    REQUIRE(across.deflection()[0] == 0.0);
+    REQUIRE(across.deflection()[1] == alone.deflection()[1]);
+    REQUIRE(across.deflection()[2] == doctest::Approx(alone.deflection()[0] + alone.deflection()[2]).epsilon(1e-9));
+  }
+  CHECK(across.peak()[2] > 0.01);
+  // Behind the stop too: a plant whose Z has nothing but the crossing mode.
+  ModalPlant z(on_z(crossing), 1e-3);
+  ModalPlant x(on_x({mode}), 1e-3);
+  for (int k = 1; k <= 137; ++k) {
+    z.step({0.1 * k, -0.05 * k, 7.0 * k});
+    x.step({0.15 * k, 0.0, 0.0});
+  }
+  CHECK(z.residual_peak()[2] == doctest::Approx(x.residual_peak()[0]).epsilon(1e-9));
+  CHECK(z.peak()[2] == doctest::Approx(x.peak()[0]).epsilon(1e-9));
+  crossing.excited_by[1] = std::numeric_limits<double>::infinity();
+  CHECK_THROWS_AS(ModalPlant(on_z(crossing), 1e-3), Error);
 }
 
 TEST_CASE("modal: tables of modes") {

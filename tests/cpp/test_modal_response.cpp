@@ -74,6 +74,22 @@ TEST_CASE("modal response: ModalPlant's to the last bit, whatever the number of 
   }
 }
 
+TEST_CASE("modal response: modes that other axes excite") {
+  const Mode crossing{46.0, 0.02, 0.7, {0.5, -2.0, 0.0}};
+  for (const Modes& modes :
+       {Modes{{crossing}, some_modes(2)}, Modes{some_modes(1), {}, {crossing, {30.0, 0.01, 1.0}}}}) {
+    const MatrixXd samples = command(1200, static_cast<Index>(modes.size()));
+    const MatrixXd whole = plant_response(samples, modes, period_s);
+    CHECK(whole == streamed(samples, modes));
+    ModalResponse plant(modes, period_s);
+    MatrixXd pieces = samples;
+    plant.apply(samples.topRows(701), pieces.topRows(701));
+    plant.apply(samples.bottomRows(499), pieces.bottomRows(499));
+    CHECK(pieces == whole);
+  }
+  CHECK_THROWS_AS((void)plant_response(command(20, 4), {{crossing}, {}, {}, {}}, period_s), Error);
+}
+
 TEST_CASE("modal response: more axes than three are as good") {
   const MatrixXd samples = command(700, 5);
   const Modes modes{some_modes(1), some_modes(2), some_modes(3), some_modes(0), some_modes(2)};

@@ -89,6 +89,10 @@ SimulationOptions random_options(Random& random) {
       options.modes[axis].push_back(Mode{uniform(random, 20.0, 150.0), uniform(random, 0.002, 0.1), weight});
     }
   }
+  // One in three has a mode that moves one axis and is excited by others.
+  if (uniform(random, 0.0, 3.0) < 1.0) {
+    options.modes[1].push_back(Mode{uniform(random, 20.0, 150.0), 0.01, 0.3, {uniform(random, -1.0, 1.0), 0.2, 0.0}});
+  }
   return options;
 }
 

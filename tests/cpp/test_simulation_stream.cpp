@@ -261,6 +261,7 @@ TEST_CASE("simulation stream: feed drives get the set-points of their axes; thei
   const auto text = program("G90 G94\nG00 X0. Y0. Z0.\nG01 X3. Y1. Z.5 F3000.\nG04 P20\nG00 X0.");
   const FanucModel model;
   SimulationOptions options = vertical_machine();
+  options.modes = {};
   options.drives = three_drives();
   SimulationStream stream(text, model, options);
   const SimulationChunk chunk = stream.read(100'000);

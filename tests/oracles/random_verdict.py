@@ -69,10 +69,21 @@ class Case:
 
     @property
     def modes(self) -> list[list[Mode]]:
-        return [
-            [Mode(m.frequency_hz, m.damping_ratio, m.participation) for m in axis.modes]
-            for axis in self.machine.axes.as_tuple()
-        ]
+        return modes_of(self.machine)
+
+
+def modes_of(machine: sg.Machine) -> list[list[Mode]]:
+    """The modes of a machine file for the judge's plant, by the axis which they move."""
+    found: list[list[Mode]] = [[], [], []]
+    for axis, table in zip("xyz", machine.axes.as_tuple(), strict=True):
+        own = dict.fromkeys("xyz", 0.0) | {axis: 1.0}
+        for mode in table.modes:
+            by = own if mode.excited_by is None else mode.excited_by.model_dump()
+            moves = own if mode.moves is None else mode.moves.model_dump()
+            for modes, letter in zip(found, "xyz", strict=True):
+                if share := mode.participation * moves[letter]:
+                    modes.append(Mode(mode.frequency_hz, mode.damping_ratio, share, (by["x"], by["y"], by["z"])))
+    return found
 
 
 def read(text: str, drawn: Draw) -> list[Item]:

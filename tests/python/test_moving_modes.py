@@ -16,8 +16,8 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import (
     axis_modes,
     machine_warnings,
-    mode_tables,
     moving_axis,
+    moving_modes,
     region_offset,
     region_range_warnings,
     slowest_mode,
@@ -88,7 +88,7 @@ def test_tables_are_linear_and_constant_beyond_their_ends(at: float) -> None:
     here = still_mode(mode, abs(at))
     assert here.frequency_hz == pytest.approx(np.interp(abs(at), [0, 100, 300], [50, 46, 40]), rel=1e-13)
     assert here.damping_ratio == pytest.approx(np.interp(abs(at), [0, 100, 300], [0.02, 0.03, 0.05]), rel=1e-13)
-    table = mode_tables(machine_with(OVER_Z))[0][0]
+    table = moving_modes(machine_with(OVER_Z))[0][0][1]
     there = table.mode_at(Mode(46.0, 0.02, 0.7), at)
     assert there.frequency_hz == pytest.approx(np.interp(at, [0, 200, 400], [52, 46, 41]), rel=1e-13)
     assert (there.damping_ratio, there.participation) == (0.02, 0.7)
@@ -97,7 +97,7 @@ def test_tables_are_linear_and_constant_beyond_their_ends(at: float) -> None:
 def test_a_mass_fixes_the_mode_for_the_whole_program() -> None:
     machine = machine_with(OVER_MASS, more="part_mass_kg = 200")
     assert axis_modes(machine)[0] == [Mode(43.0, 0.04, 1.0)]
-    assert all(not len(table.position_mm) for tables in mode_tables(machine) for table in tables)
+    assert all(not len(table.position_mm) for pairs in moving_modes(machine) for _, table in pairs)
     assert moving_axis(machine) is None
     assert slowest_mode(machine.axes.x.modes[0]) == (40.0, 0.02)
 
@@ -114,7 +114,7 @@ def test_position_tables_go_to_the_plant_shifted_and_in_program_coordinates() ->
     assert table.axis == 2
     assert list(table.position_mm) == [-150.0, 50.0, 250.0]
     assert list(table.frequency_hz) == pytest.approx([46.8, 41.4, 36.9])
-    assert len(mode_tables(machine, offset=(0.0, 0.0, None))[0][0].position_mm) == 0
+    assert len(moving_modes(machine, offset=(0.0, 0.0, None))[0][0][1].position_mm) == 0
 
 
 def test_what_the_user_is_told() -> None:

@@ -27,9 +27,15 @@ enum class ContourTarget {
 /// that cancels the modes leaves a kernel hardly longer than itself; the tail of one that does not is cut where less
 /// than 1e-4 of it is left, or at four times the shaper, and the outer taps mended so that sum and mean delay
 /// are the shaper's.
-/// Throws Error(argument) as ModalPlant does. Source: this project.
+/// `of`: the axis that follows, with its modes, and the axis whose command is shaped: where that is another one, the
+/// kernel is what modes do that it excites, and empty without any. Throws Error(argument) as ModalPlant does. Source:
+/// this project.
+struct KernelAxes {
+  std::size_t moved = 0;
+  std::size_t commanded = 0;
+};
 [[nodiscard]] std::vector<double> contour_kernel(const Fir& shaper, std::span<const Mode> modes, double period_s,
-                                                 ContourTarget target);
+                                                 ContourTarget target, KernelAxes of = {});
 
 /// Finds, for one axis, the correction c of a command before shaping that brings the shaped command (or the plant's
 /// response to it) back to the programmed path: it minimises |e + f*c|^2 + sum_k w_k (c_k - 2 c_{k-1} + c_{k-2})^2,

@@ -1,14 +1,22 @@
 #pragma once
 
+#include <array>
 #include <complex>
 
 namespace shapegcode {
 
-/// One vibration mode of one axis, base-excited by the axis command.
+/// One vibration mode as it moves one axis, base-excited by the command of that axis or of others.
 struct Mode {
   double frequency_hz = 0.0;   ///< undamped natural frequency
   double damping_ratio = 0.0;  ///< 0 <= zeta < 1
   double participation = 1.0;  ///< share of this mode's relative deflection in the response
+  /// Shares of the accelerations of X, Y and Z that excite it; all zero: that of the axis which it moves, whole.
+  std::array<double, 3> excited_by{};
+
+  /// Whether axes of its own excite it, not the one which it moves.
+  [[nodiscard]] constexpr bool crosses() const noexcept {
+    return excited_by[0] != 0.0 || excited_by[1] != 0.0 || excited_by[2] != 0.0;
+  }
 };
 
 /// Pole s = -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s. Throws Error(argument) if frequency or damping is not

@@ -22,8 +22,9 @@ struct SimulationOptions {
   std::vector<Fir> axis_filters;  ///< after the set-points, in order (acceleration after interpolation)
   AxisModes modes;
   AxisModeTables mode_tables;  ///< how the modes vary with position; none: constant modes
-  /// Feed drives of X, Y and Z in place of modes and tables; none: modes alone. The figures then hold the servo loop's
-  /// lag, and are those at the set-points.
+  /// Feed drives of X, Y and Z with the modes of their own; none: modes alone. The modes and tables above are then
+  /// excited by the drives' tables instead of the set-points. The figures hold the servo loop's lag, and are those at
+  /// the set-points.
   std::vector<FeedDriveParameters> drives;
   /// A tracker of the path at its start, whose geometry several runs share; null: each run makes its own.
   std::shared_ptr<const ContourTracker> tracker;

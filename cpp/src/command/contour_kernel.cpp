@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 
 #include "filter/dense.hpp"
 #include "shapegcode/plant/modal.hpp"
@@ -16,20 +17,24 @@ constexpr std::size_t tail_shapers = 4;
 }  // namespace
 
 std::vector<double> contour_kernel(const Fir& shaper, std::span<const Mode> modes, double period_s,
-                                   ContourTarget target) {
+                                   ContourTarget target, KernelAxes of) {
   std::vector<double> kernel = dense_taps(shaper);
-  if (target != ContourTarget::response || modes.empty()) {
-    return kernel;
+  const auto moved = static_cast<Eigen::Index>(of.moved);
+  const auto commanded = static_cast<Eigen::Index>(of.commanded);
+  const bool own = moved == commanded;
+  const auto is_excited = [&](const Mode& mode) { return excitation(mode, of.moved)[commanded] != 0.0; };
+  if (target != ContourTarget::response || std::ranges::none_of(modes, is_excited)) {
+    return own ? kernel : std::vector<double>{};
   }
   AxisModes axes;
-  axes[0].assign(modes.begin(), modes.end());
+  std::ranges::copy_if(modes, std::back_inserter(axes[of.moved]), is_excited);
   ModalPlant plant(axes, period_s);
   plant.reset(Vector3::Zero());
   const std::size_t longest = tail_shapers * kernel.size() + 2;
   const std::size_t shaped = kernel.size();
   kernel.resize(longest, 0.0);
   for (double& tap : kernel) {
-    tap = plant.step(Vector3(tap, 0.0, 0.0))[0];
+    tap = plant.step(tap * Vector3::Unit(commanded))[moved];
   }
   std::size_t size = longest;
   double rest = 0.0;
@@ -37,16 +42,17 @@ std::vector<double> contour_kernel(const Fir& shaper, std::span<const Mode> mode
     rest += std::abs(kernel[--size]);
   }
   kernel.resize(size);
-  // A base-excited mode follows a steady motion without delay, whatever was cut off: sum and mean are the shaper's.
+  // A base-excited mode follows a steady motion without delay, whatever was cut off: sum and mean are the shaper's, or
+  // none where another axis moves.
   double sum = 0.0;
   double moment = 0.0;
   for (std::size_t k = 0; k < kernel.size(); ++k) {
     sum += kernel[k];
     moment += kernel[k] * static_cast<double>(k);
   }
-  const double behind = (shaper.mean_samples() - moment) / static_cast<double>(kernel.size() - 1);
+  const double behind = ((own ? shaper.mean_samples() : 0.0) - moment) / static_cast<double>(kernel.size() - 1);
   kernel.back() += behind;
-  kernel.front() += 1.0 - sum - behind;
+  kernel.front() += (own ? 1.0 : 0.0) - sum - behind;
   return kernel;
 }
 

@@ -19,8 +19,8 @@ RunCorrector::RunCorrector(RunReader& rows, const RunLimits& limits)
     : rows_(rows), limits_(limits), margin_(std::max<std::size_t>(rows.reach(), 8)) {
   const double smoothness = rows.filter().smoothness;
   for (const auto& kernel : rows.filter().kernels) {
-    solvers_.push_back({ContourSolver(kernel[0], smoothness), ContourSolver(kernel[1], smoothness),
-                        ContourSolver(kernel[2], smoothness)});
+    solvers_.push_back({ContourSolver(kernel[0][0], smoothness), ContourSolver(kernel[1][1], smoothness),
+                        ContourSolver(kernel[2][2], smoothness)});
   }
 }
 
@@ -66,7 +66,10 @@ void RunCorrector::decide_to(std::size_t row) {
 void RunCorrector::correct(std::size_t begin, std::size_t end, std::size_t accepted) {
   const std::size_t m = end - begin;
   std::array<bool, axis_count> acts{};
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+  // Axis after axis; where one moves another, once more with what the others have become.
+  const std::size_t sweeps = rows_.filter().crosses ? 2 : 1;
+  for (std::size_t k = 0; k < sweeps * axis_count; ++k) {
+    const std::size_t axis = k % axis_count;
     const std::size_t reach = solver(begin, end, axis).reach();
     const double* error = rows_.error(axis, begin);
     const double* correction = rows_.correction(axis, begin);
@@ -118,7 +121,13 @@ void RunCorrector::solve(std::size_t begin, std::size_t end, std::size_t axis) {
   const auto past = static_cast<std::ptrdiff_t>(by.reach() + 2);
   double* correction = rows_.correction(axis, begin);
   window_.assign(correction - past, correction + m);
-  by.solve({rows_.error(axis, begin), m + by.reach()}, window_, stiffness_[axis]);
+  const double* error = rows_.error(axis, begin);
+  if (rows_.filter().crosses) {
+    error_.assign(error, error + m + by.reach());
+    for (std::size_t k = 0; k < error_.size(); ++k) error_[k] += rows_.crossed(axis, begin + k);
+    error = error_.data();
+  }
+  by.solve({error, m + by.reach()}, window_, stiffness_[axis]);
   std::copy(window_.begin() + past, window_.end(), correction);
 }
 

@@ -16,10 +16,11 @@ struct RunLimits {
 };
 
 /// Corrects the command of a run before shaping so that the shaped command or the response keeps to the path: windows
-/// around the rows that would leave it, solved per axis, carried on where they are long. The correction is zero at both
-/// ends of the run: nothing moves before the start and nothing is added behind the stop. Where the corrected command
-/// would ask more of an axis than `limits`, or run faster along the path than the filter's share of the programmed feed
-/// allows, the correction is made smoother there, down to none.
+/// around the rows that would leave it, solved per axis, carried on where they are long; what a correction does to
+/// another axis through a mode is part of that axis' deviation. The correction is zero at both ends of the run: nothing
+/// moves before the start and nothing is added behind the stop. Where the corrected command would ask more of an axis
+/// than `limits`, or run faster along the path than the filter's share of the programmed feed allows, the correction is
+/// made smoother there, down to none.
 class RunCorrector {
  public:
   RunCorrector(RunReader& rows, const RunLimits& limits);
@@ -50,6 +51,7 @@ class RunCorrector {
   std::size_t scan_ = 0;     // rows looked at for something to correct
   std::size_t decided_ = 0;  // rows whose correction is final
   std::vector<double> window_;
+  std::vector<double> error_;  // of an axis that others move
   std::array<std::vector<double>, axis_count> stiffness_;
   std::vector<std::size_t> raised_;
 };

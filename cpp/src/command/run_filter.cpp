@@ -39,7 +39,7 @@ RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target,
   if (along.shapers) following = along.shapers->on_finer_grid(2);
   const std::size_t nodes = following ? following->position_mm().size() : 1;
   for (std::size_t node = 0; node < nodes; ++node) {
-    std::array<std::vector<double>, axis_count>& kernel = kernels.emplace_back();
+    auto& kernel = kernels.emplace_back();
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
       std::vector<Mode> here = axis_modes[axis];
       for (std::size_t m = 0; following && m < std::min(here.size(), along.tables[axis].size()); ++m) {
@@ -48,8 +48,11 @@ RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target,
           here[m] = mode_at(here[m], table, following->position_mm()[node]);
         }
       }
-      kernel[axis] =
-          contour_kernel(following ? following->fir().set()[node] : half_shapers[axis], here, half_period_s, target);
+      for (std::size_t commanded = 0; commanded < axis_count; ++commanded) {
+        const Fir& shaper = following ? following->fir().set()[node] : half_shapers[commanded];
+        kernel[axis][commanded] = contour_kernel(shaper, here, half_period_s, target, {axis, commanded});
+        crosses = crosses || (commanded != axis && !kernel[axis][commanded].empty());
+      }
     }
   }
 }

@@ -33,8 +33,11 @@ struct RunFilter {
   ContourTarget target;
   AxisModes modes;
   double half_period_s;
-  double mean_delay_s;                                               ///< of the shaper
-  std::vector<std::array<std::vector<double>, axis_count>> kernels;  ///< one per shaper that is followed
+  double mean_delay_s;  ///< of the shaper
+  /// By shaper that is followed, axis that follows the path and axis that is commanded; empty where one does not move
+  /// the other.
+  std::vector<std::array<std::array<std::vector<double>, axis_count>, axis_count>> kernels;
+  bool crosses = false;  ///< whether any axis moves another one
   double smoothness;
   double feed_excess_ratio = MotionLimits::none;  ///< see ShapingOptions
 

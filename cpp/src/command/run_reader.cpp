@@ -30,8 +30,11 @@ RunReader::RunReader(std::shared_ptr<const Path> path, std::shared_ptr<const Spe
   reach_ = shaper_rows;
   if (filter_.target != ContourTarget::none) {
     target_ = std::make_unique<Interpolator>(path_, std::move(profile), ahead_.period_s(), filter_.mean_delay_s);
-    for (const auto& kernel : filter_.kernels) {
-      for (const std::vector<double>& of_axis : kernel) reach_ = std::max(reach_, of_axis.size() - 1);
+    for (const auto& at_node : filter_.kernels) {
+      for (const auto& moved : at_node) {
+        for (const std::vector<double>& kernel : moved)
+          reach_ = std::max(reach_, std::max<std::size_t>(kernel.size(), 1) - 1);
+      }
     }
   }
   history_ = static_cast<std::ptrdiff_t>(2 * reach_ + 8);
@@ -92,7 +95,7 @@ void RunReader::read_error() {
   const std::size_t row = index(read_ - 1);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
-    error[a] = behind_kernel(axis, command_[axis], row) - wanted[a];
+    error[a] = behind_kernels(axis, command_, row) - wanted[a];
   }
   error -= (1.0 - smooth_step(along_)) * tangent.dot(error) * tangent;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
@@ -125,14 +128,29 @@ Vector3 RunReader::left_of_error(std::size_t row) const noexcept {
   const std::size_t i = index(row);
   Vector3 result;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    result[static_cast<Eigen::Index>(axis)] = error_[axis][i] + behind_kernel(axis, correction_[axis], i);
+    result[static_cast<Eigen::Index>(axis)] = error_[axis][i] + behind_kernels(axis, correction_, i);
   }
   return result;
 }
 
-double RunReader::behind_kernel(std::size_t axis, const Column& column, std::size_t i) const noexcept {
+double RunReader::crossed(std::size_t axis, std::size_t row) const noexcept {
+  const std::size_t i = index(row);
+  return behind_kernels(axis, correction_, i) - behind_kernel(axis, axis, correction_[axis], i);
+}
+
+double RunReader::behind_kernels(std::size_t axis, const std::array<Column, axis_count>& columns,
+                                 std::size_t i) const noexcept {
+  double sum = behind_kernel(axis, axis, columns[axis], i);
+  for (std::size_t other = 0; filter_.crosses && other < axis_count; ++other) {
+    if (other != axis) sum += behind_kernel(axis, other, columns[other], i);
+  }
+  return sum;
+}
+
+double RunReader::behind_kernel(std::size_t axis, std::size_t commanded, const Column& column,
+                                std::size_t i) const noexcept {
   const auto at = [&](std::size_t node) {
-    const std::vector<double>& kernel = filter_.kernels[node][axis];
+    const std::vector<double>& kernel = filter_.kernels[node][axis][commanded];
     double sum = 0.0;
     for (std::size_t j = 0; j < kernel.size(); ++j) {
       sum += kernel[j] * column[i - j];

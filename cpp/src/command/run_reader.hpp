@@ -55,6 +55,8 @@ class RunReader {
   [[nodiscard]] double place(std::size_t row) const noexcept { return place_.empty() ? 0.0 : place_[index(row)]; }
   /// Whether a row's deviation is worth a correction.
   [[nodiscard]] bool leaves_path(std::size_t row) const noexcept;
+  /// What the corrections of the other axes do to an axis.
+  [[nodiscard]] double crossed(std::size_t axis, std::size_t row) const noexcept;
   /// What the corrections leave of the deviation behind the kernel.
   [[nodiscard]] Vector3 left_of_error(std::size_t row) const noexcept;
   /// The command behind the shaper, with the corrections or without them.
@@ -84,8 +86,12 @@ class RunReader {
   void read_row();
   void read_command();
   void read_error();
-  /// What a column comes to behind the kernel that is valid at its entry `i`.
-  [[nodiscard]] double behind_kernel(std::size_t axis, const Column& column, std::size_t i) const noexcept;
+  /// What the columns of the axes come to at one of them, behind the kernels that are valid at their entry `i`.
+  [[nodiscard]] double behind_kernels(std::size_t axis, const std::array<Column, axis_count>& columns,
+                                      std::size_t i) const noexcept;
+  /// The same of one of them.
+  [[nodiscard]] double behind_kernel(std::size_t axis, std::size_t commanded, const Column& column,
+                                     std::size_t i) const noexcept;
   [[nodiscard]] std::size_t index(std::size_t row) const noexcept {
     return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(row) - base_);
   }

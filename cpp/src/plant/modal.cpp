@@ -86,12 +86,11 @@ ModalPlant::ModalPlant(AxisModes modes, double period_s, AxisModeTables tables)
     tables[axis].resize(axis_modes.size());
     first_[axis] = states_.size();
     for (const Mode& mode : axis_modes) {
-      if (!std::isfinite(mode.participation)) {
-        throw Error(ErrorKind::argument, fmt::format("participation of a mode of axis {} is not finite", axis));
-      }
+      check_shares(mode, axis);
       State state;
       static_cast<Node&>(state) = node_of(mode, period_s);
       state.participation = mode.participation;
+      state.excited_by = excitation(mode, axis);
       states_.push_back(state);
     }
     double fastest = fastest_hz(axis_modes);
@@ -237,11 +236,11 @@ void ModalPlant::forget_nothing() noexcept {
 }
 
 // The same as of several modes, to the last bit.
-inline void ModalPlant::step_only_mode(std::size_t axis, double jump) noexcept {
+inline void ModalPlant::step_only_mode(std::size_t axis, const Vector3& jumps) noexcept {
   const auto a = static_cast<Eigen::Index>(axis);
   State& stored = states_[first_[axis]];
   State state = stored;
-  state.velocity -= jump;
+  state.velocity -= state.excited_by.dot(jumps);
   const double share2 = state.participation * state.participation;
   const bool may_grow = share2 * state.amplitude2() > surely_below * peak_[a] * peak_[a];
   if (may_grow && state.reachable() > peak_[a]) {
@@ -262,12 +261,11 @@ Vector3 ModalPlant::step(const Vector3& command) noexcept {
   command_velocity_ = velocity;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
-    const double jump = jumps[a];
     const std::size_t first = first_[axis];
     const std::size_t last = first_[axis + 1];
     if (first == last) continue;
     if (last - first == 1) {
-      step_only_mode(axis, jump);
+      step_only_mode(axis, jumps);
       continue;
     }
 
@@ -275,7 +273,7 @@ Vector3 ModalPlant::step(const Vector3& command) noexcept {
     double squares = 0.0;
     for (std::size_t m = first; m < last; ++m) {
       State& state = states_[m];
-      state.velocity -= jump;
+      state.velocity -= state.excited_by.dot(jumps);
       squares += state.participation * state.participation * state.amplitude2();
     }
     // The square of a sum is at most its number of terms times the sum of their squares: mostly it settles the matter.
@@ -308,7 +306,7 @@ Vector3 ModalPlant::residual_peak(int n_periods) const {
     const double steps = std::min(std::ceil(n_periods / (slowest_hz(modes) * step_s)), max_residual_steps);
     Motion before{deflection_[a], 0.0};
     for (std::size_t m = 0; m < free.size(); ++m) {
-      free[m].velocity += command_velocity_[a];  // the command stops
+      free[m].velocity += free[m].excited_by.dot(command_velocity_);  // the command stops
       static_cast<Node&>(free[m]) = node_of(modes[m], step_s);
       before.rate += free[m].participation * free[m].velocity;
     }

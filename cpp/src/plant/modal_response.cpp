@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -146,6 +147,24 @@ struct ModalResponse::Impl {
   Index row = 0;  // of the whole record that comes next
   bool started = false;
   std::vector<Group> groups;
+  std::unique_ptr<ModalPlant> crossed;  // where axes excite modes that move others, instead of the groups
+
+  void start(const ModalResponse::Record& command) {
+    for (Group& group : groups) group.begin(command);
+    if (crossed) crossed->reset(position(command, 0));
+    started = true;
+  }
+  [[nodiscard]] Vector3 position(const ModalResponse::Record& command, Index at) const noexcept {
+    Vector3 result = Vector3::Zero();
+    for (Index axis = 0; axis < axes; ++axis) result[axis] = command(at, axis);
+    return result;
+  }
+  void step(const ModalResponse::Record& command, ModalResponse::Result& response, Index first, Index rows) noexcept {
+    for (Index at = first; at < first + rows; ++at) {
+      const Vector3 there = crossed->step(position(command, at));
+      for (Index axis = 0; axis < axes; ++axis) response(at, axis) = there[axis];
+    }
+  }
 };
 
 ModalResponse::ModalResponse(const std::vector<std::vector<Mode>>& modes, double period_s)
@@ -155,6 +174,7 @@ ModalResponse::ModalResponse(const std::vector<std::vector<Mode>>& modes, double
   impl_->rate_hz = 1.0 / period_s;
   impl_->axes = static_cast<Index>(modes.size());
   impl_->groups.resize((modes.size() + lane_count - 1) / lane_count);
+  bool crosses = false;
   for (std::size_t g = 0; g < impl_->groups.size(); ++g) {
     Group& group = impl_->groups[g];
     for (std::size_t lane = 0; lane < lane_count; ++lane) {
@@ -162,13 +182,20 @@ ModalResponse::ModalResponse(const std::vector<std::vector<Mode>>& modes, double
       group.axis[lane] = static_cast<Index>(axis);
       if (group.modes.size() < modes[axis].size()) group.modes.resize(modes[axis].size());
       for (std::size_t m = 0; m < modes[axis].size(); ++m) {
-        if (!std::isfinite(modes[axis][m].participation)) {
-          throw Error(ErrorKind::argument, fmt::format("participation of a mode of axis {} is not finite", axis));
-        }
+        check_shares(modes[axis][m], axis);
+        crosses = crosses || modes[axis][m].crosses();
         group.modes[m].set(static_cast<Index>(lane), modes[axis][m], period_s);
       }
     }
   }
+  if (!crosses) return;
+  if (modes.size() > axis_count) {
+    throw Error(ErrorKind::argument, fmt::format("modes that other axes excite, among {} axes: at most {} are possible",
+                                                 modes.size(), axis_count));
+  }
+  AxisModes of_axes;
+  std::ranges::copy(modes, of_axes.begin());
+  impl_->crossed = std::make_unique<ModalPlant>(std::move(of_axes), period_s);
 }
 
 ModalResponse::~ModalResponse() = default;
@@ -183,10 +210,7 @@ void ModalResponse::apply(const Record& command, Result response) {
                             command.cols(), response.rows(), response.cols(), self.axes));
   }
   if (command.rows() == 0) return;
-  if (!self.started) {
-    for (Group& group : self.groups) group.begin(command);
-    self.started = true;
-  }
+  if (!self.started) self.start(command);
   for (Index first = 0; first < command.rows(); first += piece_rows) {
     const Index rows = std::min(piece_rows, command.rows() - first);
     for (Group& group : self.groups) {
@@ -195,9 +219,12 @@ void ModalResponse::apply(const Record& command, Result response) {
                     fmt::format("command of a response has a value that is not finite, in rows {} to {}", first,
                                 first + rows - 1));
       }
-      group.propagate(self.row, rows);
-      group.give(response, first, rows);
+      if (!self.crossed) {
+        group.propagate(self.row, rows);
+        group.give(response, first, rows);
+      }
     }
+    if (self.crossed) self.step(command, response, first, rows);
     self.row += rows;
   }
 }

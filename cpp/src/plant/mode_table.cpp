@@ -49,4 +49,20 @@ Mode mode_at(const Mode& mode, const ModeTable& table, double position_mm) noexc
   return here;
 }
 
+Vector3 excitation(const Mode& mode, std::size_t axis) noexcept {
+  if (!mode.crosses()) return Vector3::Unit(static_cast<Eigen::Index>(axis));
+  return {mode.excited_by[0], mode.excited_by[1], mode.excited_by[2]};
+}
+
+void check_shares(const Mode& mode, std::size_t axis) {
+  if (!std::isfinite(mode.participation)) {
+    throw Error(ErrorKind::argument, fmt::format("participation of a mode of axis {} is not finite", axis));
+  }
+  for (const double share : mode.excited_by) {
+    if (!std::isfinite(share)) {
+      throw Error(ErrorKind::argument, fmt::format("excitation of a mode of axis {} is not finite", axis));
+    }
+  }
+}
+
 }  // namespace shapegcode

@@ -16,15 +16,12 @@ namespace {
 
 constexpr double watched_share = 0.2;  // of the limit at its end: an oscillation passes through the band all the time
 
-ModalPlant modal_plant(const SimulationOptions& options) {
-  return options.drives.empty() ? ModalPlant(options.modes, options.period_s, options.mode_tables)
-                                : ModalPlant({}, options.period_s);
-}
-
 }  // namespace
 
 AxisPlant::AxisPlant(const SimulationOptions& options)
-    : period_s_(options.period_s), arrived_mm_(options.arrived_mm), modal_(modal_plant(options)) {
+    : period_s_(options.period_s),
+      arrived_mm_(options.arrived_mm),
+      modal_(options.modes, options.period_s, options.mode_tables) {
   if (!options.drives.empty() && options.drives.size() != axis_count) {
     throw Error(ErrorKind::argument,
                 fmt::format("{} feed drives: must be none or one each for X, Y and Z", options.drives.size()));
@@ -55,10 +52,13 @@ void AxisPlant::shift(const Vector3& by_mm) noexcept {
 
 Vector3 AxisPlant::step_drives(const Vector3& command) {
   Vector3 response;
+  Vector3 table;
   for (std::size_t i = 0; i < drives_.size(); ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
     response[axis] = drives_[i].step(command[axis]);
+    table[axis] = drives_[i].table_mm();
   }
+  response += modal_.step(table) - table;
   drive_deflection_ = response - command;
   drive_peak_ = drive_peak_.cwiseMax(drive_deflection_.cwiseAbs());
   return response;

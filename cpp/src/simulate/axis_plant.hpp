@@ -1,4 +1,4 @@
-// The plant behind three axes: modes, or feed drives. Only here a simulation chooses between them.
+// The plant behind three axes: modes, or feed drives with modes on them. Only here a simulation chooses.
 #pragma once
 
 #include <vector>

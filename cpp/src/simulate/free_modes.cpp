@@ -14,8 +14,8 @@ FreeModes::FreeModes(const AxisModes& modes, double period_s) : period_s_(period
       modes_.push_back(mode);
       // The square of a sum is at most its number of terms times the sum of their squares.
       const double weight2 = static_cast<double>(modes[axis].size()) * mode.participation * mode.participation;
-      states_.push_back({mode_transition(mode, period_s), static_cast<Eigen::Index>(axis), mode.participation, weight2,
-                         -s.real(), 1.0 / s.imag()});
+      states_.push_back({mode_transition(mode, period_s), static_cast<Eigen::Index>(axis), excitation(mode, axis),
+                         mode.participation, weight2, -s.real(), 1.0 / s.imag()});
       for (std::size_t k = 1; k <= tabulated; ++k) {
         over_.push_back(mode_transition(mode, static_cast<double>(k) * period_s));
       }
@@ -38,7 +38,7 @@ double FreeModes::step(const Vector3& velocity_mm_per_s, std::size_t periods) no
   for (std::size_t m = 0; m < states_.size(); ++m) {
     State& state = states_[m];
     const double before = state.deflection;
-    const double velocity = state.velocity - jump[state.axis];
+    const double velocity = state.velocity - state.excited_by.dot(jump);
     const double quadrature = (velocity + state.decay_rate * before) * state.damped_period_s;
     reachable2 += state.weight2 * (before * before + quadrature * quadrature);
     const ModeTransition by = periods <= tabulated

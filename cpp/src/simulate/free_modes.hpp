@@ -35,7 +35,8 @@ class FreeModes {
 
   struct State {
     ModeTransition over_period;
-    Eigen::Index axis = 0;
+    Eigen::Index axis = 0;  // which it moves
+    Vector3 excited_by = Vector3::Zero();
     double participation = 1.0;
     double weight2 = 1.0;          // its square, times the number of modes of the axis
     double decay_rate = 0.0;       // 1/s
@@ -56,7 +57,7 @@ inline void FreeModes::step(const Vector3& velocity_mm_per_s) noexcept {
   velocity_ = velocity_mm_per_s;
   for (State& state : states_) {
     const ModeTransition& by = state.over_period;
-    const double velocity = state.velocity - jump[state.axis];
+    const double velocity = state.velocity - state.excited_by.dot(jump);
     const double deflection = by.dd * state.deflection + by.dv * velocity;
     state.velocity = by.vd * state.deflection + by.vv * velocity;
     state.deflection = deflection;

@@ -16,7 +16,7 @@ from shapegcode.conversion.budget import TransferLoad
 from shapegcode.conversion.restart import CutRestarts, RestartPoint
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.modes import slowest_mode
+from shapegcode.model.modes import slowest_excited_hz
 from shapegcode.program import Program
 from shapegcode.program.stamp import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK, no_room
 from shapegcode.results.table import Column, Table
@@ -146,8 +146,7 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFi
         return "here the shaped cuts are shorter than an increment"
     fast = np.flatnonzero(feeds >= _FAST_RATIO * feeds.max())
     fast = fast[:: math.ceil(len(fast) / _FAST_BLOCKS)]
-    axes = model.machine.axes.as_tuple()
-    slowest = np.array([min((slowest_mode(mode)[0] for mode in axis.modes), default=np.inf) for axis in axes])
+    slowest = np.array(slowest_excited_hz(model.machine))
     # The speed that each puts into the modes, all at once; the softest axis counts most.
     steps = np.array([_direction(blocks[int(one)]) for one in fast]) * feeds[fast, None]
     fastest = fast[np.argsort(-np.linalg.norm(steps / slowest, axis=1), kind="stable")[:_SINGLE_BLOCKS]]

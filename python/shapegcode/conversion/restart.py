@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.modes import slowest_mode
+from shapegcode.model.modes import slowest_excited_hz
 from shapegcode.program import Program, between_increments
 from shapegcode.program.stamp import whole_lines
 from shapegcode.verdict.figures import Placed
@@ -166,9 +166,7 @@ class RestartPlaces:
         self._fastest_mm_per_s = _SLOW_RATIO * region.path.fastest_feed_mm_per_s
         self._floor_mm = machine.tolerance.residual_floor_um * 1e-3
         self._tolerance_mm = machine.tolerance.contour_um * 1e-3
-        axes = machine.axes.as_tuple()
-        slowest = [min((slowest_mode(mode)[0] for mode in axis.modes), default=math.inf) for axis in axes]
-        self._omega = 2.0 * math.pi * np.array(slowest)
+        self._omega = 2.0 * math.pi * np.array(slowest_excited_hz(machine))
         self.last = 0
         """Period of the last point."""
         self.longest = 0

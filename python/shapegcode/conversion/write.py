@@ -23,7 +23,7 @@ from shapegcode.conversion.restart import (
 )
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, OwnFilter
-from shapegcode.model.modes import NO_OFFSET, Offset
+from shapegcode.model.modes import NO_OFFSET, Offset, excited_modes
 from shapegcode.program import MM_PER_INCH, Program, between_increments, least_increment_mm
 from shapegcode.program.stamp import REGION_MARK
 from shapegcode.shaping.grid import Grid
@@ -298,7 +298,7 @@ class RegionWriter:
         on_progress: Callable[[float], None],
         stopped: tuple[int, int],
     ) -> EmittedRegion:
-        fit = self._fit(region, options)
+        fit = self._fit(region)
         state = self._writer(program, region, fit)
         marks = _Marks(program, region.notes)
         restarts = RegionRestarts(self._places(region), region, self._machine, fit, state.position_decimals)
@@ -342,7 +342,7 @@ class RegionWriter:
             emitted, sum(map(len, periods)), periods, sizes.end(), planned_um, found, shaper.is_slowed, duration_s
         )
 
-    def _fit(self, region: _core.Region, options: _core.ShapingOptions) -> _core.FitOptions:
+    def _fit(self, region: _core.Region) -> _core.FitOptions:
         """How shaped motion becomes blocks in the units of a region."""
         controller, emission = self._machine.controller, self._machine.emission
         unit, feed_decimals = self._units(region)
@@ -359,7 +359,7 @@ class RegionWriter:
             fit.equal_above_increments = self._machine.tolerance.residual_floor_increments
             fit.equal_periods = math.ceil(self._model.vibration_memory_s * _FADED / fit.block_period_s)
         if emission.rounding == "vibration":
-            fit.modes = options.modes
+            fit.modes = excited_modes(self._machine)
         return fit
 
     def _writer(self, program: Program, region: _core.Region, fit: _core.FitOptions) -> _core.WriterOptions:

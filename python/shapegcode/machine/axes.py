@@ -154,6 +154,24 @@ class FrequencyOver(InlineTable):
         return (self.position_mm if self.mass_kg is None else self.mass_kg) or ()
 
 
+class Direction(InlineTable):
+    """Shares of X, Y and Z; one that is left out is 0."""
+
+    x: Float = key("share of the X axis", unit="1", default=0.0)
+    y: Float = key("share of the Y axis", unit="1", default=0.0)
+    z: Float = key("share of the Z axis", unit="1", default=0.0)
+
+    @model_validator(mode="after")
+    def _points_somewhere(self) -> Direction:
+        if not any(self.as_tuple()):
+            raise ValueError("x, y and z are 0: one must be another number")
+        return self
+
+    def as_tuple(self) -> tuple[float, float, float]:
+        """The three shares in the order X, Y, Z."""
+        return (self.x, self.y, self.z)
+
+
 class AxisMode(TomlTable):
     """One vibration mode of an axis, excited by the motion of that axis."""
 
@@ -165,6 +183,16 @@ class AxisMode(TomlTable):
         "share of this mode in the axis's deflection; several modes of one axis need not add up to 1",
         unit="1",
         default=1.0,
+    )
+    excited_by: Direction | None = key(
+        "shares of the accelerations of X, Y and Z that excite this mode, { y = 1, z = 0.2 }; left out: that of its "
+        "axis alone, { y = 1 } under axes.y. A mode that several axes excite stands at one of them",
+        default=None,
+    )
+    moves: Direction | None = key(
+        "what this mode moves at the tool against the part, as shares of its deflection: { y = 1, z = 0.3 } rocks the "
+        "tool by 0.3 mm in Z for every mm in Y; left out: its axis alone. participation counts for all of it",
+        default=None,
     )
     frequency_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
         "the frequency may be off by this much either way (position of the table, weight of the workpiece); "
@@ -192,6 +220,14 @@ class AxisMode(TomlTable):
         default=None,
     )
 
+    def excitation(self, axis: int) -> tuple[float, float, float]:
+        """Shares of the accelerations of X, Y, Z that excite a mode of an axis (0, 1, 2)."""
+        return _along(axis) if self.excited_by is None else self.excited_by.as_tuple()
+
+    def motion(self, axis: int) -> tuple[float, float, float]:
+        """What a mode of an axis (0, 1, 2) moves of X, Y, Z, as shares of its deflection; without participation."""
+        return _along(axis) if self.moves is None else self.moves.as_tuple()
+
     @model_validator(mode="after")
     def _uncertainty_of_a_mass(self) -> AxisMode:
         if self.mass_uncertainty_percent is not None and self.mass_kg is None:
@@ -208,6 +244,11 @@ class AxisMode(TomlTable):
                     f"{toml(low)} to {toml(high)} (unit: Hz)"
                 )
         return self
+
+
+def _along(axis: int) -> tuple[float, float, float]:
+    x, y, z = (float(axis == each) for each in range(3))
+    return (x, y, z)
 
 
 class Axis(TomlTable):

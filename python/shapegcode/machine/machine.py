@@ -87,6 +87,18 @@ class Machine(TomlTable):
         return self
 
     @model_validator(mode="after")
+    def _modes_stand_where_they_are_excited(self) -> Machine:
+        for index, (letter, axis) in enumerate(zip("xyz", self.axes.as_tuple(), strict=True)):
+            for number, mode in enumerate(axis.modes, start=1):
+                if not mode.excitation(index)[index]:
+                    raise KeyProblem(
+                        f"axes.{letter}.modes.{number}.excited_by",
+                        mode.excited_by.model_dump() if mode.excited_by else {},
+                        f"must have a share of {letter}: a mode stands at an axis that excites it",
+                    )
+        return self
+
+    @model_validator(mode="after")
     def _override_can_be_locked(self) -> Machine:
         emission, controller = self.emission, self.controller
         if emission.override != "lock":

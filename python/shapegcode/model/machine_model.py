@@ -19,10 +19,9 @@ from shapegcode.machine import Machine
 from shapegcode.model.modes import (
     NO_OFFSET,
     Offset,
-    axis_modes,
     drive_parameters,
-    mode_tables,
     moving_axis,
+    moving_modes,
     region_offset,
     slowest_mode,
 )
@@ -283,11 +282,12 @@ class MachineModel:
             raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
         options = _core.PlaybackOptions()
         options.period_s = self.period_s
-        if plant == "modal":
-            options.modes = axis_modes(self.machine, shift, only)
-            options.mode_tables = mode_tables(self.machine, shift, offset, only)
-        else:
+        pairs = moving_modes(self.machine, shift, offset, only)
+        if plant != "modal":
             options.drives = drive_parameters(self.machine, shift, only)
+            pairs = [[pair for pair in of if any(pair[0].excited_by)] for of in pairs]
+        options.modes = [[mode for mode, _ in of] for of in pairs]
+        options.mode_tables = [[table for _, table in of] for of in pairs]
         options.axis_filters = list(filters)
         return options
 

@@ -37,34 +37,71 @@ def still_mode(mode: AxisMode, part_mass_kg: float | None) -> _core.Mode:
     return _core.ModeTable(0, over.mass_kg, over.frequency_hz, over.damping_ratio or ()).mode_at(nominal, part_mass_kg)
 
 
-def axis_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> list[list[_core.Mode]]:
-    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty, its damping at its low end.
+Pairs = list[tuple[_core.Mode, _core.ModeTable]]
 
-    A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
+
+def moving_modes(
+    machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET, only: str | None = None
+) -> list[Pairs]:
+    """What moves X, Y, Z: modes for the core, each with how it varies with the position of the command.
+
+    Each is shifted by `shift` times its stated uncertainty, its damping at its low end. A table over the part's mass is
+    looked up; of one over a position the nominal frequency is taken. A mode that moves several axes stands at each.
     """
-    return [
-        [
-            _core.Mode(
-                still.frequency_hz * (1.0 + moved * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
-                still.damping_ratio * damping_scale(mode, moved),
-                still.participation,
-            )
-            for mode, moved in modes
-            for still in (still_mode(mode, machine.shaping.part_mass_kg),)
-        ]
-        for modes in _moved(machine, shift, only)
-    ]
+    found: list[Pairs] = [[], [], []]
+    for name, axis, mode in numbered_modes(machine):
+        off = shift if only in (None, name.removeprefix("axes.").replace(".modes", "")) else 0.0
+        still = _shifted(mode, off, machine)
+        by = mode.excitation(axis)
+        for moved, share in enumerate(mode.motion(axis)):
+            own = by[moved] if sum(map(bool, by)) == 1 else 0.0
+            if share:
+                shape = (share * own, (0.0, 0.0, 0.0)) if own else (share, by)
+                as_moved = _core.Mode(still.frequency_hz, still.damping_ratio, still.participation * shape[0], shape[1])
+                found[moved].append((as_moved, position_table(mode, off, offset)))
+    return found
 
 
-def _moved(machine: Machine, shift: float, only: str | None) -> list[list[tuple[AxisMode, float]]]:
-    """Per axis its modes, each with the share of its uncertainty by which it is moved."""
-    return [
-        [
-            (mode, shift if only in (None, f"{letter}.{number}") else 0.0)
-            for number, mode in enumerate(axis.modes, start=1)
-        ]
-        for letter, axis in zip(_AXES, machine.axes.as_tuple(), strict=True)
-    ]
+def axis_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> list[list[_core.Mode]]:
+    """The modes of `moving_modes` alone."""
+    return [[mode for mode, _ in pairs] for pairs in moving_modes(machine, shift, only=only)]
+
+
+def own_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> list[list[_core.Mode]]:
+    """Those of them that the axis which they move excites alone."""
+    return [[mode for mode in modes if not any(mode.excited_by)] for modes in axis_modes(machine, shift, only)]
+
+
+def excited_modes(machine: Machine) -> list[list[_core.Mode]]:
+    """The modes that X, Y, Z excite, for their shapers: each as far as its axis moves the tool by it."""
+    found: list[list[_core.Mode]] = [[], [], []]
+    for _, axis, mode in numbered_modes(machine):
+        still, length = _shifted(mode, 0.0, machine), math.hypot(*mode.motion(axis))
+        for exciting, share in enumerate(mode.excitation(axis)):
+            if share:
+                weight = still.participation * abs(share) * length
+                found[exciting].append(_core.Mode(still.frequency_hz, still.damping_ratio, weight))
+    return found
+
+
+def slowest_excited_hz(machine: Machine) -> list[float]:
+    """Lowest frequency that X, Y, Z excite, by the tables of their modes; infinite for an axis without any."""
+    found = [math.inf] * 3
+    for _, axis, mode in numbered_modes(machine):
+        for exciting, share in enumerate(mode.excitation(axis)):
+            if share:
+                found[exciting] = min(found[exciting], slowest_mode(mode)[0])
+    return found
+
+
+def _shifted(mode: AxisMode, off: float, machine: Machine) -> _core.Mode:
+    """A mode at a share of its stated uncertainty."""
+    still = still_mode(mode, machine.shaping.part_mass_kg)
+    return _core.Mode(
+        still.frequency_hz * (1.0 + off * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
+        still.damping_ratio * damping_scale(mode, off),
+        still.participation,
+    )
 
 
 def slowest_mode(mode: AxisMode) -> tuple[float, float]:
@@ -83,13 +120,6 @@ def damping_scale(mode: AxisMode, shift: float) -> float:
     end: what counts is how far the pole is off, |dw/w + i dzeta|. Beyond that less damping leaves more.
     """
     return 1.0 - abs(shift) * (mode.damping_uncertainty_percent or 0.0) / 100.0
-
-
-def mode_tables(
-    machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET, only: str | None = None
-) -> list[list[_core.ModeTable]]:
-    """How the modes of X, Y, Z vary with the position of the command: `PlaybackOptions.mode_tables`."""
-    return [[_table(mode, moved, offset) for mode, moved in modes] for modes in _moved(machine, shift, only)]
 
 
 def moving_axis(machine: Machine) -> int | None:
@@ -176,7 +206,8 @@ def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> 
     return warnings
 
 
-def _table(mode: AxisMode, shift: float, offset: Offset) -> _core.ModeTable:
+def position_table(mode: AxisMode, shift: float = 0.0, offset: Offset = NO_OFFSET) -> _core.ModeTable:
+    """How a mode varies with the position of the command; without rows where it does not."""
     over = mode.frequency_over
     if over is None or over.axis is None:
         return _core.ModeTable()
@@ -242,7 +273,7 @@ def drive_parameters(
     parameters = [
         _of_axis(modes, axis.drive, gain, ratio)
         for axis, modes, gain, ratio in zip(
-            machine.axes.as_tuple(), axis_modes(machine, shift, only), gains, ratios, strict=True
+            machine.axes.as_tuple(), own_modes(machine, shift, only), gains, ratios, strict=True
         )
         if axis.drive is not None
     ]

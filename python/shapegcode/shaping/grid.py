@@ -13,7 +13,7 @@ from shapegcode import _core
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.modes import axis_modes, mode_tables, moving_axis, numbered_modes, still_mode
+from shapegcode.model.modes import excited_modes, moving_axis, numbered_modes, position_table, still_mode
 from shapegcode.shaping.bands import (
     NO_MODE,
     ON_GRID,
@@ -376,7 +376,7 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
             )
         return grid
     longest = machine.shaping.max_duration_s if wanted else grid.shaper.duration_s - 0.5 * grid.block_period_s
-    firs = design_per_axis(axis_modes(machine), grid.block_period_s, longest)
+    firs = design_per_axis(excited_modes(machine), grid.block_period_s, longest)
     if firs is None:
         if wanted:
             raise _core.DesignError(
@@ -434,10 +434,11 @@ def shaper_track(machine: Machine, period_s: float) -> ShaperTrack:
     axis = moving_axis(machine)
     if axis is None:
         raise _core.ArgumentError("no mode of the machine file varies with the position of an axis (frequency_over)")
-    tables = [table for of_axis in mode_tables(machine) for table in of_axis]
+    numbered = [mode for _, _, mode in numbered_modes(machine)]
+    tables = [position_table(mode) for mode in numbered]
     modes = [
         MovingMode(still_mode(mode, machine.shaping.part_mass_kg), table if len(table.position_mm) else None)
-        for (_, _, mode), table in zip(numbered_modes(machine), tables, strict=True)
+        for mode, table in zip(numbered, tables, strict=True)
     ]
     reached = [position for table in tables for position in table.position_mm]
     return design_track(modes, axis, (min(reached), max(reached)), period_s, machine.shaping.max_duration_s)
@@ -447,7 +448,7 @@ def override_vibration_um(
     block_period_s: float, shaper: _core.Shaper, model: MachineModel, feed_mm_per_s: float
 ) -> float:
     """Largest residual vibration of straight moves in equal blocks, over the feed overrides."""
-    moves = np.array([float(bool(axis.modes)) for axis in model.machine.axes.as_tuple()])
+    moves = np.array([float(bool(modes)) for modes in excited_modes(model.machine)])
     speed = feed_mm_per_s * math.sqrt(moves.sum())
     fir = _core.Fir([round(t / block_period_s) for t in shaper.times_s], list(shaper.amplitudes))
     worst_mm = 0.0

@@ -26,11 +26,15 @@ FINE_STEP_S = 1e-4
 
 @dataclass(frozen=True)
 class Mode:
-    """A base-excited mode. `share` scales its motion relative to the command where an axis has several."""
+    """A base-excited mode. `share` scales its motion relative to the command where an axis has several.
+
+    `excited_by`: shares of every axis' acceleration that excite it; None: its own axis alone.
+    """
 
     frequency_hz: float
     damping_ratio: float
     share: float = 1.0
+    excited_by: tuple[float, ...] | None = None
 
 
 #: One entry per axis: None (rigid), a mode, (frequency, damping ratio), or a list of these.
@@ -89,7 +93,8 @@ def response(
     moved = command.copy()
     for k, entry in enumerate(modes):
         for mode in _modes_of(entry):
-            moved[:, k] += relative_motion(command[:, k], mode, step)
+            exciting = command[:, k] if mode.excited_by is None else command @ np.array(mode.excited_by)
+            moved[:, k] += relative_motion(exciting, mode, step)
     return fine * period_s, command, moved
 
 

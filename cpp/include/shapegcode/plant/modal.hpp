@@ -44,12 +44,19 @@ void check_table(const ModeTable& table);
 /// The mode at a position (mm) of the table's axis; the participation stays. The table must pass check_table.
 [[nodiscard]] Mode mode_at(const Mode& mode, const ModeTable& table, double position_mm) noexcept;
 
-/// Base-excited modes per axis: d'' + 2*zeta*omega*d' + omega^2*d = -x'' and response u = x + sum(participation*d).
+/// Base-excited modes by the axis which they move: d'' + 2*zeta*omega*d' + omega^2*d = -x'' and response
+/// u = x + sum(participation*d), where x'' is the acceleration of that axis, or the sum of excited_by*x'' over X, Y, Z.
+/// A mode that moves several axes stands at each of them.
 using AxisModes = std::array<std::vector<Mode>, axis_count>;
+
+/// Shares of the accelerations of X, Y and Z that excite a mode of `axis`.
+[[nodiscard]] Vector3 excitation(const Mode& mode, std::size_t axis) noexcept;
+/// Throws Error(argument) on a participation or a share of an acceleration that is not finite.
+void check_shares(const Mode& mode, std::size_t axis);
 
 /// Propagates the modes exactly (matrix exponential) for a command that is linear between set-points, as a servo's
 /// set-points are (first-order hold). Real-time safe after construction: no allocation, no exception, bounded work.
-/// Of each mode: u'' + 2*zeta*omega*u' + omega^2*u = 2*zeta*omega*x' + omega^2*x.
+/// Of each mode that its own axis excites: u'' + 2*zeta*omega*u' + omega^2*u = 2*zeta*omega*x' + omega^2*x.
 ///
 /// Modes may vary with the commanded position of an axis. Frequency and damping are then held over each period at their
 /// value in its middle (an error of second order in the period), and the matrices of the period are interpolated
@@ -94,6 +101,7 @@ class ModalPlant {
   };
   struct State : Node {
     double participation = 1.0;
+    Vector3 excited_by = Vector3::Zero();
     double deflection = 0.0;  // mm
     double velocity = 0.0;    // mm/s, of the deflection
 
@@ -146,8 +154,8 @@ class ModalPlant {
   void forget_nothing() noexcept;
   /// No later deflection of an axis that is free from now on exceeds it.
   [[nodiscard]] double reachable(std::size_t axis) const noexcept;
-  /// An axis with one mode, after its command's velocity jumped.
-  void step_only_mode(std::size_t axis, double jump) noexcept;
+  /// An axis with one mode, after the commands' velocities jumped.
+  void step_only_mode(std::size_t axis, const Vector3& jumps) noexcept;
   /// `peak_` over the period that now begins, looked at between its ends; called only where it may grow.
   void look_between(std::size_t axis) noexcept;
   /// Largest |deflection| between two instants `time_s` apart, with the turning point found by the secant of the rate.
@@ -178,8 +186,8 @@ class ModalResponse {
   using Record = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
   using Result = Eigen::Ref<Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
 
-  /// `modes`: by axis; an axis without modes follows its command. Throws Error(argument) on period_s <= 0, an invalid
-  /// mode or no axis.
+  /// `modes`: by axis; an axis without modes follows its command. Modes that other axes excite are slower, and only for
+  /// up to three axes. Throws Error(argument) on period_s <= 0, an invalid mode or no axis.
   ModalResponse(const std::vector<std::vector<Mode>>& modes, double period_s);
   ~ModalResponse();
   ModalResponse(ModalResponse&&) noexcept;
