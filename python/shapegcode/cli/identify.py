@@ -74,6 +74,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     along = "use the response along this axis; where the file names none, it is this one"
     add("--axis", choices=("x", "y", "z"), help=along)
+    across = (
+        "find what each mode moves along the other axes too, for a tool that rocks: by a sensor of three axes, or by "
+        "these files of taps at the same point with the sensor turned"
+    )
+    add("--across", metavar="FILE", nargs="*", help=across)
     add("--update", metavar="MACHINE.toml", help="put the supported modes into this machine file")
     options.add_modes_arguments(parser, "--keep-modes")
     add("--tap-plan", action="store_true", help="say how to do the test (for the modes of -m MACHINE), nothing else")
@@ -101,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.tap_plan and args.files:
         raise ArgumentError("--tap-plan says how to do the test and reads no file: leave one of both out")
-    runner.check_files(args, also_read=[] if args.sweep is None else [args.sweep])
+    runner.check_files(args, also_read=[*(args.across or ()), *([] if args.sweep is None else [args.sweep])])
     if args.tap_plan:
         from shapegcode.identification.plan import tap_plan
 
@@ -134,7 +139,7 @@ def _identify(args: argparse.Namespace) -> int:
     with runner.progress(f"fitting {', '.join(args.files)}", args):
         found = identify(
             args.files, ReadOptions(**said), max_modes=args.max_modes, modes=args.modes, band_hz=args.frequencies,
-            start_s=args.start, strict=False, **shaken,
+            start_s=args.start, across=args.across or args.across is not None, strict=False, **shaken,
         )  # fmt: skip
     notes, wrote = list(found.notes), []
     if args.update is not None and found.modes and found.doubt and not args.force:

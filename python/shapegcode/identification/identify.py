@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
+from shapegcode.identification.across import measured_across, with_moves
 from shapegcode.identification.checks import Prepared, RecordUse, prepare
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
 from shapegcode.identification.model_search import (
@@ -63,6 +64,7 @@ def identify(
     accepted_percent: float | None = None,
     sweep: Program | str | Path | None = None,
     machine: Machine | str | Path | None = None,
+    across: bool | str | Path | Record | FrequencyResponse | Sequence[str | Path | Record | FrequencyResponse] = False,
     strict: bool = True,
 ) -> Identification:
     """Modes in one or several taps of a point (with force), in free decays (without), or in frequency responses.
@@ -84,6 +86,8 @@ def identify(
         sweep: the program that ran beside the sensor, of one axis, such as `write_sweep` writes: its command takes the
             place of the force, start and clock of the logger are found from the record.
         machine: whose controller ran it.
+        across: find what each mode moves along the other axes too: True: by other channels of the same files, which
+            state their axes (a sensor of three axes); or by other files or records, of hits at the same point.
         strict: raise where no record can be used; False: the result says it, in `reason`.
 
     Returns:
@@ -91,7 +95,7 @@ def identify(
 
     Raises:
         ArgumentError: a number of modes that is not from 1 to 99; a sweep without its machine.
-        RecordError: no record can be used; what was found and what is needed.
+        RecordError: no record can be used; what was found and what is needed. No response along another axis.
         OSError: a file cannot be read.
 
     Source: Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md) for its ARMA models; the fit in
@@ -113,7 +117,31 @@ def identify(
     if sweep is not None and (machine is None or response is not None):
         raise ArgumentError("a sweep needs the machine whose controller ran it, and files or records")
     options = options or ReadOptions()
+    if across is False:
+        return _identified(sources, names, options, sought, start_s, sweep, machine, across=False, strict=strict)
+    found = _identified(sources, names, options, sought, start_s, sweep, machine, across=across is True, strict=strict)
+    if sweep is not None:
+        if across is not True:
+            raise ArgumentError("across: a sweep needs one record of all axes: the channels beside its own are taken")
+        return found
+    return with_moves(found, measured_across(sources, across, options), window_s)
+
+
+def _identified(
+    sources: Sequence[Any],
+    names: tuple[str, ...],
+    options: ReadOptions,
+    sought: Sought,
+    start_s: float | None,
+    sweep: Program | str | Path | None,
+    machine: Machine | str | Path | None,
+    *,
+    across: bool,
+    strict: bool,
+) -> Identification:
+    """The modes along one axis; of a sweep what they move across too."""
     ready: Prepared | None = None
+    band_hz = sought.band_hz
     try:
         # The matrices are small: further threads of BLAS would wait for each other, up to twenty times as long.
         with threadpool_limits(limits=1, user_api="blas"):
@@ -121,7 +149,7 @@ def identify(
                 # A simulated control, which no tap needs.
                 from shapegcode.identification.known_command import find_modes_of_command, known_command
 
-                return find_modes_of_command(known_command(sweep, machine), sources, options, sought)
+                return find_modes_of_command(known_command(sweep, machine), sources, options, sought, across=across)
             swept = _swept(sources, options)
             if swept is not None:
                 return find_swept_modes(swept, names, sought)

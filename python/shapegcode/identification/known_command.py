@@ -8,6 +8,7 @@ begins in the record and how much faster its clock runs is found from the record
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import czt, resample_poly
 
 from shapegcode.errors import RecordError
+from shapegcode.identification.across import with_moves
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
 from shapegcode.identification.result import Identification, Sweep
@@ -111,15 +113,27 @@ def known_command(program: str | Path | Program, machine: Machine | str | Path) 
 
 
 def find_modes_of_command(
-    command: KnownCommand, sources: Sequence[str | Path | Record], options: ReadOptions, sought: Sought
+    command: KnownCommand,
+    sources: Sequence[str | Path | Record],
+    options: ReadOptions,
+    sought: Sought,
+    *,
+    across: bool = False,
 ) -> Identification:
-    """Find the modes in records beside a known command; see `identify.identify`."""
-    aligned = [_aligned(command, source, options, sought.band_hz) for source in sources]
+    """Find the modes in records beside a known command, with `across` what they move of the sensor's other axes too.
+
+    See `identify.identify`.
+    """
+    aligned = [_aligned(command, source, options, sought.band_hz, across=across) for source in sources]
     ends = [[each.response.frequency_hz[end] for each in aligned] for end in (0, -1)]
     responses = [_between(each.response, max(ends[0]), min(ends[1])) for each in aligned]
     names = tuple(_name(each) for each in sources)
     found = find_frf_modes(responses, names, replace(sought, phase_known=False))
     first, lines = aligned[0], responses[0].frequency_hz
+    if across:
+        found = with_moves(
+            found, [_between(one, max(ends[0]), min(ends[1])) for each in aligned for one in each.others]
+        )
     return replace(
         found,
         notes=(*(note for each in aligned for note in each.notes), *found.notes),
@@ -150,16 +164,24 @@ class _Aligned:
     record: Record
     response: FrequencyResponse  # minus the acceleration over that of the command
     notes: tuple[str, ...]
+    others: tuple[FrequencyResponse, ...] = ()  # the same of the sensor's other axes
 
 
 def _aligned(
-    command: KnownCommand, source: str | Path | Record, options: ReadOptions, band_hz: tuple[float, float] | None
+    command: KnownCommand,
+    source: str | Path | Record,
+    options: ReadOptions,
+    band_hz: tuple[float, float] | None,
+    *,
+    across: bool,
 ) -> _Aligned:
     """The record of a file that goes with the command, on the program's time."""
     records = [source] if isinstance(source, Record) else read_records(source, replace(options, ignore_force=True))
     clocks = [_Clock(command, record) for record in records]
-    best = max(clocks, key=lambda clock: clock.correlation)
-    return best.aligned(band_hz, len(records) > 1)
+    named = [clock for clock in clocks if clock.record.axis == command.axis] if across else []
+    best = max(named or clocks, key=lambda clock: clock.correlation)
+    others = [each for each in records if each is not best.record] if across else []
+    return best.aligned(band_hz, len(records) > 1, others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,8 +308,8 @@ class _Clock:
                 best = (float(total[place]), float(rate), first * every, shares)
         return best[1:]
 
-    def aligned(self, band_hz: tuple[float, float] | None, chosen: bool) -> _Aligned:
-        """Minus the response over the command, with start and clock found."""
+    def aligned(self, band_hz: tuple[float, float] | None, chosen: bool, others: Sequence[Record]) -> _Aligned:
+        """Minus the response over the command, with start and clock found; and of others on the same clock."""
         rows = self._clear_parts()
         spectra = self._spectra(band_hz)
         for _ in range(_ROUNDS):
@@ -308,7 +330,18 @@ class _Clock:
         notes = self._notes(rows)
         if chosen:
             notes.append(f"{self.record.source}: of the axes of the sensor this one goes with the command best")
-        return _Aligned(self.record, self._response(spectra.of(rows).late(lags).in_twos(rows)), tuple(notes))
+        used = spectra.of(rows).late(lags).in_twos(rows)
+        response = self._response(used)
+        beside = []
+        for other in others:
+            clock = copy(self)
+            clock.record, clock.values = other, other.response - np.mean(other.response)
+            of_other = clock._spectra(band_hz).of(rows).late(lags).in_twos(rows)
+            # Delay, lag and sign that were taken out of the one are taken out of the other.
+            inside = np.isin(used.hertz, response.frequency_hz)
+            lines = response.response * (of_other.ratio() / used.ratio())[inside]
+            beside.append(replace(response, source=other.source, response=lines, axis=other.axis))
+        return _Aligned(self.record, response, tuple(notes), tuple(beside))
 
     def _spectra(self, band_hz: tuple[float, float] | None) -> _Spectra:
         """Lines of command and response of each part."""

@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 from shapegcode.identification.checks import Prepared, RecordUse
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import FloatArray, Record
-from shapegcode.results.json import hidden
+from shapegcode.results.json import hidden, sparse
 from shapegcode.results.page.model import Light
-from shapegcode.results.result import Plot, Result
+from shapegcode.results.result import Plot, Result, Xyz
 from shapegcode.results.table import Column, Table
 
 
@@ -67,6 +67,8 @@ class IdentifiedMode:
         refusal: why the data do not support this mode; empty: they do.
         left_out: refused, but no fault of the test: beyond what the hits excite, beyond the number asked for, or with a
             peak below 2 % of the highest one.
+        moves: how far it moves X, Y and Z, as shares of its motion along the axis along which it was found; null for an
+            axis that was not measured. Only where other axes were measured too.
     """
 
     frequency_hz: Estimate
@@ -76,6 +78,7 @@ class IdentifiedMode:
     stiffness_n_per_m: Estimate | None = None
     refusal: str = ""
     left_out: bool = False
+    moves: Xyz[Estimate | None] | None = field(default=None, metadata=sparse())
 
 
 _SKEWED = 1.2
@@ -357,6 +360,10 @@ class Identification(Result):
         found = []
         if self.modes:
             found.append(Table("modes, each ± 95 %", _MODE_COLUMNS, self.modes, caption=self._check_line()))
+        if any(mode.moves is not None for mode in self.modes):
+            found.append(
+                Table("what each mode moves, as shares of its motion along its axis", _MOVE_COLUMNS, self.modes)
+            )
         if self.refused:
             title = "not supported by the data" if self._unsupported else "left out"
             found.append(Table(title, _REFUSAL_COLUMNS, self.refused))
@@ -402,6 +409,21 @@ _MODE_COLUMNS = (
     Column("m", "kg", _estimate("mass_kg")),
     Column("c", "N s/m", _estimate("damping_n_s_per_m")),
     Column("k", "N/µm", _estimate("stiffness_n_per_m", 1e-6)),
+)
+
+
+def _move(letter: str) -> Any:
+    def cell(mode: IdentifiedMode) -> str:
+        estimate: Estimate | None = getattr(mode.moves, letter)
+        own = estimate is not None and estimate.low == estimate.high
+        return "1" if own else estimate_cell(estimate, 1.0)
+
+    return cell
+
+
+_MOVE_COLUMNS = (
+    Column("frequency", "Hz", lambda mode: f"{mode.frequency_hz.value:.4g}"),
+    *(Column(letter.upper(), "1", _move(letter)) for letter in "xyz"),
 )
 _REFUSAL_COLUMNS = (
     Column("frequency", "Hz", lambda mode: f"{mode.frequency_hz.value:.4g}"),

@@ -17,6 +17,7 @@ from scipy.optimize import linear_sum_assignment
 from tomlkit.items import AoT, Key, SingleKey, Table
 
 from shapegcode.errors import ArgumentError, MachineError
+from shapegcode.identification.across import told_moves
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, MachineFile
 from shapegcode.machine import Machine, check_axes
 from shapegcode.settings.edit import (
@@ -200,6 +201,7 @@ def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[
 _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
 _SUM_SLACK = 1e-3  # of the participations: rounding
+_LEAST_MOVE = 0.01  # of the motion along the axis itself: less is not written
 _KEYS = (
     "frequency_hz",
     "damping_ratio",
@@ -353,6 +355,8 @@ class ModeTables:
         """Put a mode into a table."""
         entries = table.value.body
         values = self._values(mode)
+        if mode.moves is not None and "moves" in old:
+            values = {"moves": ({self.axis: 1.0}, "no other axis is told from nothing")} | values
         kept = ["participation " + toml(old.get("participation", 1.0))]
         stated = old.get("frequency_uncertainty_percent")
         if stated is not None and _MEASURED not in table["frequency_uncertainty_percent"].trivia.comment:
@@ -360,7 +364,8 @@ class ModeTables:
             if stated > measured:
                 del values["frequency_uncertainty_percent"]
                 kept.append(f"frequency_uncertainty_percent = {toml(stated)}, wider than the measured {toml(measured)}")
-        kept += [f"{key} = {toml(old[key])}" for key in ("frequency_over",) if key in old]
+        stays = ("frequency_over", "excited_by", *(() if "moves" in values else ("moves",)))
+        kept += [f"{key} = {toml(old[key])}" for key in stays if key in old]
         for key in ("mass_kg", "mass_uncertainty_percent"):
             if key in old and key not in values:
                 entries[:] = [entry for entry in entries if entry[0] is None or entry[0].key != key]
@@ -406,7 +411,17 @@ class ModeTables:
                 uncertain = key.partition("_")[0] + "_uncertainty_percent"
                 values[uncertain] = _rounded_up(estimate.uncertainty_percent), _MEASURED
         values["source"] = self.source, ""
-        return {key: values[key] for key in _KEYS if key in values}
+        return {key: values[key] for key in _KEYS if key in values} | self._moves(mode)
+
+    def _moves(self, mode: IdentifiedMode) -> dict[str, tuple[Any, str]]:
+        """What a mode moves of other axes, where that was measured and is told from nothing."""
+        told = {letter: each for letter, each in told_moves(mode).items() if abs(each.value) >= _LEAST_MOVE}
+        if len(told) < 2:
+            return {}
+        others = ", ".join(
+            f"{letter} {each.low:.3g} ... {each.high:.3g}" for letter, each in told.items() if letter != self.axis
+        )
+        return {"moves": ({letter: float(f"{each.value:.4g}") for letter, each in told.items()}, f"95 %: {others}")}
 
     def _table(self, mode: IdentifiedMode, share: float, meaning: str) -> Table:
         """A new table."""

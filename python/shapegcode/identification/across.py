@@ -1,0 +1,303 @@
+"""What modes move across the axis along which they were found: their poles in the responses of the other axes.
+
+With the poles known everything else is linear. Over time the free part behind a hit or stop is a sum of decays; over
+frequency the lines around a mode are its residue and a smooth background. The ratio of the amplitudes along two axes is
+the mode's shape between them, whatever the force was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from shapegcode.errors import RecordError
+from shapegcode.identification.checks import Prepared, prepare
+from shapegcode.identification.frf_model import mode_columns
+from shapegcode.identification.frf_search import cut
+from shapegcode.identification.lines import measured_lines
+from shapegcode.identification.result import Estimate, Identification, IdentifiedMode
+from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
+from shapegcode.io.read import read_measurement
+from shapegcode.io.record import FloatArray, ReadOptions, Record
+from shapegcode.results.result import Xyz
+
+Measured = Record | FrequencyResponse
+_AXES = "xyz"
+_WIDTHS, _NEAREST = 8.0, 0.08  # half-power widths around a mode, and share of its frequency, that are fitted
+_LOCAL_WIDTHS, _LOCAL_LINES = 2.0, 4  # of what is left around a mode
+_NO_VIBRATION = 0.3  # damping ratio of what is background
+_OUT_OF_PHASE = 1.0  # tan of the phase beyond which two directions do not move together
+
+
+@dataclass(frozen=True, eq=False)
+class _Poles:
+    """The modes that are known."""
+
+    omega: FloatArray  # (m,) rad/s
+    zeta: FloatArray  # (m,)
+    applied: float  # 1/s, by which a window makes responses decay faster
+
+
+@dataclass(frozen=True, eq=False)
+class _Amplitudes:
+    """Of every mode along one axis in one record or response."""
+
+    value: ComplexArray  # (m,)
+    variance: FloatArray  # (m,) of real and imaginary part together
+
+
+def measured_across(
+    sources: Sequence[Any], across: bool | str | Path | Measured | Sequence[str | Path | Measured], options: ReadOptions
+) -> list[Measured]:
+    """What the files (those of the taps themselves, or others) hold, of all axes."""
+    given: Sequence[Any]
+    if isinstance(across, bool):
+        given = sources
+    else:
+        given = [across] if isinstance(across, str | Path | Record | FrequencyResponse) else across
+    options = replace(options, axis=None, response_columns=())
+    return [
+        one
+        for each in given
+        for one in ([each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options))
+    ]
+
+
+def with_moves(found: Identification, others: Sequence[Measured], window_s: float | None = None) -> Identification:
+    """The identification with what its supported modes move of the other axes.
+
+    Args:
+        found: with modes, and the axis along which they were found.
+        others: records or responses that state their axes; those of the axis itself are left out. Of the same file
+            they count as recorded together.
+        window_s: time constant of an exponential window that the analyser applied to all of them.
+
+    Raises:
+        RecordError: no axis, or no response of another one; a free decay that was not recorded together.
+    """
+    if found.axis is None:
+        raise RecordError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
+    by_axis = {letter: [each for each in others if each.axis == letter] for letter in _AXES if letter != found.axis}
+    if not any(by_axis.values()):
+        raise RecordError(
+            f"{', '.join(dict.fromkeys(each.source for each in others)) or found.files[0]}: no response along "
+            f"{' or '.join(letter.upper() for letter in by_axis)}: needed is a sensor of three axes, or files that "
+            "state theirs"
+        )
+    if not found.modes:
+        return found
+    refused = [mode for mode in found.refused if 0.0 < mode.damping_ratio.value < _NO_VIBRATION]
+    omega = 2.0 * np.pi * np.array([mode.frequency_hz.value for mode in (*found.modes, *refused)])
+    zeta = np.array([mode.damping_ratio.value for mode in (*found.modes, *refused)])
+    applied = 0.0 if window_s is None else 1.0 / window_s
+    own, along = _amplitudes(found, by_axis, _Poles(omega, zeta, applied))
+    notes, modes = list(found.notes), []
+    for index, mode in enumerate(found.modes):
+        moves: dict[str, Estimate | None] = dict.fromkeys(_AXES) | {found.axis: Estimate(1.0, 1.0, 1.0)}
+        for letter, parts in along.items():
+            ratio, moves[letter] = _ratio(own, parts, index)
+            if abs(ratio.imag) > _OUT_OF_PHASE * abs(ratio.real) and _is_told(moves[letter], abs(ratio)):
+                notes.append(
+                    f"{mode.frequency_hz.value:.4g} Hz: {letter.upper()} moves {abs(ratio):.3g} times as far, "
+                    f"{abs(np.degrees(np.angle(ratio))):.0f}° behind or ahead: only the part in phase is taken"
+                )
+        modes.append(replace(mode, moves=Xyz(moves["x"], moves["y"], moves["z"])))
+    return replace(found, modes=tuple(modes), notes=tuple(notes))
+
+
+def told_moves(mode: IdentifiedMode) -> dict[str, Estimate]:
+    """Of a mode, by axis, what the data tell from nothing."""
+    if mode.moves is None:
+        return {}
+    named = zip(_AXES, mode.moves, strict=True)
+    return {letter: each for letter, each in named if each is not None and _is_told(each, abs(each.value))}
+
+
+def _is_told(estimate: Estimate | None, size: float) -> bool:
+    return estimate is not None and size > 0.5 * (estimate.high - estimate.low)
+
+
+def _amplitudes(
+    found: Identification, by_axis: Mapping[str, Sequence[Measured]], poles: _Poles
+) -> tuple[list[_Amplitudes], dict[str, list[_Amplitudes]]]:
+    """Along the axis of the modes, and along each other axis."""
+    ready = found.prepared
+    of_own: Measured = found.responses[0] if ready is None else ready.records[0]
+    for each in (part for parts in by_axis.values() for part in parts):
+        if each.quantity != of_own.quantity:
+            raise RecordError(
+                f"{each.source}: {each.quantity}, but {of_own.source}: {of_own.quantity}: must be the same along all "
+                "axes"
+            )
+    if ready is None:
+        own = [_in_lines(each, poles) for each in found.responses]
+        along = {
+            letter: [_in_lines(each, poles) for each in parts if isinstance(each, FrequencyResponse)]
+            for letter, parts in by_axis.items()
+        }
+    else:
+        own = [_in_time(part, poles) for part in _free_parts(ready, ready.records)]
+        along = {}
+        for letter, parts in by_axis.items():
+            records = [each for each in parts if isinstance(each, Record)]
+            along[letter] = [_in_time(part, poles) for part in _parts_of(ready, records, found.files)]
+    for letter, amplitudes in along.items():
+        if by_axis[letter] and not amplitudes:
+            raise RecordError(
+                f"{by_axis[letter][0].source}: over frequency where {found.files[0]} is over time, or the other way "
+                "round: needed is the same kind"
+            )
+    return own, {letter: parts for letter, parts in along.items() if parts}
+
+
+@dataclass(frozen=True, eq=False)
+class _FreePart:
+    """A record behind its hit or stop, and by what its amplitudes are divided: the hammer's force at each pole."""
+
+    values: FloatArray  # (n,)
+    period_s: float
+    force: FloatArray | None  # (k,) N, up to the first sample of the part
+
+
+def _parts_of(ready: Prepared, records: Sequence[Record], files: Sequence[str]) -> Iterator[_FreePart]:
+    if not records:
+        return
+    together = all(any(_same_file(use, each, files) for use in ready.records) for each in records)
+    if together or ready.records[0].force_n is None:
+        if not together:
+            raise RecordError(
+                f"{records[0].source}: a free decay tells what moves across only beside the axis it was found along: "
+                "needed is one record of all axes"
+            )
+        yield from _free_parts(ready, [_beside(use, records, files) for use in ready.records])
+        return
+    hits = prepare(records)
+    yield from _free_parts(hits, [_beside(use, records, files) for use in hits.records])
+
+
+def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Record:
+    """The record of another channel that covers one that was looked through."""
+
+    def far(each: Record) -> tuple[bool, bool, float]:
+        own = f"{use.source} ".startswith(f"{each.source} ")
+        return not own, not _same_file(use, each, files), abs(each.start_s - use.start_s)
+
+    first = min(records, key=far)
+    begin = round((use.start_s - first.start_s) / first.period_s)
+    if abs(first.period_s / use.period_s - 1.0) > 1e-6 or begin < 0 or begin + len(use.response) > len(first.response):
+        raise RecordError(f"{first.source}: was not recorded together with {use.source}")
+    return replace(first, response=first.response[begin : begin + len(use.response)])
+
+
+def _same_file(use: Record, other: Record, files: Sequence[str]) -> bool:
+    """By the names of files, behind which channels and hits may stand."""
+    return any(all(f"{each.source} ".startswith(f"{name} ") for each in (use, other)) for name in files)
+
+
+def _free_parts(ready: Prepared, records: Sequence[Record]) -> Iterator[_FreePart]:
+    for use, record in zip(ready.usable, records, strict=True):
+        first = 0
+        if use.hit is not None:
+            first = min(use.hit.end + (use.hit.end - use.hit.first) + _LOCAL_LINES, len(record.response) - 1)
+        force = None if use.record.force_n is None else use.record.force_n[:first]
+        yield _FreePart(record.response[first:], record.period_s, force)
+
+
+def _in_time(part: _FreePart, poles: _Poles) -> _Amplitudes:
+    """Amplitudes at the first sample; over the hammer's force at the poles, where there was one."""
+    omega, zeta = poles.omega, poles.zeta
+    time_s = part.period_s * np.arange(len(part.values))
+    pole = omega * (-zeta + 1j * np.sqrt(1.0 - zeta**2)) - poles.applied
+    waves = np.exp(time_s[:, None] * pole)
+    smooth = np.stack((np.ones(len(time_s)), np.linspace(-1.0, 1.0, len(time_s))), axis=1)
+    value, variance, left = _solved(np.hstack((waves.real, -waves.imag, smooth)), part.values, len(omega))
+    spectrum = np.abs(np.fft.rfft(left)) ** 2
+    hertz = np.fft.rfftfreq(len(left), part.period_s)
+    local = _local(np.asarray(2.0 * np.pi * hertz, dtype=np.float64), np.asarray(spectrum, dtype=np.float64), poles)
+    variance = np.asarray(variance * local, dtype=np.float64)
+    if part.force is None:
+        return _Amplitudes(value, variance)
+    ago_s = part.period_s * (len(part.force) - np.arange(len(part.force)))
+    gain = np.exp(ago_s[:, None] * pole).T @ part.force * part.period_s
+    return _Amplitudes(value / gain, variance / np.abs(gain) ** 2)
+
+
+def _in_lines(each: FrequencyResponse, poles: _Poles) -> _Amplitudes:
+    """Residues, mode by mode from the lines around it."""
+    omega, zeta = poles.omega, poles.zeta
+    lines = measured_lines(each, 1.0 / poles.applied if poles.applied else None)
+    value = np.zeros(len(omega), dtype=np.complex128)
+    variance = np.full(len(omega), np.inf)
+    for index, (at, damping) in enumerate(zip(omega, zeta, strict=True)):
+        reach = max(_WIDTHS * damping, _NEAREST) * at
+        part = cut(lines, at - reach, at + reach, complex_modes=True)
+        near = np.abs(omega - at) <= reach
+        count = int(np.count_nonzero(near))
+        if 2 * len(part.s) < 2 * count + part.background.shape[1] + 8:
+            continue
+        column = mode_columns(part, omega[near], zeta[near])[0]
+        turned = column * part.s[:, None] / omega[near]
+        columns = np.hstack((part.weighted(column), part.weighted(turned), part.weighted_background))
+        found, spread, left = _solved(columns, part.goal, count)
+        half = len(left) // 2
+        power = left[:half] ** 2 + left[half:] ** 2
+        place = int(np.count_nonzero(near[:index]))
+        value[index] = found[place]
+        variance[index] = spread[place] * float(_local(part.omega, power, poles)[index])
+    return _Amplitudes(value, variance)
+
+
+def _solved(columns: FloatArray, goal: FloatArray, modes: int) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Complex factors of the first columns (real parts, then imaginary ones), their variance, and what is left."""
+    norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    basis, sizes, turned = np.linalg.svd(columns / norms, full_matrices=False)
+    kept = sizes > 1e-10 * sizes[0]
+    inverse = (turned[kept].T / sizes[kept]) @ basis[:, kept].T
+    factors = inverse @ goal
+    left = goal - (columns / norms) @ factors
+    noise = float(left @ left) / max(len(goal) - int(np.count_nonzero(kept)), 1)
+    spread = noise * np.einsum("ij,ij->i", inverse, inverse) / norms**2
+    factors = factors / norms
+    value = np.asarray(factors[:modes] + 1j * factors[modes : 2 * modes], dtype=np.complex128)
+    return value, spread[:modes] + spread[modes : 2 * modes], left
+
+
+def _local(at: FloatArray, power: FloatArray, poles: _Poles) -> FloatArray:
+    """By how much more of it is left around each mode than on average."""
+    omega, zeta = poles.omega, poles.zeta
+    mean, step = max(float(np.mean(power)), 1e-300), float(at[1] - at[0])
+    reach = np.maximum(_LOCAL_WIDTHS * zeta * omega, _LOCAL_LINES * step)
+    near = np.abs(at - omega[:, None]) <= reach[:, None]
+    around = near @ power / np.maximum(np.count_nonzero(near, axis=1), 1)
+    return np.asarray(np.maximum(around / mean, 1.0), dtype=np.float64)
+
+
+def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int) -> tuple[complex, Estimate]:
+    """A mode's amplitude along another axis over that along its own, and its real part with the 95 % interval."""
+    if len(own) == len(other):  # hit by hit: what changes from hit to hit changes along both
+        pairs = [
+            (a.value[index], a.variance[index], b.value[index], b.variance[index])
+            for a, b in zip(own, other, strict=True)
+        ]
+    else:
+        pairs = [(*_mean(own, index), *_mean(other, index))]
+    one, one_variance, two, two_variance = (np.array(column) for column in zip(*pairs, strict=True))
+    weight = np.abs(one) ** 2
+    ratio = complex(np.sum(np.conj(one) * two) / np.sum(weight))
+    variance = float(np.sum(weight * (two_variance + abs(ratio) ** 2 * one_variance)) / np.sum(weight) ** 2)
+    half = 1.96 * np.sqrt(0.5 * variance)
+    if len(one) > 2:
+        scatter = np.sum((weight / np.sum(weight) * np.abs(two / one - ratio)) ** 2) * len(one) / (len(one) - 1)
+        half = max(half, float(stats.t.ppf(0.975, len(one) - 1) * np.sqrt(0.5 * scatter)))
+    return ratio, Estimate(ratio.real, ratio.real - half, ratio.real + half)
+
+
+def _mean(parts: Sequence[_Amplitudes], index: int) -> tuple[complex, float]:
+    values = np.array([part.value[index] for part in parts])
+    variances = np.array([part.variance[index] for part in parts])
+    return complex(np.mean(values)), float(np.sum(variances)) / len(parts) ** 2

@@ -1,0 +1,225 @@
+"""What modes move across the axis they were found along: taps, decays, frequency responses, a sweep.
+
+Simulated by SciPy and NumPy alone: a mode with the shape (x, y, z) at a point answers along k to a push along y with
+the residue phi_y phi_k / m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import shapegcode as sg
+from command import run
+from shaken_axis import Logger, ShakenMode, logged, shaken
+from shapegcode.errors import RecordError
+from shapegcode.identification.known_command import known_command
+from shapegcode.identification.result import Identification
+from shapegcode.identification.sweep_program import write_sweep
+from tap_truth import TrueMode, tap
+
+Vector = npt.NDArray[np.float64]
+Shape = tuple[float, float, float]
+AXES = "xyz"
+Structure = Sequence[tuple[TrueMode, Shape]]
+MODES: list[tuple[TrueMode, Shape]] = [
+    (TrueMode(31.0, 0.02, 80.0), (0.2, 1.0, 0.3)),
+    (TrueMode(57.0, 0.03, 60.0), (0.0, 1.0, -0.6)),
+    (TrueMode(120.0, 0.015, 100.0), (-0.4, 0.7, 0.1)),
+]
+READ = sg.ReadOptions(axis="y")
+
+
+def hit(modes: Structure, seed: int, *, axes: str = AXES, snr_db: float = 35.0) -> list[sg.Record]:
+    """A tap along Y on a sensor of three axes."""
+    rng = np.random.default_rng(seed)
+    peak_n = float(rng.uniform(300.0, 700.0))
+    records = []
+    for letter in axes:
+        k = AXES.index(letter)
+        seen = [replace(mode, mass_kg=mode.mass_kg / (shape[1] * shape[k])) for mode, shape in modes if shape[k]]
+        clean = tap(seen or [TrueMode(50.0, 0.02, 1e12)], rng, peak_n=peak_n)
+        assert clean.force_n is not None
+        level = 10.0 ** (-snr_db / 20.0)
+        noise = level * np.std(tap([replace(m, mass_kg=m.mass_kg / s[1] ** 2) for m, s in modes], rng).response)
+        force = clean.force_n + 0.001 * peak_n * np.random.default_rng(seed).standard_normal(len(clean.force_n))
+        response = clean.response + noise * rng.standard_normal(len(force))
+        records.append(replace(clean, source=f"tap{seed}", response=response, force_n=force, axis=letter))
+    return records
+
+
+def along(records: Sequence[sg.Record], letter: str) -> list[sg.Record]:
+    return [record for record in records if record.axis == letter]
+
+
+def check(found: Identification, modes: Structure, within: float = 0.02) -> None:
+    assert len(found.modes) == len(modes), found
+    for mode, (truth, shape) in zip(found.modes, modes, strict=True):
+        assert mode.frequency_hz.value == pytest.approx(truth.frequency_hz, rel=0.005)
+        assert mode.moves is not None
+        for estimate, share in zip(mode.moves, shape, strict=True):
+            assert estimate is not None
+            assert estimate.value == pytest.approx(share / shape[1], abs=within)
+
+
+def write(path: Path, records: Sequence[sg.Record]) -> Path:
+    first = records[0]
+    columns: dict[str, Vector] = {"time [s]": first.period_s * np.arange(len(first.response))}
+    if first.force_n is not None:
+        columns["force [N]"] = first.force_n
+    columns |= {f"acc{(each.axis or '').upper()} [m/s^2]": each.response for each in records}
+    np.savetxt(path, np.array(list(columns.values())).T, "%.8g", ",", header=",".join(columns), comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("taps")
+    return [write(folder / f"tap{seed}.csv", hit(MODES, seed)) for seed in (1, 2, 3)]
+
+
+def test_taps_with_a_sensor_of_three_axes(files: list[Path]) -> None:
+    found = sg.identify(files, READ, across=True)
+    check(found, MODES)
+    assert all(mode.moves is None for mode in sg.identify(files, READ).modes)
+
+
+def test_a_sensor_that_is_turned_between_taps() -> None:
+    hits = [
+        hit(MODES, seed, axes=letter)
+        for letter in AXES
+        for seed in range(5 * AXES.index(letter), 5 * AXES.index(letter) + 3)
+    ]
+    records = [record for of_hit in hits for record in of_hit]
+    found = sg.identify(along(records, "y"), across=[*along(records, "x"), *along(records, "z")])
+    check(found, MODES, within=0.05)
+
+
+def test_intervals_hold_the_truth() -> None:
+    held = total = 0
+    for seed in range(100, 112):
+        rng = np.random.default_rng(seed)
+        modes = [(mode, (float(rng.normal()), shape[1], float(rng.normal()))) for mode, shape in MODES]
+        records = [record for k in range(3) for record in hit(modes, 10 * seed + k, snr_db=25.0)]
+        found = sg.identify(along(records, "y"), across=records)
+        for mode in found.modes:
+            shape = min((abs(truth.frequency_hz - mode.frequency_hz.value), shape) for truth, shape in modes)[1]
+            assert mode.moves is not None
+            for k, estimate in ((0, mode.moves.x), (2, mode.moves.z)):
+                assert estimate is not None
+                held += estimate.low <= shape[k] / shape[1] <= estimate.high
+                total += 1
+    assert total >= 60
+    assert held >= 0.9 * total, f"{held} of {total}"
+
+
+def test_a_decay_of_all_axes(files: list[Path], tmp_path: Path) -> None:
+    whole = hit(MODES, 7)
+    stop = [replace(record, force_n=None, response=record.response[90:]) for record in whole]
+    found = sg.identify(write(tmp_path / "stop.csv", stop), READ, across=True)
+    check(found, MODES, within=0.05)
+    with pytest.raises(RecordError, match="one record of all axes"):
+        sg.identify(along(stop, "y"), across=[replace(record, source="other") for record in along(stop, "z")])
+
+
+def responses(modes: Structure) -> dict[str, sg.FrequencyResponse]:
+    """Accelerance over a push along Y, with noise."""
+    hertz, rng = np.arange(5.0, 300.0, 0.25), np.random.default_rng(3)
+    s = 2j * np.pi * hertz
+    found = {}
+    for k, letter in enumerate(AXES):
+        lines = sum(
+            shape[1]
+            * shape[k]
+            / mode.mass_kg
+            * s**2
+            / (s**2 + 2.0 * mode.damping_ratio * mode.omega * s + mode.omega**2)
+            for mode, shape in modes
+        )
+        noise = 1e-3 * (rng.standard_normal(len(s)) + 1j * rng.standard_normal(len(s)))
+        found[letter] = sg.FrequencyResponse(letter, hertz, np.asarray(lines + noise, dtype=np.complex128), axis=letter)
+    return found
+
+
+def test_frequency_responses() -> None:
+    lines = responses(MODES)
+    check(sg.identify([lines["y"]], across=[lines["x"], lines["z"]]), MODES)
+
+
+def test_a_sweep_beside_a_sensor_of_three_axes(tmp_path: Path) -> None:
+    machine, program = sg.Machine.load("vx500"), tmp_path / "SWEEP.NC"
+    write_sweep(program, machine, "y", seconds=40.0)
+    command = known_command(program, machine)
+    modes, rocking = [ShakenMode(0.5, 23.0, 0.02), ShakenMode(0.3, 46.0, 0.03)], {23.0: (0.1, -0.4), 46.0: (0.0, 0.8)}
+    channels = {"y": shaken(command.position * 1e3, command.period_s, modes)}
+    times = channels["y"][0]
+    carried = shaken(command.position * 1e3, command.period_s, [])[1]
+    for k, letter in enumerate("xz"):
+        motion = np.zeros(len(times))
+        for mode in modes:
+            own = shaken(command.position * 1e3, command.period_s, [mode])[1] - carried
+            motion += rocking[mode.frequency_hz][k] * own
+        channels[letter] = times, motion
+    samples = {letter: logged(*channel, Logger(), 5 + AXES.index(letter)) for letter, channel in channels.items()}
+    clock = samples["y"][0]
+    records = [sg.Record("phone", float(clock[1]), samples[letter][1], axis=letter) for letter in AXES]
+    found = sg.identify(write(tmp_path / "phone.csv", records), sweep=program, machine=machine, across=True)
+    assert [mode.frequency_hz.value for mode in found.modes] == pytest.approx([23.0, 46.0], rel=0.005)
+    for mode, (x, z) in zip(found.modes, rocking.values(), strict=True):
+        assert mode.moves is not None and mode.moves.x is not None and mode.moves.z is not None
+        assert mode.moves.x.value == pytest.approx(x, abs=0.03)
+        assert mode.moves.z.value == pytest.approx(z, abs=0.03)
+
+
+def moves(machine: sg.Machine) -> list[Mapping[str, float] | None]:
+    modes = sorted(machine.axes.y.modes, key=lambda mode: mode.frequency_hz)
+    return [None if mode.moves is None else mode.moves.model_dump() for mode in modes]
+
+
+def test_into_the_machine_file_and_back(files: list[Path], tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(sg.Machine.load("vx500").to_toml(short=True))
+    names = [str(each) for each in files]
+    done = run(tmp_path, "identify", *names, "--axis", "y", "--update", file, "--keep-modes", "x", "--across")
+    assert done.returncode == 0, done.stderr
+    assert "what each mode moves" in done.stdout
+    said = moves(sg.Machine.load(file))
+    assert said[0] is not None and said[0]["z"] == pytest.approx(0.3, abs=0.01)
+    assert said[1] is not None and said[1]["x"] == 0.0  # not told from nothing
+    once = file.read_text()
+    run(tmp_path, "identify", *names, "--axis", "y", "--update", file, "--keep-modes", "x", "--across")
+    assert file.read_text() == once
+    # A tap along one axis keeps what is known of the others; a sensor that sees nothing there takes it out.
+    run(tmp_path, "identify", *names, "--axis", "y", "--update", file, "--keep-modes", "x")
+    assert moves(sg.Machine.load(file)) == said
+    still = [(mode, (0.0, shape[1], 0.0)) for mode, shape in MODES]
+    records = [record for seed in (1, 2, 3) for record in hit(still, seed)]
+    update = sg.update_machine(file, sg.identify(along(records, "y"), across=records), keep_modes="x")
+    assert moves(update.machine) == [{"x": 0.0, "y": 1.0, "z": 0.0}] * 3
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--axis", "y", "--across", "{alone}"], "no response along X or Z"),
+        (["--across"], "which|--axis|axis is x"),
+        (["--axis", "y", "--across", "none.csv"], "none.csv"),
+    ],
+)
+def test_what_cannot_tell_is_refused(files: list[Path], tmp_path: Path, options: list[str], words: str) -> None:
+    alone = write(tmp_path / "alone.csv", along(hit(MODES, 4), "y"))
+    done = run(tmp_path, "identify", str(files[0]), *(each.format(alone=alone) for each in options))
+    assert done.returncode == 2
+    assert any(word in done.stderr for word in words.split("|")), done.stderr
+
+
+def test_another_quantity_is_refused() -> None:
+    records = hit(MODES, 1)
+    others = [replace(record, quantity="velocity") for record in along(records, "z")]
+    with pytest.raises(RecordError, match=r"velocity.*acceleration"):
+        sg.identify(along(records, "y"), across=others)
