@@ -100,6 +100,7 @@ def test_a_sensor_that_is_turned_between_taps() -> None:
     check(found, MODES, within=0.05)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth() -> None:
     held = total = 0
     for seed in range(100, 112):

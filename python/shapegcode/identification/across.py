@@ -30,6 +30,7 @@ Measured = Record | FrequencyResponse
 _AXES = "xyz"
 _WIDTHS, _NEAREST = 8.0, 0.08  # half-power widths around a mode, and share of its frequency, that are fitted
 _LOCAL_WIDTHS, _LOCAL_LINES = 2.0, 4  # of what is left around a mode
+_HITS_TO_SCATTER = 5  # fewer say little of how hits differ
 _NO_VIBRATION = 0.3  # damping ratio of what is background
 _OUT_OF_PHASE = 1.0  # tan of the phase beyond which two directions do not move together
 
@@ -291,7 +292,7 @@ def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int)
     ratio = complex(np.sum(np.conj(one) * two) / np.sum(weight))
     variance = float(np.sum(weight * (two_variance + abs(ratio) ** 2 * one_variance)) / np.sum(weight) ** 2)
     half = 1.96 * np.sqrt(0.5 * variance)
-    if len(one) > 2:
+    if len(one) >= _HITS_TO_SCATTER:
         scatter = np.sum((weight / np.sum(weight) * np.abs(two / one - ratio)) ** 2) * len(one) / (len(one) - 1)
         half = max(half, float(stats.t.ppf(0.975, len(one) - 1) * np.sqrt(0.5 * scatter)))
     return ratio, Estimate(ratio.real, ratio.real - half, ratio.real + half)
