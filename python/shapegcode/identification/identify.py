@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
 from shapegcode.identification.across import measured_across, with_moves
+from shapegcode.identification.capture import find_modes_of_captures, is_capture
 from shapegcode.identification.checks import Prepared, RecordUse, prepare
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
 from shapegcode.identification.model_search import (
@@ -150,6 +151,11 @@ def _identified(
                 from shapegcode.identification.known_command import find_modes_of_command, known_command
 
                 return find_modes_of_command(known_command(sweep, machine), sources, options, sought, across=across)
+            captures = [Path(each) for each in sources if isinstance(each, str | Path) and is_capture(Path(each))]
+            if captures:
+                if len(captures) < len(sources):
+                    raise RecordError(f"{captures[0]}: a capture of command and encoder: other files go apart")
+                return find_modes_of_captures(captures, options, sought)
             swept = _swept(sources, options)
             if swept is not None:
                 return find_swept_modes(swept, names, sought)

@@ -10,19 +10,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.ndimage import uniform_filter1d
 from scipy.optimize import minimize_scalar
-from scipy.signal import czt, resample_poly
+from scipy.signal import resample_poly
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.across import with_moves
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
+from shapegcode.identification.parts import Spectra, transform
 from shapegcode.identification.result import Identification, Sweep
 from shapegcode.identification.sweep_program import commanded, moving_parts
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
@@ -35,7 +35,6 @@ _CLOCK = 0.025  # the logger's clock may be off by this share
 _COARSE_STEP, _FINE_STEP = 0.001, 5e-5
 _COARSE_HZ = 40.0  # start and clock are first looked for in what lies below
 _AFTER_S = 3.0  # of the record behind the last part
-_EXCITED = 0.2  # of the median of the command's spectrum, in amplitude: lines below are not used
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # of a part against the others
 _EXPLAINED = 0.5  # share of a part's power that the others must explain
@@ -53,9 +52,6 @@ _GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
 _LOWEST_SHARE = 0.15  # of the power of the command
 _CORRELATED = 0.25  # squared correlation of a part, below 40 Hz
 _OWN = 0.1  # of the largest line of a part, in power
-_SMOOTH_LINES = 31
-_COHERENT = 0.9
-_BESIDE = 0.3  # of the lines around, in power: weaker lines show noise
 _LAGS_S = np.arange(-0.1, 0.1, 2.5e-4)
 
 
@@ -184,46 +180,6 @@ def _aligned(
     return best.aligned(band_hz, len(records) > 1, others)
 
 
-@dataclass(frozen=True, eq=False)
-class _Spectra:
-    """Of each part, at the same lines and on the program's time."""
-
-    hertz: FloatArray  # (n,)
-    command: ComplexArray  # (parts, n)
-    response: ComplexArray  # (parts, n)
-
-    @property
-    def turn(self) -> ComplexArray:
-        """(n,) i omega."""
-        return np.asarray(2j * np.pi * self.hertz)
-
-    @cached_property
-    def power(self) -> FloatArray:
-        """(n,) of the command."""
-        return np.asarray(np.sum(np.abs(self.command) ** 2, axis=0), dtype=np.float64)
-
-    def late(self, lags_s: FloatArray) -> _Spectra:
-        """The same with the response of each part so much earlier."""
-        return replace(self, response=self.response * np.exp(self.turn * lags_s[:, None]))
-
-    def of(self, rows: npt.NDArray[np.intp]) -> _Spectra:
-        """Some parts."""
-        return replace(self, command=self.command[rows], response=self.response[rows])
-
-    def ratio(self) -> ComplexArray:
-        """(n,) response over command, by least squares over the parts."""
-        return np.asarray(np.sum(np.conj(self.command) * self.response, axis=0) / np.maximum(self.power, 1e-300))
-
-    def in_twos(self, rows: npt.NDArray[np.intp]) -> _Spectra:
-        """Sums of the parts 0 and 1, 2 and 3, ...: what one leaves in the next is within one window."""
-        first = [np.flatnonzero(rows // 2 == pair) for pair in np.unique(rows // 2)]
-        return replace(
-            self,
-            command=np.array([self.command[each].sum(axis=0) for each in first]),
-            response=np.array([self.response[each].sum(axis=0) for each in first]),
-        )
-
-
 def _held_at_ends(values: FloatArray) -> bool:
     """Whether the largest or the smallest value stands for samples in a row, again and again."""
     for end in (np.max(values), np.min(values)):
@@ -343,7 +299,7 @@ class _Clock:
             beside.append(replace(response, source=other.source, response=lines, axis=other.axis))
         return _Aligned(self.record, response, tuple(notes), tuple(beside))
 
-    def _spectra(self, band_hz: tuple[float, float] | None) -> _Spectra:
+    def _spectra(self, band_hz: tuple[float, float] | None) -> Spectra:
         """Lines of command and response of each part."""
         period = self.record.period_s * (1.0 + self.rate)
         low, high = band_hz or (_LOWEST_HZ, np.inf)
@@ -357,11 +313,11 @@ class _Clock:
             first, last = max(first, 0), min(last, len(self.values))
             part = self.values[first:last]
             part = part - np.mean(part) if len(part) else part
-            response = _transform(part, first * period - self.start_s, period, hertz) * period
+            response = transform(part, first * period - self.start_s, period, hertz) * period
             every = self.command.period_s
             first, last = round(begin / every), round(end / every)
-            rows.append((_transform(self.command.kicks[first:last], first * every, every, hertz), response))
-        return _Spectra(hertz, np.array([each for each, _ in rows]), np.array([each for _, each in rows]))
+            rows.append((transform(self.command.kicks[first:last], first * every, every, hertz), response))
+        return Spectra(hertz, np.array([each for each, _ in rows]), np.array([each for _, each in rows]))
 
     def _clear_parts(self) -> npt.NDArray[np.intp]:
         """Parts of the program that the record shows beyond doubt."""
@@ -384,7 +340,7 @@ class _Clock:
             f"machine file of this control? The clock of the logger may be off by {100 * _CLOCK:g} %"
         )
 
-    def _refine(self, spectra: _Spectra, rows: npt.NDArray[np.intp]) -> None:
+    def _refine(self, spectra: Spectra, rows: npt.NDArray[np.intp]) -> None:
         """The rate for which the parts agree best on one response."""
         power = np.maximum(spectra.power, 1e-300)
         middles = np.array([np.mean(self.windows[row]) for row in rows])
@@ -422,22 +378,13 @@ class _Clock:
             notes.append(f"{self.record.source}: {what} the record does not go with the program ({cause}): not used")
         return notes
 
-    def _response(self, spectra: _Spectra) -> FrequencyResponse:
+    def _response(self, spectra: Spectra) -> FrequencyResponse:
         """Minus the response over the command where the command excites and parts agree."""
-        ratio, power = spectra.ratio(), spectra.power
-        left = np.sum(np.abs(spectra.response - ratio * spectra.command) ** 2, axis=0) / max(
-            len(spectra.command) - 1, 1
-        )
-        noise = uniform_filter1d(left, _SMOOTH_LINES) / np.maximum(power, 1e-300)
-        size = np.abs(ratio) ** 2
-        coherence = size / (size + noise + 1e-300)
-        used = (power > _EXCITED**2 * np.median(power)) & (power > _BESIDE * median_filter(power, _SMOOTH_LINES))
-        clear = uniform_filter1d(coherence, _SMOOTH_LINES) > _COHERENT
-        good = np.flatnonzero(used & clear)
-        if len(good) < FEWEST_LINES:
+        used, coherence = spectra.coherent()
+        if np.count_nonzero(used) < FEWEST_LINES:
             raise RecordError(self._no_relation("no line is coherent with the command"))
-        used[: good[0]] = used[good[-1] + 1 :] = False
-        hertz, ratio, coherence = spectra.hertz[used], ratio[used], coherence[used]
+        power = spectra.power
+        hertz, ratio, coherence = spectra.hertz[used], spectra.ratio()[used], coherence[used]
         # What is left of a delay and the lag of a position loop, by all lines: those that bring phases best together.
         turn, turns = 2j * np.pi * hertz, np.exp(2j * np.pi * hertz * _LAGS_S[:, None])
         loops = [np.ones(len(hertz), dtype=np.complex128), *(1.0 + turn / gain for gain in _GAINS_PER_S)]
@@ -454,7 +401,7 @@ class _Clock:
         )
 
 
-def _in_place(spectra: _Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
     """Parts that are clear, or correlate with their command best where they should be and stand out or are between."""
     lags = np.linspace(-_AWAY_S, _AWAY_S, 401)
     crossed = spectra.response * np.conj(spectra.command)
@@ -466,7 +413,7 @@ def _in_place(spectra: _Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np
     return np.flatnonzero(clear | (near & (rows > ends[0]) & (rows < ends[1])))
 
 
-def _lags(spectra: _Spectra) -> FloatArray:
+def _lags(spectra: Spectra) -> FloatArray:
     """By how much the response of each part is later than the others say, s."""
     lags = np.zeros(len(spectra.command))
     for _ in range(_ROUNDS):
@@ -486,7 +433,7 @@ def _lags(spectra: _Spectra) -> FloatArray:
     return lags - float(np.mean(lags))
 
 
-def _explained(spectra: _Spectra) -> FloatArray:
+def _explained(spectra: Spectra) -> FloatArray:
     """Share of the power of each part, where the command has most of its own, that the other parts explain."""
     found = []
     for row in range(len(spectra.command)):
@@ -497,15 +444,6 @@ def _explained(spectra: _Spectra) -> FloatArray:
         total = float(np.sum(np.abs(spectra.response[row][inside]) ** 2))
         found.append(1.0 - float(np.sum(np.abs(left) ** 2)) / max(total, 1e-300))
     return np.array(found)
-
-
-def _transform(values: FloatArray, begin_s: float, period_s: float, hertz: FloatArray) -> ComplexArray:
-    """Sum of the values times exp(-i omega t), at evenly spaced frequencies."""
-    if not len(values):
-        return np.zeros(len(hertz), dtype=np.complex128)
-    turn = -2j * np.pi * period_s
-    lines = czt(values, len(hertz), np.exp(turn * (hertz[1] - hertz[0])), np.exp(-turn * hertz[0]))
-    return np.asarray(lines * np.exp(-2j * np.pi * hertz * begin_s), dtype=np.complex128)
 
 
 def _low_passed(command: KnownCommand, highest_hz: float) -> tuple[ComplexArray, FloatArray]:

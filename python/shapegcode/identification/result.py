@@ -162,7 +162,8 @@ class Sweep:
     frequency_hz: FloatArray  # (n,) middles of the bins
     amplitude: FloatArray  # (n,) of the response over the command's course, any unit
     fitted: FloatArray  # (n,) of the model
-    command: str = ""  # program whose command is known; empty: taken from the record
+    command: str = ""  # program or capture whose command is known; empty: taken from the record
+    kind: str = "sweep without force"
 
 
 @dataclass(frozen=True)
@@ -268,12 +269,12 @@ class Identification(Result):
         """Where the modes come from, for the machine file."""
         names = ", ".join(Path(file).name for file in self.files)
         if self.responses or self.sweep is not None:
-            return f"{'frequency response' if self.responses else 'sweep without force'} {names}"
+            return f"{'frequency response' if self.sweep is None else self.sweep.kind} {names}"
         return f"free decay {names}" if self.decay else f"tap test {names}, {self._counted()}"
 
     def _counted(self) -> str:
         if self.sweep is not None:
-            return "a sweep without force"
+            return f"a {self.sweep.kind}"
         count = len(self.taps) + len(self.responses)
         kind = "frequency response" if self.responses else "decay" if self.decay else "tap"
         return f"{count} {kind}{'' if count == 1 else 's'}"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.errors import ArgumentError
+from shapegcode.errors import ArgumentError, RecordError
 from shapegcode.io.columns import Label, Meaning, read_label, unit_of, words_of
 from shapegcode.io.table import TextTable
 from shapegcode.io.units import factor_between, find_unit, units_of
@@ -93,6 +93,17 @@ def _columns(table: TextTable) -> _Columns:
             f"{table.where}: only actual positions; the commanded ones are needed (columns X, Y, Z or X_cmd, ...)"
         )
     return found
+
+
+def is_servo_log(path: Path, head: bytes) -> bool:
+    """Whether a file is text whose header names command and actual position of an axis."""
+    if b"\0" in head or not any(word.encode() in head.lower() for word in _ACTUAL):
+        return False
+    try:
+        found = _columns(TextTable(path))
+    except (ArgumentError, RecordError):
+        return False
+    return bool(set(found.command) & set(found.actual))
 
 
 def _time_unit(table: TextTable, label: Label, step: float) -> float:

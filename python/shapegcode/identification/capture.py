@@ -1,0 +1,136 @@
+"""Modes from a control's own capture: commands and actual positions of an axis while it did its work.
+
+The position loop moves the point that its encoder measures, and what stands on it vibrates as with that point held. At
+such a frequency the structure takes the force that would have moved the encoder: actual over command has a dip there,
+and command over actual a peak. The drive between both is smooth beside a mode and takes up the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shapegcode.errors import RecordError
+from shapegcode.identification.frf_fit import find_frf_modes
+from shapegcode.identification.model_search import Sought
+from shapegcode.identification.parts import Spectra, transform
+from shapegcode.identification.result import Identification, Sweep
+from shapegcode.identification.servo.record import ServoTrace, read_servo_record
+from shapegcode.identification.sweep_program import moving_parts
+from shapegcode.io.data_file import open_file
+from shapegcode.io.edge_json import is_edge_json
+from shapegcode.io.frequency_response import FEWEST_LINES, FrequencyResponse
+from shapegcode.io.record import FloatArray, ReadOptions
+from shapegcode.io.servo_log import is_servo_log
+
+_LOWEST_HZ, _OVER_HALF = 4.0, 2.5  # samples in a cycle of the highest line
+_WINDOW_S = 8.0  # of a motion without rests
+_AFTER_S = 1.0  # of what rings on behind the last part
+_FEWEST_PARTS = 2
+
+
+def is_capture(path: Path) -> bool:
+    """Whether a file holds commands and actual positions of axes."""
+    with open_file(path) as file:
+        head = file.read(4096)
+    return is_edge_json(head) or is_servo_log(path, head)
+
+
+def find_modes_of_captures(paths: Sequence[Path], options: ReadOptions, sought: Sought) -> Identification:
+    """Find the modes of one axis in captures; see `identify.identify`."""
+    traces, notes = [], []
+    for path in paths:
+        record = read_servo_record(path)
+        traces.append((str(path), record.period_s, _axis_of(str(path), record.axes, options.axis)))
+        notes += [f"{path}: {note}" for note in record.notes]
+    responses = [_response(*each, sought.band_hz, options.axis) for each in traces]
+    found = find_frf_modes(responses, tuple(map(str, paths)), replace(sought, phase_known=False))
+    (source, period_s, trace), first = traces[0], responses[0]
+    notes.append("of what the encoder measures: the modes with it held, no masses")
+    return replace(
+        found,
+        notes=(*notes, *found.notes),
+        responses=(),
+        fitted_lines=(),
+        noise_rms=None,
+        sweep=Sweep(
+            source, first.axis, trace.samples, period_s, found.responses[0].frequency_hz,
+            np.abs(found.responses[0].response), np.abs(found.fitted_lines[0]), command=source,
+            kind="capture of command and encoder",
+        ),
+    )  # fmt: skip
+
+
+def _axis_of(source: str, traces: Sequence[ServoTrace], axis: str | None) -> ServoTrace:
+    """The trace of an axis: X, X1, 1 (X1)."""
+    linear = [each for each in traces if each.unit == "mm"]
+    named = [each for each in linear if axis is not None and axis in _letters(each.name)]
+    if len(named) == 1 or (axis is not None and len(linear) == 1 and not _letters(linear[0].name)):
+        return (named or linear)[0]
+    names = ", ".join(each.name for each in traces)
+    wanted = "say --axis x, y or z" if axis is None else f"none or several are called {axis.upper()}"
+    raise RecordError(f"{source}: holds command and actual position of {names}: {wanted}")
+
+
+def _letters(name: str) -> set[str]:
+    """Axes that a name may mean."""
+    return {letter for letter in "xyz" if letter in name.lower()}
+
+
+def _response(
+    source: str, period_s: float, trace: ServoTrace, band_hz: tuple[float, float] | None, axis: str | None
+) -> FrequencyResponse:
+    """Minus command over actual, where the command excites and the parts agree."""
+    windows = _windows(trace, period_s)
+    if len(windows) < _FEWEST_PARTS:
+        raise RecordError(
+            f"{source}: {trace.name} moves in {len(windows)} part{'' if len(windows) == 1 else 's'}: needed are two "
+            f"between rests of half a second, or {1.5 * _WINDOW_S:g} s of motion"
+        )
+    low, high = band_hz or (_LOWEST_HZ, np.inf)
+    high = min(high, 1.0 / (_OVER_HALF * period_s))
+    longest = max(len(command) for command, _ in windows) * period_s
+    hertz = np.arange(max(low, _LOWEST_HZ), high, 0.5 / longest)
+    if len(hertz) < FEWEST_LINES:
+        raise RecordError(
+            f"{source}: a sample every {period_s * 1e3:g} ms tells nothing between {low:g} and {high:g} Hz"
+        )
+    rows = [[transform(_kicks(each), 0.0, period_s, hertz) for each in pair] for pair in windows]
+    spectra = Spectra(hertz, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
+    used, coherence = spectra.coherent()
+    if np.count_nonzero(used) < FEWEST_LINES:
+        raise RecordError(
+            f"{source}: the actual position of {trace.name} does not go with its command between {low:g} and "
+            f"{high:.0f} Hz: too little motion, or positions too coarse; a sweep moves enough (shapegcode sweep)"
+        )
+    return FrequencyResponse(
+        source, hertz[used], -1.0 / spectra.ratio()[used], "acceleration", coherence[used], axis, scaled=False
+    )
+
+
+def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, FloatArray]]:
+    """Command and actual position of each part between rests; of a motion without rests, tapered windows."""
+    found: list[tuple[FloatArray, FloatArray]] = []
+    after, size = round(_AFTER_S / period_s), round(_WINDOW_S / period_s)
+    for command, actual in zip(trace.command, trace.actual, strict=True):
+        parts = moving_parts(command, period_s)
+        followed = [*(first for first, _ in parts[1:]), len(command)][: len(parts)]
+        for (begin, end), following in zip(parts, followed, strict=True):
+            stop = min(following, end + after)
+            if end - begin <= 2 * size:
+                found.append((command[begin:stop], actual[begin:stop]))
+                continue
+            taper = np.hanning(size)
+            for first in range(begin, stop - size + 1, size // 2):
+                both = (each[first : first + size] for each in (command, actual))
+                one, other = (np.cumsum(np.cumsum(np.diff(each, 2) * taper[1:-1])) for each in both)
+                found.append((one, other))
+    return found
+
+
+def _kicks(position: FloatArray) -> FloatArray:
+    """Change of speed at each sample, mm per period."""
+    return np.asarray(np.diff(position, 2), dtype=np.float64)
