@@ -62,8 +62,8 @@ def test_a_stiffer_loop_sees_the_same_modes(command: KnownCommand, tmp_path: Pat
         actual = encoder_m(
             command.position, command.period_s, MODES, gain_per_s=gain, bandwidth_hz=bandwidth, feed_forward=0.0
         )
-        found = sg.identify(write(tmp_path / "trace.csv", command.position, actual), sg.ReadOptions(axis="x"))
-        check(found, within=0.01)
+        file = write(tmp_path / "trace.csv", command.position, actual, step_m=1e-7)
+        check(sg.identify(file, sg.ReadOptions(axis="x")), within=0.01)
 
 
 def test_into_the_machine_file(command: KnownCommand, actual_m: FloatArray, tmp_path: Path) -> None:

@@ -67,8 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files",
         metavar="FILE",
         nargs="*",
-        help="CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML), capture of command and encoder; several of one "
-        "point together",
+        help="CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML), capture of command and encoder; several "
+        "of one point together",
     )
     add(
         "--sweep", metavar="PROGRAM", help="program that ran beside the sensor (shapegcode sweep), on the control of -m"
