@@ -92,6 +92,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--frequencies", metavar="LOW:HIGH", type=arguments.frequency_band, help=within)
     ignore = "take it as a free decay: do not use the force, even if there is one"
     add("--decay", "--ignore-force", dest="ignore_force", action="store_true", help=ignore)
+    stops = "the record is of an ordinary run: use every stop in it behind which the machine rests"
+    add("--stops", action="store_true", help=stops)
     add("--start", metavar="TIME", type=arguments.start_time, help=_HELP_TIME)
     for name, field, how, said in _OF_FILES:
         add(name, dest=field, help=said, **({"default": None} | how))
@@ -140,7 +142,7 @@ def _identify(args: argparse.Namespace) -> int:
     with runner.progress(f"fitting {', '.join(args.files)}", args):
         found = identify(
             args.files, ReadOptions(**said), max_modes=args.max_modes, modes=args.modes, band_hz=args.frequencies,
-            start_s=args.start, across=args.across or args.across is not None, strict=False, **shaken,
+            start_s=args.start, stops=args.stops, across=args.across or args.across is not None, strict=False, **shaken,
         )  # fmt: skip
     notes, wrote = list(found.notes), []
     if args.update is not None and found.modes and found.doubt and not args.force:

@@ -43,6 +43,12 @@ class _Poles:
     zeta: FloatArray  # (m,)
     applied: float  # 1/s, by which a window makes responses decay faster
 
+    @property
+    def in_plane(self) -> ComplexArray:
+        """(m,) 1/s, of the responses."""
+        turn = 1j * np.sqrt(1.0 - self.zeta**2)
+        return np.asarray(self.omega * (turn - self.zeta) - self.applied, dtype=np.complex128)
+
 
 @dataclass(frozen=True, eq=False)
 class _Amplitudes:
@@ -109,6 +115,15 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
                 )
         modes.append(replace(mode, moves=Xyz(moves["x"], moves["y"], moves["z"])))
     return replace(found, modes=tuple(modes), notes=tuple(notes))
+
+
+def left_by(modes: Sequence[IdentifiedMode], record: Record) -> float:
+    """Share of a free decay's energy that known modes leave, whatever their amplitudes."""
+    omega = 2.0 * np.pi * np.array([mode.frequency_hz.value for mode in modes])
+    poles = _Poles(omega, np.array([mode.damping_ratio.value for mode in modes]), 0.0)
+    values = record.response - np.mean(record.response)
+    left = _decays(poles, record.period_s, values)[2]
+    return float(left @ left) / max(float(values @ values), 1e-300)
 
 
 def told_moves(mode: IdentifiedMode) -> dict[str, Estimate]:
@@ -211,12 +226,7 @@ def _free_parts(ready: Prepared, records: Sequence[Record]) -> Iterator[_FreePar
 
 def _in_time(part: _FreePart, poles: _Poles) -> _Amplitudes:
     """Amplitudes at the first sample; over the hammer's force at the poles, where there was one."""
-    omega, zeta = poles.omega, poles.zeta
-    time_s = part.period_s * np.arange(len(part.values))
-    pole = omega * (-zeta + 1j * np.sqrt(1.0 - zeta**2)) - poles.applied
-    waves = np.exp(time_s[:, None] * pole)
-    smooth = np.stack((np.ones(len(time_s)), np.linspace(-1.0, 1.0, len(time_s))), axis=1)
-    value, variance, left = _solved(np.hstack((waves.real, -waves.imag, smooth)), part.values, len(omega))
+    value, variance, left = _decays(poles, part.period_s, part.values)
     spectrum = np.abs(np.fft.rfft(left)) ** 2
     hertz = np.fft.rfftfreq(len(left), part.period_s)
     local = _local(np.asarray(2.0 * np.pi * hertz, dtype=np.float64), np.asarray(spectrum, dtype=np.float64), poles)
@@ -224,8 +234,16 @@ def _in_time(part: _FreePart, poles: _Poles) -> _Amplitudes:
     if part.force is None:
         return _Amplitudes(value, variance)
     ago_s = part.period_s * (len(part.force) - np.arange(len(part.force)))
-    gain = np.exp(ago_s[:, None] * pole).T @ part.force * part.period_s
+    gain = np.exp(ago_s[:, None] * poles.in_plane).T @ part.force * part.period_s
     return _Amplitudes(value / gain, variance / np.abs(gain) ** 2)
+
+
+def _decays(poles: _Poles, period_s: float, values: FloatArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Amplitudes of the modes at the first sample beside a straight line, their variance, and what is left."""
+    time_s = period_s * np.arange(len(values))
+    waves = np.exp(time_s[:, None] * poles.in_plane)
+    smooth = np.stack((np.ones(len(time_s)), np.linspace(-1.0, 1.0, len(time_s))), axis=1)
+    return _solved(np.hstack((waves.real, -waves.imag, smooth)), values, len(poles.omega))
 
 
 def _in_lines(each: FrequencyResponse, poles: _Poles) -> _Amplitudes:

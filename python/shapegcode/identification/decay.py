@@ -31,6 +31,10 @@ _SLOWER = 0.8  # What is slower than this share of the slowest mode is motion of
 _MOTION_SHARE = 0.4
 #: The search for the strongest frequency leaves out what has fewer than so many periods in the record.
 _FEWEST_PERIODS = 3.0
+#: A stop within a run is followed by so many periods of the lowest frequency; the envelope falls to this share.
+_STOP_PERIODS, _STOP_FALLS = 3.0, 0.3
+_LOWEST_HZ = 10.0  # of modes in an ordinary run; what is slower is motion
+_MOST_STOPS = 20
 
 
 def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
@@ -133,6 +137,51 @@ def _rest_after_motion(quiet: FloatArray, period_samples: float, level: float, s
     return start + int(rest[0]) if rest.size else start
 
 
+def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
+    """One record for each stop of an ordinary run behind which the machine rests, those with least motion first.
+
+    Of many the strongest ones. `lowest_hz`: no mode lies below; what is slower is motion of the axis.
+    """
+    quiet = np.asarray(record.response - np.median(record.response), dtype=np.float64)
+    period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
+    envelope = _envelope(quiet, period, _ENVELOPE_PERIODS * period)
+    parts = []
+    for begin, stop in _until_next(envelope, _events(envelope)):
+        rest = _rest_after_motion(quiet, period, float(envelope[begin]), begin, stop)
+        whole = max(rest, min(stop, len(envelope) - round(_ENVELOPE_PERIODS * period)) - 1)
+        if stop - rest > _STOP_PERIODS * period and envelope[whole] < _STOP_FALLS * envelope[rest]:
+            parts.append((rest, stop))
+    slow = _mean_over(_mean_over(quiet, period), period)
+
+    def moved(part: tuple[int, int]) -> float:
+        inside = slice(part[0] + round(period), part[1])
+        return float(np.sum(slow[inside] ** 2) / np.sum(quiet[inside] ** 2))
+
+    parts = sorted(sorted(parts, key=lambda part: -envelope[part[0]])[:_MOST_STOPS], key=moved)
+    return [
+        replace(
+            record,
+            source=f"{record.source} stop at {record.start_s + begin * record.period_s:.2f} s",
+            response=record.response[begin:stop],
+            start_s=record.start_s + begin * record.period_s,
+        )
+        for begin, stop in parts
+    ]
+
+
+def _overview(record: Record) -> tuple[FloatArray, float, float]:
+    """A record without its median; in samples the period of its strongest frequency, and of a first envelope."""
+    response = record.response
+    if not np.ptp(response) > 0.0:
+        raise RecordError(f"{record.source}: every sample is {response[0]:zg}: no vibration; is the sensor connected?")
+    frequency = _fast_frequency_hz(response, record.period_s)
+    if frequency == 0.0:
+        raise RecordError(f"{record.source}: {len(response)} samples and no vibration with three periods or more")
+    quiet = np.asarray(response - np.median(response), dtype=np.float64)
+    period = 1.0 / (frequency * record.period_s)
+    return quiet, period, max(_ENVELOPE_PERIODS * period, _ENVELOPE_SHARE * len(quiet))
+
+
 def find_decay(record: Record, start_s: float | None = None) -> Record:
     """The free decay in a record without force."""
     response = record.response
@@ -141,14 +190,7 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
         raise RecordError(
             f"{record.source}: start at {start_s:g} s: must be within the record, {record.start_s:g} to {last_s:g} s"
         )
-    if not np.ptp(response) > 0.0:
-        raise RecordError(f"{record.source}: every sample is {response[0]:zg}: no vibration; is the sensor connected?")
-    frequency = _fast_frequency_hz(response, record.period_s)
-    if frequency == 0.0:
-        raise RecordError(f"{record.source}: {len(response)} samples and no vibration with three periods or more")
-    quiet = np.asarray(response - np.median(response), dtype=np.float64)
-    period = 1.0 / (frequency * record.period_s)
-    window = max(_ENVELOPE_PERIODS * period, _ENVELOPE_SHARE * len(quiet))
+    quiet, period, window = _overview(record)
     if start_s is not None:
         start = int(np.ceil((start_s - record.start_s) / record.period_s - 1e-9))
         end = _end_of(_envelope(quiet, period, window), start, window)

@@ -14,9 +14,10 @@ from threadpoolctl import threadpool_limits
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
-from shapegcode.identification.across import measured_across, with_moves
+from shapegcode.identification.across import left_by, measured_across, with_moves
 from shapegcode.identification.capture import find_modes_of_captures, is_capture
 from shapegcode.identification.checks import Prepared, RecordUse, prepare
+from shapegcode.identification.decay import split_stops
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
 from shapegcode.identification.model_search import (
     ACCEPTED_PERCENT,
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
 
 _LARGEST_MODEL = 99
 _MIN_SAMPLES = 3
+_FIRST_STOPS, _STOP_LEFT = 4, 0.1  # with least motion; of a stop's energy that their modes may leave
 
 
 def identify(
@@ -62,6 +64,7 @@ def identify(
     modes: int | None = None,
     band_hz: tuple[float, float] | None = None,
     start_s: float | None = None,
+    stops: bool = False,
     accepted_percent: float | None = None,
     sweep: Program | str | Path | None = None,
     machine: Machine | str | Path | None = None,
@@ -82,6 +85,8 @@ def identify(
         modes: number of modes; None: chosen by evidence.
         band_hz: lowest and highest frequency of interest; None: all.
         start_s: time at which a decay begins; None: it is looked for.
+        stops: the records are of an ordinary run: every stop behind which the machine rests is a decay, the 20
+            strongest of each. What is slower than 10 Hz, or than the lower end of `band_hz`, is motion.
         accepted_percent: a mode is refused whose damping ratio is less certain than this (95 %; of a fit over time its
             stiffness too); None: 5 % over time, 50 % over frequency.
         sweep: the program that ran beside the sensor, of one axis, such as `write_sweep` writes: its command takes the
@@ -118,9 +123,11 @@ def identify(
     if sweep is not None and (machine is None or response is not None):
         raise ArgumentError("a sweep needs the machine whose controller ran it, and files or records")
     options = options or ReadOptions()
+    found = _identified(
+        sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is True, strict=strict
+    )
     if across is False:
-        return _identified(sources, names, options, sought, start_s, sweep, machine, across=False, strict=strict)
-    found = _identified(sources, names, options, sought, start_s, sweep, machine, across=across is True, strict=strict)
+        return found
     if sweep is not None:
         if across is not True:
             raise ArgumentError("across: a sweep needs one record of all axes: the channels beside its own are taken")
@@ -137,6 +144,7 @@ def _identified(
     sweep: Program | str | Path | None,
     machine: Machine | str | Path | None,
     *,
+    stops: bool,
     across: bool,
     strict: bool,
 ) -> Identification:
@@ -162,6 +170,8 @@ def _identified(
             records, responses = _measured(sources, options)
             if responses:
                 return find_frf_modes(responses, names, sought)
+            if stops:
+                return _modes_of_stops(_stops_in(records, None if band_hz is None else band_hz[0]), names, sought)
             ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
             return find_modes(ready, names, sought)
     except (ArgumentError, NumericError) as error:
@@ -187,6 +197,35 @@ def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record
             "apart"
         )
     return records, responses
+
+
+def _stops_in(records: Sequence[Record], lowest_hz: float | None) -> list[Record]:
+    """The stops of ordinary runs, each as a record."""
+    forced = [record for record in records if record.force_n is not None]
+    if forced:
+        raise ArgumentError(f"{forced[0].source}: holds a force: stops are looked for in a run without a hammer")
+    found = [stop for record in records for stop in split_stops(record, lowest_hz)]
+    if not found:
+        raise RecordError(
+            f"{records[0].source}: no stop behind which the machine rests for a third of a second and its vibration "
+            "falls to a third: needed is a run with pauses, such as dwells, or the decay after one stop"
+        )
+    return found
+
+
+def _modes_of_stops(records: list[Record], files: tuple[str, ...], sought: Sought) -> Identification:
+    """Modes of the stops with least motion in them, then of all that these explain."""
+    ready = prepare(records, band_hz=None if sought.band_hz is None else sought.band_hz[1])
+    first = ready.usable[: max(_FIRST_STOPS, len(ready.usable) // 3)]
+    found = find_modes(replace(ready, usable=first), files, sought)
+    if not found.modes:
+        return found
+    kept = tuple(use for use in ready.usable if left_by(found.modes, use.record) <= _STOP_LEFT)
+    if not kept:
+        return found
+    why = "the modes of the stillest stops do not explain it: something moved"
+    refused = tuple(RecordUse(use.record.source, False, why) for use in ready.usable if use not in kept)
+    return find_modes(replace(ready, usable=kept, refused=(*ready.refused, *refused)), files, sought)
 
 
 def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:
