@@ -35,7 +35,7 @@ void register_simulation(py::module_& module) {
       .def(py::init([](const std::shared_ptr<Path>& path) { return ContourTracker(*path); }),
            py::arg("path").none(false), "Raises ArgumentError on a path without segments.");
 
-  py::class_<SimulationOptions>(module, "PlaybackOptions", "What a run of set-points is measured with.")
+  py::class_<SimulationOptions>(module, "SimulationOptions", "What a run of set-points is measured with.")
       .def(py::init<>())
       .def_readwrite("period_s", &SimulationOptions::period_s, "Interpolation period, s.")
       .def_readwrite("axis_filters", &SimulationOptions::axis_filters, "Filters after the set-points, in order.")
@@ -67,7 +67,7 @@ void register_simulation(py::module_& module) {
       .def_readwrite("feed_slack_mm", &SimulationOptions::feed_slack_mm,
                      "Distance within that time that rounding may add, mm.")
       .def_readwrite("last_seconds", &SimulationOptions::last_seconds,
-                     "Blocks only: play the last so many seconds; 0: all.")
+                     "Blocks only: simulate the last so many seconds; 0: all.")
       .def_readwrite("starved_blocks", &SimulationOptions::starved_blocks,
                      "Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?")
       .def_readwrite("measure_response_orbit", &SimulationOptions::measure_response_orbit,
@@ -98,7 +98,7 @@ void register_simulation(py::module_& module) {
       .def_readonly("command_mm", &OverrideFigures::command_mm, "Of the command from the path, mm.")
       .def_readonly("response_mm", &OverrideFigures::response_mm, "Of the response from the path, mm.");
 
-  py::class_<SimulationFigures, std::shared_ptr<SimulationFigures>>(module, "PlaybackFigures",
+  py::class_<SimulationFigures, std::shared_ptr<SimulationFigures>>(module, "SimulationFigures",
                                                                     "Figures of one run from rest to rest.")
       .def_readonly("duration_s", &SimulationFigures::duration_s, "Until the set-points rest, s.")
       .def_readonly("residual_mm", &SimulationFigures::residual_mm,
@@ -116,8 +116,8 @@ void register_simulation(py::module_& module) {
                     "The same of the response, where asked for.")
       .def_readonly("feed_excess", &SimulationFigures::feed_excess, "Of the command, where asked for.")
       .def_readonly("end_mm", &SimulationFigures::end_mm, "Last set-point, (3,), mm.")
-      .def_readonly("starved", &SimulationFigures::starved, "One per PlaybackOptions.starved_blocks.")
-      .def_readonly("other_overrides", &SimulationFigures::other_overrides, "One per PlaybackOptions.other_overrides.")
+      .def_readonly("starved", &SimulationFigures::starved, "One per SimulationOptions.starved_blocks.")
+      .def_readonly("other_overrides", &SimulationFigures::other_overrides, "One per SimulationOptions.other_overrides.")
       .def_property_readonly(
           "recorded_command", [](const SimulationFigures& self) { return recorded(self.recorded_command); },
           "(n, 3), mm.")
@@ -126,7 +126,7 @@ void register_simulation(py::module_& module) {
           "(n, 3), mm.");
 
   module.def(
-      "play_path",
+      "simulate_path",
       [](std::shared_ptr<Path> path, std::shared_ptr<SpeedProfile> profile, const SimulationOptions& options,
          const std::shared_ptr<Path>& programmed) {
         const py::gil_scoped_release release;
@@ -141,7 +141,7 @@ void register_simulation(py::module_& module) {
       "the programmed path (None: the path itself).");
 
   module.def(
-      "play_planned",
+      "simulate_planned",
       [](const std::shared_ptr<Path>& path, const MotionLimits& limits, const SimulationOptions& options,
          const std::shared_ptr<Path>& programmed) {
         const py::gil_scoped_release release;
@@ -151,7 +151,7 @@ void register_simulation(py::module_& module) {
       "simulate_path under the profile of plan_speed, which is not kept as a whole where it need not be.");
 
   module.def(
-      "play_blocks",
+      "simulate_blocks",
       [](const std::shared_ptr<Path>& blocks, const std::shared_ptr<Path>& path, BlockEnd block_end,
          double override_ratio, const SimulationOptions& options) {
         const py::gil_scoped_release release;
@@ -163,7 +163,7 @@ void register_simulation(py::module_& module) {
       "Simulate blocks at their feed (a controller without look-ahead), measured against the programmed path.");
 
   module.def(
-      "play_samples",
+      "simulate_samples",
       [](const MatrixArray& positions_mm, const std::shared_ptr<Path>& path, const SimulationOptions& options) {
         const Samples samples = samples_from(positions_mm, options.period_s);
         const py::gil_scoped_release release;
@@ -173,7 +173,7 @@ void register_simulation(py::module_& module) {
       "Simulate set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.");
 
   module.def(
-      "play_duration_s",
+      "simulated_duration_s",
       [](const std::shared_ptr<Path>& blocks, double period_s, BlockEnd block_end, double override_ratio) {
         const py::gil_scoped_release release;
         return blocks_duration_s(blocks->segments(), period_s, block_end, override_ratio);

@@ -32,7 +32,7 @@ py::array kinds_of(const SimulationChunk& chunk) {
 }  // namespace
 
 void register_simulation_stream(py::module_& module) {
-  py::class_<SimulationChunk, std::shared_ptr<SimulationChunk>>(module, "PlayedChunk",
+  py::class_<SimulationChunk, std::shared_ptr<SimulationChunk>>(module, "SimulationChunk",
                                                                 "A section of a simulated motion, one row per period.")
       .def("__len__", &SimulationChunk::size)
       .def_readonly("first_sample", &SimulationChunk::first_sample,
@@ -57,7 +57,7 @@ void register_simulation_stream(py::module_& module) {
       .def_property_readonly("line", &lines_of, "Line of the block that is being interpolated, (k,).")
       .def_property_readonly("kind", &kinds_of, "Value of its BlockKind, (k,).");
 
-  py::class_<SimulationStream>(module, "PlayedStream",
+  py::class_<SimulationStream>(module, "SimulationStream",
                                "A motion simulated through filters and plant and handed out in pieces.")
       .def_static(
           "of_path",

@@ -25,7 +25,7 @@ void check_one_axis(const VectorArray& setpoints_mm) {
                                        std::to_string(setpoints_mm.ndim()) + " dimensions");
 }
 
-py::array play(FeedDrive& drive, const VectorArray& setpoints_mm) {
+py::array respond(FeedDrive& drive, const VectorArray& setpoints_mm) {
   check_one_axis(setpoints_mm);
   const double* setpoints = setpoints_mm.data();
   Eigen::MatrixXd response_rows(setpoints_mm.size(), response_columns);
@@ -212,7 +212,7 @@ Raises:
       .def("reset", &FeedDrive::reset, py::arg("position_mm"), "At rest at a position (mm).")
       .def("step", &FeedDrive::step, py::arg("setpoint_mm"),
            "Next set-point (mm); the response at that instant in mm. NumericError with CVODE's flag and the time.")
-      .def("play", &play, py::arg("setpoints_mm"), R"(Runs on over many set-points.
+      .def("respond", &respond, py::arg("setpoints_mm"), R"(Runs on over many set-points.
 
 Args:
     setpoints_mm: Shape (n,), mm.
@@ -248,7 +248,7 @@ Raises:
       .def("reset", &FeedDriveRealTime::reset, py::arg("position_mm"), "At rest at a position (mm).")
       .def("step", py::overload_cast<double>(&FeedDriveRealTime::step), py::arg("setpoint_mm"),
            "Next set-point (mm); the response at that instant in mm.")
-      .def("play", &simulate_in_real_time, py::arg("setpoints_mm"),
+      .def("respond", &simulate_in_real_time, py::arg("setpoints_mm"),
            "Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.");
 }
 

@@ -241,7 +241,7 @@ void register_gcode(py::module_& module) {
           "Offset memory A, B or C.")
       .def_readwrite("retained_variables", &ReaderOptions::retained_variables, "#500 ... #999.")
       .def_readwrite("bindings", &ReaderOptions::bindings, "Codes bound to programs.")
-      .def_readwrite("program", &ReaderOptions::program, "O number to play of a file with several; -1: the first.")
+      .def_readwrite("program", &ReaderOptions::program, "O number to run of a file with several; -1: the first.")
       .def_readwrite("program_index", &ReaderOptions::program_index,
                      "The same by its index in `list_programs`, whatever its name, and alone; -1: by number.")
       .def_property(

@@ -215,8 +215,8 @@ from shapegcode.simulation.result import (
     Simulation as Simulation,
 )
 from shapegcode.simulation.simulate import (
-    play_motion as play_motion,
     simulate as simulate,
+    simulate_motion as simulate_motion,
 )
 from shapegcode.studies.optimize import optimize as optimize
 from shapegcode.studies.plots import (

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_planned', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1852,7 +1852,7 @@ class ReaderOptions:
     @property
     def program(self) -> int:
         """
-        O number to play of a file with several; -1: the first.
+        O number to run of a file with several; -1: the first.
         """
     @program.setter
     def program(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2599,7 +2599,11 @@ class FeedDrive:
         """
         ArgumentError on a value outside its range.
         """
-    def play(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+    def reset(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        At rest at a position (mm).
+        """
+    def respond(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
         """
         Runs on over many set-points.
         
@@ -2613,10 +2617,6 @@ class FeedDrive:
         Raises:
             ArgumentError: Another shape or a value that is not finite.
             NumericError: The integrator failed; with CVODE's flag and the time.
-        """
-    def reset(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        """
-        At rest at a position (mm).
         """
     def step(self, setpoint_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
@@ -2673,13 +2673,13 @@ class FeedDriveRealTime:
         """
         ArgumentError on a value outside its range.
         """
-    def play(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
-        """
-        Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.
-        """
     def reset(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         At rest at a position (mm).
+        """
+    def respond(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.
         """
     def step(self, setpoint_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
@@ -3537,7 +3537,7 @@ class ContourTracker:
         """
         Raises ArgumentError on a path without segments.
         """
-class PlaybackOptions:
+class SimulationOptions:
     """
     What a run of set-points is measured with.
     """
@@ -3586,7 +3586,7 @@ class PlaybackOptions:
     @property
     def last_seconds(self) -> float:
         """
-        Blocks only: play the last so many seconds; 0: all.
+        Blocks only: simulate the last so many seconds; 0: all.
         """
     @last_seconds.setter
     def last_seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -3778,7 +3778,7 @@ class OverrideFigures:
         """
         Of the response from the path, mm.
         """
-class PlaybackFigures:
+class SimulationFigures:
     """
     Figures of one run from rest to rest.
     """
@@ -3810,7 +3810,7 @@ class PlaybackFigures:
     @property
     def other_overrides(self) -> list[OverrideFigures]:
         """
-        One per PlaybackOptions.other_overrides.
+        One per SimulationOptions.other_overrides.
         """
     @property
     def peak_acceleration_mm_per_s2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -3855,7 +3855,7 @@ class PlaybackFigures:
     @property
     def starved(self) -> list[StarvedFigures]:
         """
-        One per PlaybackOptions.starved_blocks.
+        One per SimulationOptions.starved_blocks.
         """
 class SectionKind:
     """
@@ -5128,7 +5128,7 @@ class InterpolatedTime:
         """
         Sum of the parts below, s.
         """
-class PlayedChunk:
+class SimulationChunk:
     """
     A section of a simulated motion, one row per period.
     """
@@ -5179,26 +5179,26 @@ class PlayedChunk:
         """
         Of the command over the period that ends with the row, without the jumps of coordinates, (k, 3), mm/s.
         """
-class PlayedStream:
+class SimulationStream:
     """
     A motion simulated through filters and plant and handed out in pieces.
     """
     @staticmethod
-    def of_blocks(blocks: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: PlaybackOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+    def of_blocks(blocks: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: SimulationOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
         Blocks at their feed.
         """
     @staticmethod
-    def of_path(path: Path, profile: SpeedProfile, options: PlaybackOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+    def of_path(path: Path, profile: SpeedProfile, options: SimulationOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
         A path under a speed profile; behind its end the set-points rest for rest_s.
         """
     @staticmethod
-    def of_program(program: ProgramText, model: FanucModel, options: PlaybackOptions, region_offsets_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]] = [], rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+    def of_program(program: ProgramText, model: FanucModel, options: SimulationOptions, region_offsets_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]] = [], rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
         A whole program on one time axis. region_offsets_mm: from the positions of each region to the machine's, for modes that vary with them. Raises ArgumentError on a model that no controller can have.
         """
-    def read(self, most: typing.SupportsInt | typing.SupportsIndex) -> PlayedChunk:
+    def read(self, most: typing.SupportsInt | typing.SupportsIndex) -> SimulationChunk:
         """
         The next rows, at most so many; none behind the end.
         """
@@ -6778,26 +6778,6 @@ def plant_response(command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
     Raises:
         ArgumentError: Not as many lists of modes as axes, a command that is not finite, an invalid mode or period.
     """
-def play_blocks(blocks: Path, path: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: PlaybackOptions) -> PlaybackFigures:
-    """
-    Simulate blocks at their feed (a controller without look-ahead), measured against the programmed path.
-    """
-def play_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.SupportsIndex, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
-    """
-    Sum of block durations, s.
-    """
-def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions, programmed: Path = None) -> PlaybackFigures:
-    """
-    Simulate a path under a speed profile (a controller with look-ahead) through filters and plant, measured against the programmed path (None: the path itself).
-    """
-def play_planned(path: Path, limits: MotionLimits, options: PlaybackOptions, programmed: Path) -> PlaybackFigures:
-    """
-    simulate_path under the profile of plan_speed, which is not kept as a whole where it need not be.
-    """
-def play_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: PlaybackOptions) -> PlaybackFigures:
-    """
-    Simulate set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.
-    """
 def poles_to_modes(poles: collections.abc.Sequence[complex | typing.SupportsComplex | typing.SupportsFloat | typing.SupportsIndex], period_s: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     Natural frequencies and damping ratios of discrete poles: complex pairs that are stable, ascending.
@@ -6899,9 +6879,29 @@ def shape_path(path: Path, shaper: Fir, marked_segments: collections.abc.Sequenc
     """
     Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block periods. Raises ArgumentError if the block period is no multiple of the interpolation period.
     """
+def simulate_blocks(blocks: Path, path: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: SimulationOptions) -> SimulationFigures:
+    """
+    Simulate blocks at their feed (a controller without look-ahead), measured against the programmed path.
+    """
 def simulate_circle(radius_mm: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, model: FanucModel) -> CircleFigures:
     """
     Run circles in XY at a constant feed and measure the mean radius over whole turns. Raises ArgumentError on a radius or feed <= 0.
+    """
+def simulate_path(path: Path, profile: SpeedProfile, options: SimulationOptions, programmed: Path = None) -> SimulationFigures:
+    """
+    Simulate a path under a speed profile (a controller with look-ahead) through filters and plant, measured against the programmed path (None: the path itself).
+    """
+def simulate_planned(path: Path, limits: MotionLimits, options: SimulationOptions, programmed: Path) -> SimulationFigures:
+    """
+    simulate_path under the profile of plan_speed, which is not kept as a whole where it need not be.
+    """
+def simulate_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: SimulationOptions) -> SimulationFigures:
+    """
+    Simulate set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.
+    """
+def simulated_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.SupportsIndex, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
+    """
+    Sum of block durations, s.
     """
 def stabilisation_poles(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_max: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None) -> list[numpy.typing.NDArray[numpy.complex128]]:
     """

@@ -156,7 +156,7 @@ def convert(program: Path, way: Way, contour_um: float, finer: int = 0) -> Outco
     emitted = conversion.emitted.core
     places = [(emitted.cutting_path(place.first_line, place.last_line), place) for place in conversion.placed]
 
-    def play(other: sg.Machine) -> Iterator[_core.PlaybackFigures]:
+    def play(other: sg.Machine) -> Iterator[_core.SimulationFigures]:
         for blocks, place in places:
             yield _residual_of(blocks, place, other)
 
@@ -191,13 +191,13 @@ def as_programmed(program: Path) -> Outcome:
     )
 
 
-def _residual_of(blocks: _core.Path, place: Placed, machine: sg.Machine) -> _core.PlaybackFigures:
+def _residual_of(blocks: _core.Path, place: Placed, machine: sg.Machine) -> _core.SimulationFigures:
     model = MachineModel(machine)
     return model.simulate_emitted(blocks, place.region.path, contour=False, last_seconds=model.vibration_memory_s)
 
 
 def _over_bands(
-    machine: sg.Machine, play: Callable[[sg.Machine], Iterable[_core.PlaybackFigures]]
+    machine: sg.Machine, play: Callable[[sg.Machine], Iterable[_core.SimulationFigures]]
 ) -> dict[str, list[float]]:
     """Largest residual of each axis, modes as stated and within each band."""
     at = {

@@ -67,10 +67,10 @@ def feed_drive_tables(samples: int, repetitions: int) -> tuple[list[Row], list[l
     exact = [reference.play(drive, axis)[:, 0] for drive, axis in zip(drives, axes, strict=True)]
 
     def ours() -> list[Vector]:
-        return [_core.FeedDrive(parameters, _PERIOD_S, rtol, atol_mm).play(axis)[:, 0] for axis in axes]
+        return [_core.FeedDrive(parameters, _PERIOD_S, rtol, atol_mm).respond(axis)[:, 0] for axis in axes]
 
     def real_time() -> list[Vector]:
-        return [_core.FeedDriveRealTime(parameters, _PERIOD_S).play(axis) for axis in axes]
+        return [_core.FeedDriveRealTime(parameters, _PERIOD_S).respond(axis) for axis in axes]
 
     def by_period() -> list[Vector]:
         return [
@@ -127,14 +127,14 @@ def method_table(samples: int) -> list[list[str]]:
         "vx500, X": drive_parameters(Machine.load("vx500"))[0],
     }
     for name, parameters in drives.items():
-        exact = _core.FeedDrive(parameters, _PERIOD_S, 1e-10, 1e-11).play(axis)[:, 0]
+        exact = _core.FeedDrive(parameters, _PERIOD_S, 1e-10, 1e-11).respond(axis)[:, 0]
         for restart in (False, True):
             evaluations, found = _evaluations(parameters, axis, restart)
             what = "restarted at every set-point" if restart else "running on"
             error_um = float(np.abs(found - exact).max()) * 1e3
             rows.append([name, f"FeedDrive, {what}", f"{evaluations:.1f}", f"{error_um:.3f}"])
         for substeps in (1, 2, 4, 8):
-            found = _core.FeedDriveRealTime(parameters, _PERIOD_S, substeps).play(axis)
+            found = _core.FeedDriveRealTime(parameters, _PERIOD_S, substeps).respond(axis)
             error_um = float(np.abs(found - exact).max()) * 1e3
             rows.append([name, f"FeedDriveRealTime, substeps: {substeps}", f"{3 * substeps}", f"{error_um:.3f}"])
     return rows

@@ -68,14 +68,14 @@ def main() -> int:
     least("original simulated", lambda: model.simulate_original(path, offset=offset))
     for rule in BLOCK_ENDS:
 
-        def emitted_played(rule: _core.BlockEnd = rule) -> _core.PlaybackFigures:
+        def emitted_played(rule: _core.BlockEnd = rule) -> _core.SimulationFigures:
             return model.simulate_emitted(blocks, path, rule, offset=offset, tracker=tracker, increment_mm=1e-3)
 
         least(f"emitted text simulated, {rule.name}", emitted_played)
     least("the same, the table alone", lambda: model.simulate_emitted(
         blocks, path, offset=offset, tracker=tracker, command_contour=False))  # fmt: skip
     least("emitted text, planned anew", lambda: model.simulate_planned(blocks, path, offset=offset, tracker=tracker))
-    least("time of the blocks", lambda: _core.play_duration_s(blocks, model.period_s, model.own_rule, 0.8))
+    least("time of the blocks", lambda: _core.simulated_duration_s(blocks, model.period_s, model.own_rule, 0.8))
     return 0
 
 

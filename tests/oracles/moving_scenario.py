@@ -51,7 +51,7 @@ def played_residuals_um(
 ) -> Array:
     """Residual vibration of X after each stop, µm: every stroke shaped, written as blocks, played through the plant."""
     command = [shape(run) for run in runs]
-    options = _core.PlaybackOptions()
+    options = _core.SimulationOptions()
     options.period_s = TICK_S
     options.modes = [[modes], [], []]
     options.mode_tables = [[table], [], []]
@@ -62,7 +62,7 @@ def played_residuals_um(
         time = np.arange(len(grid)) * BLOCK_S
         fine = np.arange(0.0, time[-1] + 0.5 * TICK_S, TICK_S)
         positions = np.column_stack([np.interp(fine, time, grid[:, axis]) for axis in range(3)])
-        figures = _core.play_samples(positions, _core.Path([]), options)
+        figures = _core.simulate_samples(positions, _core.Path([]), options)
         residuals.append(float(figures.residual_mm[0]) * 1e3)
     return np.array(residuals)
 

@@ -204,7 +204,7 @@ def test_every_function_takes_the_path_of_a_file(emitted: Path, original: Path, 
         "check": lambda program: sg.check(program, machine),
         "cycle_time": lambda program: sg.cycle_time(program, machine),
         "simulate": lambda program: sg.simulate(program, machine, record_samples=0),
-        "play_motion": lambda program: sg.play_motion(program, machine),
+        "simulate_motion": lambda program: sg.simulate_motion(program, machine),
         "stream": lambda program: next(iter(sg.stream(program, machine))),
         "measure": lambda program: sg.measure(program, machine, 10.0),
     }

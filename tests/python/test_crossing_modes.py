@@ -100,10 +100,10 @@ def test_behind_feed_drives_the_tables_excite_it() -> None:
     model = MachineModel(machine)
     options = model.options(plant="feed-drive")
     options.record_samples = 2000
-    figures = model.ordinary.play(path, options)
+    figures = model.ordinary.simulate(path, options)
     plain = MachineModel(machine.with_values("axes.y.modes", [])).options(plant="feed-drive")
     plain.record_samples = 2000
-    alone = model.ordinary.play(path, plain)
+    alone = model.ordinary.simulate(path, plain)
     table, response = alone.recorded_response, figures.recorded_response
     length = min(len(table), len(response))
     rocking = 0.8 * deflection(np.asarray(table)[:length, 1], 41.0, 0.03)

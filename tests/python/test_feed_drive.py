@@ -92,9 +92,9 @@ def quadrant_mm(count: int) -> Vector:
 def test_friction_plant_is_radaus(changes: dict[str, Any], setpoints: Vector, allowed_um: float) -> None:
     parameters = drive(**changes)
     wanted = reference.play(reference.Drive(parameters, PERIOD_S), setpoints)
-    usual = _core.FeedDrive(parameters, PERIOD_S).play(setpoints)[:, :4]
+    usual = _core.FeedDrive(parameters, PERIOD_S).respond(setpoints)[:, :4]
     assert np.abs(usual - wanted)[:, :3].max() < allowed_um * 1e-3
-    tight = _core.FeedDrive(parameters, PERIOD_S, 1e-9, 1e-10).play(setpoints)[:, :4]
+    tight = _core.FeedDrive(parameters, PERIOD_S, 1e-9, 1e-10).respond(setpoints)[:, :4]
     assert np.abs(tight - wanted)[:, :3].max() < 2e-7  # mm
     assert np.abs(tight - wanted)[:, 3].max() < 2e-3  # N, of 300
 
@@ -104,7 +104,7 @@ def test_quadrant_glitch_is_there_and_a_frictionless_drive_has_none() -> None:
     turn = slice(150, 300)
 
     def glitch_um(**changes: Any) -> float:
-        table = _core.FeedDrive(drive(modes=[], **changes), PERIOD_S).play(setpoints)[turn, 1]
+        table = _core.FeedDrive(drive(modes=[], **changes), PERIOD_S).respond(setpoints)[turn, 1]
         smooth = np.polynomial.Polynomial.fit(np.arange(len(table)), table, 6)(np.arange(len(table)))
         return float(np.abs(table - smooth).max() * 1e3)
 
@@ -114,7 +114,7 @@ def test_quadrant_glitch_is_there_and_a_frictionless_drive_has_none() -> None:
 
 def test_table_sticks_at_rest_on_its_bristles() -> None:
     setpoints = reversals_mm(80)[:80]
-    simulated = _core.FeedDrive(drive(modes=[]), PERIOD_S).play(
+    simulated = _core.FeedDrive(drive(modes=[]), PERIOD_S).respond(
         np.concatenate([setpoints, np.full(600, setpoints[-1])])
     )
     rest = simulated[-200:]
@@ -131,7 +131,7 @@ def test_linear_drive_is_lsim(forward: float) -> None:
     a, b, c, d = _core.linear_model(parameters)
     times = np.arange(len(setpoints)) * PERIOD_S
     _, wanted, _ = lsim((a, b, c, d), setpoints, times)
-    found = _core.FeedDrive(parameters, PERIOD_S, 1e-11, 1e-12).play(setpoints[1:])[:, 0]
+    found = _core.FeedDrive(parameters, PERIOD_S, 1e-11, 1e-12).respond(setpoints[1:])[:, 0]
     assert np.abs(found - wanted[1:]).max() < 1e-8 * np.abs(wanted).max()
 
 
@@ -143,7 +143,7 @@ def test_acceleration_feed_forward_is_the_second_input_of_the_linear_model() -> 
     a, b, c, d = _core.linear_model(parameters)
     inputs = np.column_stack([setpoints, np.diff(setpoints, prepend=0.0) / PERIOD_S])
     _, wanted, _ = lsim((a, b, c, d), inputs, np.arange(len(setpoints)) * PERIOD_S)
-    found = _core.FeedDrive(parameters, PERIOD_S, 1e-11, 1e-12).play(setpoints[1:])[:, 0]
+    found = _core.FeedDrive(parameters, PERIOD_S, 1e-11, 1e-12).respond(setpoints[1:])[:, 0]
     assert np.abs(found - wanted[1:]).max() < 1e-8 * np.abs(wanted).max()
 
 
@@ -155,20 +155,20 @@ def test_linear_model_refuses_what_is_not_linear() -> None:
 
 def test_real_time_form_is_cvodes() -> None:
     setpoints = quadrant_mm(400)
-    found = _core.FeedDriveRealTime(drive(), PERIOD_S).play(setpoints)
-    wanted = _core.FeedDrive(drive(), PERIOD_S, 1e-9, 1e-10).play(setpoints)[:, 0]
+    found = _core.FeedDriveRealTime(drive(), PERIOD_S).respond(setpoints)
+    wanted = _core.FeedDrive(drive(), PERIOD_S, 1e-9, 1e-10).respond(setpoints)[:, 0]
     assert np.abs(found - wanted).max() < 3e-5
 
 
 def test_a_copy_is_a_drive_of_its_own() -> None:
     setpoints = quadrant_mm(100)
     first = _core.FeedDrive(drive(), PERIOD_S)
-    first.play(setpoints[:50])
+    first.respond(setpoints[:50])
     second = copy.copy(first)
     response = first.response_mm
-    second.play(setpoints[50:])
+    second.respond(setpoints[50:])
     assert first.response_mm == response
-    assert np.abs(first.play(setpoints[50:])[-1, 0] - second.response_mm) < 1e-4
+    assert np.abs(first.respond(setpoints[50:])[-1, 0] - second.response_mm) < 1e-4
 
 
 def test_bad_arguments() -> None:
@@ -181,9 +181,9 @@ def test_bad_arguments() -> None:
         )  # fmt: skip
     plant = _core.FeedDrive(drive(), PERIOD_S)
     with pytest.raises(ArgumentError, match=r"shape \(n,\)"):
-        plant.play(np.zeros((3, 3)))
+        plant.respond(np.zeros((3, 3)))
     with pytest.raises(ArgumentError, match="set-point is nan"):
-        plant.play(np.array([0.0, math.nan]))
+        plant.respond(np.array([0.0, math.nan]))
     with pytest.raises(NumericError, match=r"CVode failed with CV_\w+ at t ="):
         plant.step(1e300)
 
@@ -215,7 +215,7 @@ def test_machine_file_to_drives() -> None:
     assert -resonance.real / abs(resonance) == pytest.approx(table.damping_ratio, rel=1e-6)
     for parameters in drives:
         plant = _core.FeedDrive(parameters, PERIOD_S)
-        assert plant.play(np.minimum(0.05 * np.arange(800), 20.0))[-1, 1] == pytest.approx(20.0, abs=0.02)
+        assert plant.respond(np.minimum(0.05 * np.arange(800), 20.0))[-1, 1] == pytest.approx(20.0, abs=0.02)
 
 
 def test_a_machine_without_drives_says_which_table_it_lacks() -> None:

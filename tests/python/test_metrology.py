@@ -49,7 +49,7 @@ def paper_region(feed: float = 200.0) -> MeasuredRegion:
 
 
 @functools.cache
-def paper_samples(feed: float = 200.0) -> tuple[FloatArray, FloatArray, _core.Path, _core.PlaybackFigures]:
+def paper_samples(feed: float = 200.0) -> tuple[FloatArray, FloatArray, _core.Path, _core.SimulationFigures]:
     machine = sg.Machine.load("vx500")
     path = path_program(feed, machine).regions[-1].path
     simulated = MachineModel(machine).simulate_original(path, record_samples=10**6)

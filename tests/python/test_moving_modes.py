@@ -167,14 +167,14 @@ def test_the_plant_solves_the_varying_equation() -> None:
     time = np.arange(count + 1) * tick
     x = 20.0 * np.clip((time - 0.02) / 0.2, 0.0, 1.0) + 3.0 * np.sin(40.0 * time) * (time < 0.3)
     z = 200.0 - 210.0 * np.cos(2.0 * np.pi * time / 0.5)
-    options = _core.PlaybackOptions()
+    options = _core.SimulationOptions()
     options.period_s = tick
     options.modes = [[Mode(46.0, 0.02)], [], []]
     options.mode_tables = [[scenario.TABLE], [], []]
     options.measure_contour = False
     options.record_samples = count + 1
     positions = np.column_stack([x, 0.0 * x, z])
-    simulated = _core.play_samples(positions, _core.Path([]), options).recorded_response[:, 0]
+    simulated = _core.simulate_samples(positions, _core.Path([]), options).recorded_response[:, 0]
 
     def slope(t: float, state: np.ndarray) -> list[float]:
         omega = 2.0 * np.pi * np.interp(np.interp(t, time, z), [0.0, 200.0, 400.0], [52.0, 46.0, 41.0])

@@ -163,5 +163,5 @@ def test_none_is_no_object_of_the_core() -> None:
     )
     assert done.returncode == 0, done.stdout[-300:] + done.stderr[-2000:]
     assert int(done.stdout.split()[-1]) > 60
-    for function in ("play_path(path", "play_blocks(blocks", "play_samples(path", "time_program(program"):
+    for function in ("simulate_path(path", "simulate_blocks(blocks", "simulate_samples(path", "time_program(program"):
         assert f".{function}=None)" in done.stdout

@@ -49,7 +49,7 @@ def vx500() -> sg.Machine:
 
 
 @functools.cache
-def ideal(feed: int, ratio: float) -> tuple[Vector, _core.PlaybackFigures]:
+def ideal(feed: int, ratio: float) -> tuple[Vector, _core.SimulationFigures]:
     """The ideal command every 10 us, (n, 3), and its figures."""
     program = path_program(feed, vx500())
     samples, simulated = ideal_command(program.regions[-1].path, vx500(), ratio)

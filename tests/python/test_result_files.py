@@ -219,7 +219,7 @@ def test_results_for_notebooks_and_tables(tmp_path: Path) -> None:
         time.to_pandas("regons")
     with pytest.raises(sg.ArgumentError, match="it has no arrays"):
         time.to_xarray()
-    motion = sg.play_motion(tmp_path / "a<b>.nc", machine)
+    motion = sg.simulate_motion(tmp_path / "a<b>.nc", machine)
     simulation = sg.simulate(tmp_path / "a<b>.nc", machine)
     assert simulation.plot("path").get_xlabel()
     with pytest.raises(sg.ArgumentError, match="plot nothing: one of"):

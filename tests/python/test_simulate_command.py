@@ -379,7 +379,7 @@ def test_orbit_error_of_the_response_is_the_area_of_its_track() -> None:
 def test_picture_of_the_motion(tmp_path: Path) -> None:
     machine = machine_with(DRIVE)
     program = sg.Program.from_text(SHORT, machine, source="some/short.nc")
-    motion = sg.play_motion(program, machine, plant="feed-drive", lines=(5, 6))
+    motion = sg.simulate_motion(program, machine, plant="feed-drive", lines=(5, 6))
     plot.save(sg.plot_motion(motion), tmp_path / "motion.svg")
     drawn = (tmp_path / "motion.svg").read_text()
     for said in ("short.nc, lines 5 to 6", "acceleration", "response", "motor", "friction"):
@@ -390,7 +390,7 @@ def test_picture_of_the_motion(tmp_path: Path) -> None:
 def test_the_motion_is_drawn_into_the_callers_axes() -> None:
     """A short one is drawn sample by sample: the curves are those of the whole motion."""
     machine = sg.Machine.load("vx500")
-    motion = sg.play_motion(sg.Program.from_text(SHORT, machine), machine)
+    motion = sg.simulate_motion(sg.Program.from_text(SHORT, machine), machine)
     figure = plot.figure(12, 12)
     places = figure.subplots(2, 1)
     panel = sg.plot_motion(motion, places[1])
@@ -406,7 +406,7 @@ def test_a_simulation_draws_what_was_asked_for() -> None:
     machine = sg.Machine.load("vx500")
     simulation = sg.simulate(sg.Program.from_text(CORNER, machine), machine)
     assert list(simulation.plots()) == ["path", "feed", "vibration"]
-    motion = sg.play_motion(sg.Program.from_text(CORNER, machine), machine)
+    motion = sg.simulate_motion(sg.Program.from_text(CORNER, machine), machine)
     assert list(dataclasses.replace(simulation, motion=motion).plots()) == ["motion", "path", "feed", "vibration"]
     assert list(dataclasses.replace(simulation, regions=()).plots()) == []
 

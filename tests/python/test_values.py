@@ -35,7 +35,7 @@ ENTRIES: dict[str, Callable[[sg.Program, sg.Machine], object]] = {
     "expand": sg.expand,
     "measure": lambda program, machine: sg.measure(program, machine, tool_diameter_mm=2.0),
     "compare": lambda program, machine: sg.compare(program, program, machine),
-    "play_motion": sg.play_motion,
+    "simulate_motion": sg.simulate_motion,
     "stream": lambda program, machine: next(iter(sg.stream(program, machine))),
     "study": lambda program, machine: sg.study(
         program, machine, {"axes.x.modes.1.frequency_hz": sg.uniform(40, 50)}, n=2

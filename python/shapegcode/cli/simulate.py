@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 
     from shapegcode.model.programs import shaped_note
     from shapegcode.program import Program
-    from shapegcode.simulation.simulate import play_motion, simulate
+    from shapegcode.simulation.simulate import simulate, simulate_motion
 
     runner.check_files(args)
     machine = load_machine(args)
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
             record_samples=0,
             on_progress=lambda done, total: bar.update(_REGIONS_SHARE * done / total),
         )
-        motion = play_motion(
+        motion = simulate_motion(
             program,
             machine,
             plant=args.plant,

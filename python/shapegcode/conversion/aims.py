@@ -354,7 +354,7 @@ class CutCurves:
         writer: TextWriter,
         program: Program,
         machine: Machine,
-        originals: Sequence[Future[_core.PlaybackFigures]],
+        originals: Sequence[Future[_core.SimulationFigures]],
     ) -> None:
         self._writer, self._program, self._machine, self._originals = writer, program, machine, originals
         self._known: dict[int, CutCurve] = {}

@@ -86,7 +86,7 @@ def convert(
         MachineError: a value that a machine file could not have.
         DesignError: no shaper exists on this grid.
         ArgumentError: the program was read with other settings than the machine has; a block period that the
-            controller cannot play, a budget without a choice, lines without a cut.
+            controller cannot run, a budget without a choice, lines without a cut.
         RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
     """
     stated = {

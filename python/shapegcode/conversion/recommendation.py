@@ -22,12 +22,12 @@ from shapegcode.verdict.figures import Placed, ProgramFigures, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures
 
 
-def _figures_um(simulated: _core.PlaybackFigures) -> tuple[float, float]:
+def _figures_um(simulated: _core.SimulationFigures) -> tuple[float, float]:
     """Residual vibration of the worst axis, contour error of the machine table."""
     return float(np.max(simulated.residual_mm)) * 1e3, simulated.response.max_abs_mm * 1e3
 
 
-def most_to_gain_um(original: _core.PlaybackFigures) -> float:
+def most_to_gain_um(original: _core.SimulationFigures) -> float:
     """The most that shaping can gain: what is there."""
     return max(_figures_um(original))
 
@@ -143,7 +143,7 @@ def filter_advice(
     machine: Machine,
     model: MachineModel,
     judge: Judge,
-    originals: Sequence[_core.PlaybackFigures],
+    originals: Sequence[_core.SimulationFigures],
 ) -> FilterAdvice | None:
     """Whether a smaller filter of the control would do instead of shaping."""
     limit_um, floor_um = machine.tolerance.contour_um, machine.tolerance.residual_floor_um

@@ -189,7 +189,7 @@ def path_program(feed_mm_per_s: float, machine: Machine) -> Program:
     return Program.from_text(text, machine, source="paper_path.nc")
 
 
-def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> tuple[Any, _core.PlaybackFigures]:
+def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> tuple[Any, _core.SimulationFigures]:
     """The paper's own way: its minimal shaper in continuous time; set-points in mm every 10 us, and their figures."""
     modes = [mode for axis in machine.axes.as_tuple() for mode in axis.modes]
     first, second = (_core.Mode(mode.frequency_hz, mode.damping_ratio) for mode in modes)
@@ -200,7 +200,7 @@ def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> 
     samples = _core.Fir(delays, list(shaper.amplitudes)).apply(_core.interpolate(path, profile, _FINE_PERIOD_S))
     options = MachineModel(machine).options()
     options.period_s = _FINE_PERIOD_S
-    return samples, _core.play_samples(np.asfortranarray(samples), path, options)
+    return samples, _core.simulate_samples(np.asfortranarray(samples), path, options)
 
 
 def path_demo(on_progress: Callable[[float], None] = lambda _: None) -> PathDemo:

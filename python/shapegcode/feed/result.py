@@ -176,7 +176,7 @@ class FeedSchedule(Result):
         survey: what the tool meets.
         plans: the feeds of each region that may change; None for the others.
         loads: along each region; None where nothing is known.
-        simulated: the program before and after, to play both for a page.
+        simulated: the program before and after, to show both on a page.
     """
 
     program: str

@@ -293,7 +293,7 @@ def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArra
         memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
     rest_s = min(memory_s, _LONGEST_REST_S)
     options = model.options(plant=plant, offset=model.offset(job.simulated))
-    stream = model.playing(shaped=job.simulated.shaped).stream(job.simulated.path, options, rest_s)
+    stream = model.simulated(shaped=job.simulated.shaped).stream(job.simulated.path, options, rest_s)
     while len(chunk := stream.read(_CHUNK_SAMPLES)) > 0:
         yield chunk.command_mm, chunk.response_mm
 

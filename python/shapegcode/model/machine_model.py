@@ -152,29 +152,29 @@ class SimulatedController:
         look_ahead = self.model.motion == _core.MotionKind.look_ahead
         return _core.plan_speed(path, self.model.limits) if look_ahead else None
 
-    def play(
+    def simulate(
         self,
         path: _core.Path,
-        options: _core.PlaybackOptions,
+        options: _core.SimulationOptions,
         *,
         against: _core.Path | None = None,
         block_end: _core.BlockEnd | None = None,
-    ) -> _core.PlaybackFigures:
+    ) -> _core.SimulationFigures:
         """A path simulated from rest to rest and measured against itself or another one."""
         options.axis_filters = self.filters
         profile = self._planned(path)
         if profile is not None:
             given = () if against is None else (against,)
-            return _core.play_path(path, profile, options, *given)
-        return _core.play_blocks(path, against or path, block_end or self.model.block_end, self._override, options)
+            return _core.simulate_path(path, profile, options, *given)
+        return _core.simulate_blocks(path, against or path, block_end or self.model.block_end, self._override, options)
 
-    def stream(self, path: _core.Path, options: _core.PlaybackOptions, rest_s: float) -> _core.PlayedStream:
+    def stream(self, path: _core.Path, options: _core.SimulationOptions, rest_s: float) -> _core.SimulationStream:
         """The same motion piece by piece, and what the plant does for a while behind its end."""
         options.axis_filters = self.filters
         profile = self._planned(path)
         if profile is not None:
-            return _core.PlayedStream.of_path(path, profile, options, rest_s)
-        return _core.PlayedStream.of_blocks(path, self.model.block_end, 1.0, options, rest_s)
+            return _core.SimulationStream.of_path(path, profile, options, rest_s)
+        return _core.SimulationStream.of_blocks(path, self.model.block_end, 1.0, options, rest_s)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: FloatArray, window_s: float) -> _core.Travel:
         """How fast a path is travelled."""
@@ -240,7 +240,7 @@ class MachineModel:
             sum(each.duration_samples + 1 for each in filters) * self.period_s,
         )
 
-    def playing(self, *, shaped: bool) -> SimulatedController:
+    def simulated(self, *, shaped: bool) -> SimulatedController:
         """One of the two: `shaped` for a program that shapegcode wrote."""
         return self.shaped if shaped else self.ordinary
 
@@ -276,11 +276,11 @@ class MachineModel:
         shift: float = 0.0,
         only: str | None = None,
         offset: Offset = NO_OFFSET,
-    ) -> _core.PlaybackOptions:
+    ) -> _core.SimulationOptions:
         """Interpolation period and plant, with acceleration filters after interpolation."""
         if plant not in PLANTS:
             raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
-        options = _core.PlaybackOptions()
+        options = _core.SimulationOptions()
         options.period_s = self.period_s
         pairs = moving_modes(self.machine, shift, offset, only)
         if plant != "modal":
@@ -298,7 +298,7 @@ class MachineModel:
         shift: float = 0.0,
         only: str | None = None,
         offset: Offset = NO_OFFSET,
-    ) -> _core.PlaybackOptions:
+    ) -> _core.SimulationOptions:
         """Options with the plant of the verdict.
 
         Behind feed drives the residual is the vibration of the table against its motor once that has arrived: the lag
@@ -321,23 +321,23 @@ class MachineModel:
         only: str | None = None,
         record_samples: int = 0,
         offset: Offset = NO_OFFSET,
-    ) -> _core.PlaybackFigures:
+    ) -> _core.SimulationFigures:
         """A cut as the controller executes an ordinary program."""
         options = self.verdict_options(shift=shift, only=only, offset=offset)
         options.record_samples = record_samples
         controller = self.ordinary
         if override != 1.0:
             controller = SimulatedController(fanuc_model(self.machine), override)
-        return controller.play(path, options, against=against)
+        return controller.simulate(path, options, against=against)
 
     def simulate_rapid(
-        self, start_mm: FloatArray, end_mm: FloatArray, options: _core.PlaybackOptions
-    ) -> _core.PlaybackFigures:
+        self, start_mm: FloatArray, end_mm: FloatArray, options: _core.SimulationOptions
+    ) -> _core.SimulationFigures:
         """A rapid as the control makes it, from rest to rest, without its contour."""
         options.measure_contour = False
         samples = _core.rapid_samples(start_mm, end_mm, self.ordinary.model)
         still = _core.Path([_core.Segment.line(start_mm, start_mm, 1.0)])
-        return _core.play_samples(np.asfortranarray(samples), still, options)
+        return _core.simulate_samples(np.asfortranarray(samples), still, options)
 
     def simulate_emitted(
         self,
@@ -359,7 +359,7 @@ class MachineModel:
         other_overrides: Sequence[float] = (),
         tracker: _core.ContourTracker | None = None,
         increment_mm: float | None = None,
-    ) -> _core.PlaybackFigures:
+    ) -> _core.SimulationFigures:
         """Emitted blocks as the controller simulates them, measured against the programmed path."""
         options = self.verdict_options(filters=self.shaped.filters, shift=shift, only=only, offset=offset)
         options.measure_contour = contour
@@ -377,7 +377,7 @@ class MachineModel:
             options.starved_blocks = list(starved_blocks)
             options.starved_s = self.machine.verdict.starved_s
             options.starved_memory_s = memory_s + self.shaped_filter.duration_s if memory_s > 0.0 else 0.0
-        return _core.play_blocks(blocks, path, block_end or self.own_rule, override, options)
+        return _core.simulate_blocks(blocks, path, block_end or self.own_rule, override, options)
 
     def simulate_planned(
         self,
@@ -386,14 +386,14 @@ class MachineModel:
         *,
         offset: Offset = NO_OFFSET,
         tracker: _core.ContourTracker | None = None,
-    ) -> _core.PlaybackFigures:
+    ) -> _core.SimulationFigures:
         """Emitted blocks as the look-ahead plans them again if it is left on, against the programmed path."""
         ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
         filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
         options = self.verdict_options(filters=filters, offset=offset)
         if tracker is not None:
             options.tracker = tracker
-        return _core.play_planned(blocks, self.limits(), options, path)
+        return _core.simulate_planned(blocks, self.limits(), options, path)
 
     def cycle_time_s(self, program: _core.ProgramText) -> float:
         """Time of a whole program in closed form, s; `shapegcode.cycle_time` says where it goes."""

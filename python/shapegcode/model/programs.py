@@ -37,7 +37,7 @@ class SimulatedPrograms:
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods of the controller and the plant that play them; see `Result.methods`."""
+        """Published methods of the controller and the plant that simulate them; see `Result.methods`."""
         control, drives = self.machine.controller, [axis.drive for axis in self.machine.axes.as_tuple()]
         used = {
             "block overlap": control.motion == "after_interpolation",

@@ -131,7 +131,7 @@ def stream(
     offsets, known = _offsets(program, model)
     options = model.options(plant=plant, offset=known)
     controller = fanuc_model(machine, shaped=shaped)
-    simulated = _core.PlayedStream.of_program(program.core, controller, options, offsets, REST_S)
+    simulated = _core.SimulationStream.of_program(program.core, controller, options, offsets, REST_S)
     return _chunks(simulated, model.period_s, lines, chunk_samples)
 
 
@@ -153,7 +153,7 @@ def _check_lines(program: Program, lines: tuple[int, int]) -> None:
 
 
 def _chunks(
-    simulated: _core.PlayedStream, period_s: float, lines: tuple[int, int] | None, chunk_samples: int
+    simulated: _core.SimulationStream, period_s: float, lines: tuple[int, int] | None, chunk_samples: int
 ) -> Iterator[Chunk]:
     rate_hz = 1.0 / period_s
     # A whole rate divides exactly: 9 / 1000 is 0.009, 9 * 0.001 is not.

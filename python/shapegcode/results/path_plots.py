@@ -334,7 +334,7 @@ class SimulatedRegion:
     @classmethod
     def of_runs(
         cls,
-        runs: Mapping[str, _core.PlaybackFigures],
+        runs: Mapping[str, _core.SimulationFigures],
         path: _core.Path,
         period_s: float,
         *,
@@ -349,7 +349,7 @@ class SimulatedRegion:
         return cls(traces, path, "; ".join(parts))
 
 
-def _trace(label: str, run: _core.PlaybackFigures, period_s: float) -> Trace:
+def _trace(label: str, run: _core.SimulationFigures, period_s: float) -> Trace:
     x, y, z = (float(value) for value in run.residual_mm)
     return Trace(
         label,

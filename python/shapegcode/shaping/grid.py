@@ -218,7 +218,7 @@ def _fallback(
 
 
 def check_block_period(period_s: float, machine: Machine) -> None:
-    """Refuse a block period that the machine's controller cannot play."""
+    """Refuse a block period that the machine's controller cannot run."""
     if not (math.isfinite(period_s) and period_s > 0.0):
         raise ArgumentError(f"block period is {period_s} s, must be finite and above 0")
     tick_s, block_time_s = machine.controller.interpolation_period_s, machine.controller.block_time_s

@@ -54,8 +54,8 @@ class RegionRun:
     settling_time_s: Xyz[float | None]
     period_s: float = field(metadata=hidden())
     path: _core.Path = field(metadata=hidden())
-    figures: _core.PlaybackFigures = field(metadata=hidden())
-    replay: Callable[[int], _core.PlaybackFigures] = field(metadata=hidden())
+    figures: _core.SimulationFigures = field(metadata=hidden())
+    replay: Callable[[int], _core.SimulationFigures] = field(metadata=hidden())
 
     @property
     def command_mm(self) -> FloatArray:

@@ -43,7 +43,7 @@ def simulate(
 ) -> Simulation:
     """Simulate the cutting regions of a program through the controller's model and the plant, each from rest to rest.
 
-    `play_motion` and `stream` simulate the whole program in one.
+    `simulate_motion` and `stream` simulate the whole program in one.
 
     Args:
         program: what to simulate, or its file.
@@ -81,8 +81,8 @@ def simulate(
         nominal = {mine.first_line: other.path for mine, other in pairs if not mine.path.moves_as(other.path)}
         verdict = judge_program(program, against, pairs, model, shaped=shaped)
     runs: list[RegionRun] = []
-    simulated: list[_core.PlaybackFigures] = []
-    of_shaped: list[_core.PlaybackFigures] = []
+    simulated: list[_core.SimulationFigures] = []
+    of_shaped: list[_core.SimulationFigures] = []
     for done, region in enumerate(program.regions, start=1):
         as_shaped = region.shaped if shaped is None else shaped
         path = nominal.get(region.first_line)
@@ -134,7 +134,7 @@ def simulate(
     )
 
 
-def play_motion(
+def simulate_motion(
     program: Program | str | Path,
     machine: Machine | str | Path,
     *,
@@ -193,7 +193,7 @@ def play_motion(
     return recorder.result(program.source, lines=lines, every=every, **names)
 
 
-def _shaped_figures(runs: Sequence[RegionRun], simulated: Sequence[_core.PlaybackFigures]) -> ShapedFigures | None:
+def _shaped_figures(runs: Sequence[RegionRun], simulated: Sequence[_core.SimulationFigures]) -> ShapedFigures | None:
     if not runs:
         return None
     return ShapedFigures(
@@ -203,7 +203,7 @@ def _shaped_figures(runs: Sequence[RegionRun], simulated: Sequence[_core.Playbac
     )
 
 
-def _largest(simulated: Sequence[_core.PlaybackFigures]) -> dict[str, Any]:
+def _largest(simulated: Sequence[_core.SimulationFigures]) -> dict[str, Any]:
     return {
         "residual_vibration_um": largest_xyz_um(figures.residual_mm for figures in simulated),
         "peak_vibration_um": largest_xyz_um(figures.peak_mm for figures in simulated),
@@ -226,13 +226,13 @@ def _play(
     record_samples: int,
     *,
     block_end: _core.BlockEnd | None = None,
-) -> _core.PlaybackFigures:
+) -> _core.SimulationFigures:
     options = model.options(plant=plant, offset=offset)
     options.record_samples = record_samples
     options.measure_response_orbit = True
     options.settling_band_mm = band_um * 1e-3
     options.settling_limit_s = limit_s
-    return model.playing(shaped=shaped).play(blocks, options, against=path, block_end=block_end)
+    return model.simulated(shaped=shaped).simulate(blocks, options, against=path, block_end=block_end)
 
 
 def _rest_s(model: MachineModel, plant: str) -> float:
@@ -241,7 +241,7 @@ def _rest_s(model: MachineModel, plant: str) -> float:
     return min(max(model.vibration_memory_s, _SHORTEST_REST_S), _LONGEST_REST_S)
 
 
-def _settling_s(simulated: Iterable[_core.PlaybackFigures], band_um: float) -> Xyz[float | None]:
+def _settling_s(simulated: Iterable[_core.SimulationFigures], band_um: float) -> Xyz[float | None]:
     """Longest settling time of each axis; None where it does not settle, or no band is given."""
     rows = [figures.settling_s for figures in simulated]
     longest = np.max(rows, axis=0) if rows else np.zeros(3)

@@ -154,7 +154,7 @@ class CycleTime(TimeParts, Result):
         blocks: per block, in order; empty unless asked for.
         shaped_regions: how many of the regions are shaped blocks, as the program's header says; 0: it has none.
         warnings: what the reader noticed; why the verdict in a header of shapegcode does not hold here.
-        simulated: the program, to play it again for a page.
+        simulated: the program, to show it on a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "difference_percent": float | None}

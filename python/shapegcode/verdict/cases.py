@@ -253,7 +253,7 @@ BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 class SimulatedCase:
     """An operating condition that was simulated."""
 
-    run: _core.PlaybackFigures  # its figures
+    run: _core.SimulationFigures  # its figures
     # how much longer all blocks take in it than at 100 %, before any filter, where only their end was simulated; else 0
     cut_s: float
 
@@ -271,7 +271,7 @@ class CaseSimulation:
     tracker: _core.ContourTracker  # of the programmed path
     increment_mm: float  # least increment of the text
 
-    def nominal(self, rule: _core.BlockEnd) -> _core.PlaybackFigures:
+    def nominal(self, rule: _core.BlockEnd) -> _core.SimulationFigures:
         """Blocks at 100 %; under the controller's own rule also with an empty buffer where a stop excites most."""
         own = rule == self.model.own_rule
         return self.model.simulate_emitted(
@@ -281,7 +281,7 @@ class CaseSimulation:
             memory_s=self.model.vibration_memory_s, tracker=self.tracker, increment_mm=self.increment_mm,
         )  # fmt: skip
 
-    def planned(self) -> _core.PlaybackFigures | None:
+    def planned(self) -> _core.SimulationFigures | None:
         """The look-ahead left on; None where no case asks."""
         wanted = any(case.look_ahead for case in self.cases)
         if not wanted:
@@ -324,7 +324,7 @@ class CaseSimulation:
 
     def _cut_s(self, override: float) -> float:
         """How long all blocks take at a feed override, before any filter."""
-        return _core.play_duration_s(self.blocks, self.model.period_s, self.model.own_rule, override)
+        return _core.simulated_duration_s(self.blocks, self.model.period_s, self.model.own_rule, override)
 
     @cached_property
     def _own_cut_s(self) -> float:
@@ -332,8 +332,8 @@ class CaseSimulation:
 
     def figures(
         self,
-        nominal: Sequence[_core.PlaybackFigures],
-        planned: _core.PlaybackFigures | None,
+        nominal: Sequence[_core.SimulationFigures],
+        planned: _core.SimulationFigures | None,
         others: Mapping[str, SimulatedCase],
     ) -> tuple[CaseFigures, ...]:
         """One entry per case, of what the tasks gave."""
@@ -350,7 +350,7 @@ class CaseSimulation:
                 figures.append(case_figures(run))
         return tuple(figures)
 
-    def _other(self, case: Case, simulated: SimulatedCase, own: _core.PlaybackFigures) -> CaseFigures:
+    def _other(self, case: Case, simulated: SimulatedCase, own: _core.SimulationFigures) -> CaseFigures:
         run, whole = simulated.run, self._whole(case)
         if case.override == 1.0:  # the set-points are those of the nominal case, only the table is another
             response = Deviation.of([run.response]) if whole else None
@@ -365,7 +365,7 @@ class CaseSimulation:
         return CaseFigures(run.residual_mm, command, response, time_s)
 
 
-def case_figures(run: _core.PlaybackFigures, *, contour: bool = True, response: bool = True) -> CaseFigures:
+def case_figures(run: _core.SimulationFigures, *, contour: bool = True, response: bool = True) -> CaseFigures:
     """What a simulation showed."""
     if not contour:
         return CaseFigures(run.residual_mm, None, None, run.duration_s)
@@ -373,9 +373,9 @@ def case_figures(run: _core.PlaybackFigures, *, contour: bool = True, response: 
     return CaseFigures(run.residual_mm, Deviation.of([run.command]), followed, run.duration_s)
 
 
-def _starved(run: _core.PlaybackFigures, waited_s: float) -> CaseFigures:
+def _starved(run: _core.SimulationFigures, waited_s: float) -> CaseFigures:
     """The worst of all places; at the end of the region the vibration is that without a wait, but for a wait nearby."""
-    runs: list[_core.PlaybackFigures | _core.StarvedFigures] = [run, *run.starved]
+    runs: list[_core.SimulationFigures | _core.StarvedFigures] = [run, *run.starved]
     return CaseFigures(
         np.max([each.residual_mm for each in runs], axis=0),
         Deviation.of(each.command for each in runs),

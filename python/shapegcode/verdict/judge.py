@@ -58,9 +58,9 @@ Step = Callable[[int, int], None]
 class RegionFigures:
     """One cut simulated: as programmed, and as emitted in every operating condition of the verdict."""
 
-    original: _core.PlaybackFigures  # the programmed path under the controller's own motion
+    original: _core.SimulationFigures  # the programmed path under the controller's own motion
     # shaped blocks under both rules of block end (ceil, carry); a cut left unchanged once
-    emitted: tuple[_core.PlaybackFigures, ...]
+    emitted: tuple[_core.SimulationFigures, ...]
     # one entry per operating condition; None: not simulated for a cut left unchanged
     cases: tuple[CaseFigures | None, ...]
     slowed_blocks: int  # emitted blocks that the controller's look-ahead limits would slow
@@ -85,8 +85,8 @@ class PendingSimulations:
     """The simulations of one emitted region under way."""
 
     simulation: CaseSimulation  # whose tasks they are
-    nominal: Sequence[Future[_core.PlaybackFigures]]  # under both rules of block end
-    planned: Future[_core.PlaybackFigures | None]  # with the look-ahead left on
+    nominal: Sequence[Future[_core.SimulationFigures]]  # under both rules of block end
+    planned: Future[_core.SimulationFigures | None]  # with the look-ahead left on
     others: Sequence[Future[dict[str, SimulatedCase]]]  # the other cases, in groups
     slowed: Future[int]  # blocks that the look-ahead limits would slow
 
@@ -108,7 +108,7 @@ class Judge:
         self,
         emitted: Program,
         placed: Sequence[Placed],
-        originals: Sequence[Future[_core.PlaybackFigures]],
+        originals: Sequence[Future[_core.SimulationFigures]],
         pool: Executor,
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
@@ -141,7 +141,7 @@ class Judge:
     def figures(
         self,
         running: Sequence[PendingSimulations],
-        originals: Sequence[Future[_core.PlaybackFigures]],
+        originals: Sequence[Future[_core.SimulationFigures]],
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
         """What the simulations show."""
@@ -413,7 +413,7 @@ def judge_program(
 
 
 def simulate_unchanged(
-    judge: Judge, model: MachineModel, mine: _core.Region, region: _core.Region, original: _core.PlaybackFigures
+    judge: Judge, model: MachineModel, mine: _core.Region, region: _core.Region, original: _core.SimulationFigures
 ) -> RegionFigures:
     """A cut left unchanged in every operating condition that counts for it.
 

@@ -29,7 +29,7 @@ class Choice:
     rapid: Rapid
     region: _core.Region
     before: Timing
-    original: Future[_core.PlaybackFigures]
+    original: Future[_core.SimulationFigures]
     shaped: EmittedRegion | None = None
     text: bytes = b""
     after: Timing | None = None
@@ -138,12 +138,14 @@ class Timing:
         return self.motion_s + max(self.arrival_s, self.settling_s)
 
 
-def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_per_s: float, band_mm: float) -> float:
+def settling_time_s(
+    command_mm: Vector, options: _core.SimulationOptions, slowest_per_s: float, band_mm: float
+) -> float:
     """Time from the end of a command until the table stays within a band around it, s; at most 30 s."""
     still = _core.Path([_core.Segment.line(command_mm[0], command_mm[0], 1.0)])
     options.measure_contour = False
     options.record_samples = 0
-    figures = _core.play_samples(np.asfortranarray(command_mm), still, options)
+    figures = _core.simulate_samples(np.asfortranarray(command_mm), still, options)
     largest = float(figures.residual_mm.max())
     if largest <= band_mm:
         return 0.0
@@ -152,7 +154,7 @@ def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_
     hold = math.ceil(min(needed, _LONGEST_WAIT_S) / options.period_s)
     held = np.concatenate([command_mm, np.repeat(command_mm[-1:], hold, axis=0)])
     options.record_samples = len(held)
-    simulated = _core.play_samples(np.asfortranarray(held), still, options)
+    simulated = _core.simulate_samples(np.asfortranarray(held), still, options)
     apart = np.abs(simulated.recorded_response - simulated.recorded_command).max(axis=1)
     outside = np.flatnonzero(apart > band_mm)
     rest = round(simulated.duration_s / options.period_s)
@@ -188,7 +190,7 @@ class RapidPlant:
         self._known[key] = timing
         return timing
 
-    def simulate_original(self, rapid: Rapid) -> _core.PlaybackFigures:
+    def simulate_original(self, rapid: Rapid) -> _core.SimulationFigures:
         """The rapid's figures beside which those of the replacement stand."""
         return self._machine_model.simulate_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
 
@@ -245,7 +247,7 @@ class RapidPlant:
     def _filter_periods(self) -> int:
         return math.ceil(self._machine_model.shaped_filter.duration_s / self.model.period_s) + 1
 
-    def _options(self, region: _core.Region | None) -> _core.PlaybackOptions:
+    def _options(self, region: _core.Region | None) -> _core.SimulationOptions:
         return self._machine_model.options(offset=NO_OFFSET if region is None else self._machine_model.offset(region))
 
     def _settling_s(self, command_mm: Vector, region: _core.Region | None) -> float:

@@ -292,7 +292,7 @@ def _drive_ways(trace: ServoTrace, values: FloatArray, period_s: float, top_spee
         run_up = late[0] + np.arange(-count, 0) * (late[1] - late[0])
         drive = _core.FeedDrive(parameters, period_s)
         drive.reset(run_up[0])
-        found.append(np.asarray(drive.play(np.concatenate([run_up, late]))[count:, 0], dtype=np.float64))
+        found.append(np.asarray(drive.respond(np.concatenate([run_up, late]))[count:, 0], dtype=np.float64))
     return found
 
 
