@@ -34,6 +34,7 @@ _COARSE_STEP, _FINE_STEP = 0.001, 5e-5
 _COARSE_HZ = 40.0  # start and clock are first looked for in what lies below
 _AFTER_S = 3.0  # of the record behind the last part
 _EXCITED = 0.2  # of the median of the command's spectrum, in amplitude: lines below are not used
+_RINGS_S = 2.0  # of the record that a part needs behind it, or up to the next part
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # of a part against the others
 _EXPLAINED = 0.5  # share of a part's power that the others must explain
@@ -50,6 +51,9 @@ _AWAY_S, _STANDS_OUT = 0.5, 2.0
 _GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
 _LOWEST_SHARE = 0.15  # of the power of the command
 _CORRELATED = 0.25  # squared correlation of a part, below 40 Hz
+_SLOWER = np.arange(-0.02, 0.0201, 0.002)  # moves of a part than commanded
+_OTHER_SPEED = 1e-3  # simulated: within 3e-4 where the command is the right one, 2e-3 for an override of 99 %
+_AGREE, _FEWEST_PAIRS = 0.8, 3
 _OWN = 0.1  # of the largest line of a part, in power
 _SMOOTH_LINES = 31
 _COHERENT = 0.9
@@ -217,6 +221,8 @@ class _Clock:
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
             raise RecordError(f"{record.source}: {record.quantity}: a sweep needs an acceleration")
+        if not np.ptp(record.response) > 0.0:
+            raise RecordError(f"{record.source}: every sample is {record.response[0]:.4g} m/s²: nothing was measured")
         if _held_at_ends(record.response):
             raise RecordError(
                 f"{record.source}: overload: the acceleration is cut off at {np.max(np.abs(record.response)):.4g} "
@@ -271,7 +277,9 @@ class _Clock:
                 at = begin + every * np.arange(int((end - begin) / every))
                 wave = np.interp(at, times, smooth.real) + 1j * np.interp(at, times, smooth.imag)
                 found = np.abs(np.fft.ifft(spectrum * np.conj(np.fft.fft(wave, size)))) ** 2
-                own = power[np.minimum(np.arange(size) + len(at), size)] - power[:size]
+                # Behind the end it begins again: a part that began before the record.
+                ends = np.arange(size) + len(at)
+                own = power[np.minimum(ends, size)] - power[:size] + power[np.maximum(ends - size, 0)]
                 own = np.maximum(own, _QUIET * float(np.max(own)))
                 share = found / (own * 0.5 * float(np.sum(np.abs(wave) ** 2)))
                 squares[row] = np.roll(share, -round(begin / every))
@@ -303,8 +311,11 @@ class _Clock:
             rows = np.delete(rows, worst)
         if np.min(explained) < _EXPLAINED:
             raise RecordError(
-                self._no_relation(f"parts of the program explain {100 * np.min(explained):.0f} % of another")
+                self._no_relation(f"parts of the program explain {max(100 * np.min(explained), 0.0):.0f} % of another")
             )
+        self._refuse_other_speed(spectra)
+        used = self._whole(rows)
+        lags, rows = lags[np.isin(rows, used)], used
         notes = self._notes(rows)
         if chosen:
             notes.append(f"{self.record.source}: of the axes of the sensor this one goes with the command best")
@@ -343,6 +354,70 @@ class _Clock:
             )
         return rows
 
+    def _refuse_other_speed(self, spectra: _Spectra) -> None:
+        """Refuse a program whose moves took another time than commanded, although its rests are where they should be.
+
+        A rise and its fall pass the same frequencies the other way round: if they are slower than commanded, what
+        they say of a frequency is late in one and early in the other, and agrees only with a command as slow.
+        """
+        size = 1 << int(np.ceil(np.log2(4 * len(spectra.hertz))))
+        found = []
+        for row in range(0, len(self.windows) - 1, 2):
+            agree = np.zeros(len(_SLOWER))
+            for place, slower in enumerate(_SLOWER):
+                one, other = (self._stretched(each, float(slower), spectra.hertz) for each in (row, row + 1))
+                powers = np.abs(one) ** 2, np.abs(other) ** 2
+                inside = np.all([power > _OWN * np.max(power) for power in powers], axis=0)
+                crossed = spectra.response[row] * np.conj(one * spectra.response[row + 1]) * other * inside
+                total = float(np.sum(np.abs(crossed)))
+                if total > 0.0:
+                    agree[place] = size * float(np.max(np.abs(np.fft.ifft(crossed, size)))) / total
+            best = int(np.argmax(agree))
+            if 0 < best < len(_SLOWER) - 1 and agree[best] > _AGREE:
+                below, most, above = agree[best - 1 : best + 2]
+                between = (below - above) / (2.0 * (below - 2.0 * most + above))
+                found.append(float(_SLOWER[best] + between * (_SLOWER[1] - _SLOWER[0])))
+        if len(found) < _FEWEST_PAIRS:
+            return
+        slower = float(np.median(found))
+        if abs(slower) > _OTHER_SPEED:
+            raise RecordError(
+                self._no_relation(
+                    f"with its rests as long as commanded, its moves take {100.0 * abs(slower):.2f} % "
+                    f"{'more' if slower > 0.0 else 'less'} time than commanded (limit {100.0 * _OTHER_SPEED:g} %)"
+                )
+            )
+
+    def _stretched(self, row: int, slower: float, hertz: FloatArray) -> ComplexArray:
+        """Lines of the command of a part that takes so much longer, about its middle."""
+        period, (begin, end) = self.command.period_s, self.windows[row]
+        first, last, middle = round(begin / period), round(end / period), 0.5 * sum(self.command.parts[row])
+        since = middle + (first * period - middle) * (1.0 + slower)
+        return _transform(self.command.kicks[first:last], since, period * (1.0 + slower), hertz)
+
+    def _whole(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+        """Those of the parts that are recorded until they rang down, with the other one of their two.
+
+        Of a part alone the ringing is cut off, or that of the part before is in it: both look like modes.
+        """
+        first_s = -self.start_s
+        last_s = len(self.values) * self.record.period_s * (1.0 + self.rate) - self.start_s
+        inside = [
+            row
+            for row in rows.tolist()
+            if self.windows[row][0] >= first_s
+            and min(self.windows[row][1], self.command.parts[row][1] + _RINGS_S) <= last_s
+        ]
+        count = len(self.windows)
+        whole = [row for row in inside if row ^ 1 in inside or row ^ 1 == count]
+        if not whole:
+            raise RecordError(
+                f"{self.record.source}: no two parts of {self.command.source} (1 and 2, 3 and 4, ...) are both in the "
+                f"record as commanded, from the begin of the first to {_RINGS_S:g} s behind the second: needed is one "
+                "such pair, a rise and fall of a sweep"
+            )
+        return np.array(whole, dtype=np.intp)
+
     def _no_relation(self, found: str) -> str:
         axis = self.command.axis.upper()
         return (
@@ -372,9 +447,10 @@ class _Clock:
 
     def _notes(self, rows: npt.NDArray[np.intp]) -> list[str]:
         """What is said of the clock, and of parts that are not used."""
+        start_s = self.start_s / (1.0 + self.rate)
         notes = [
-            f"{self.record.source}: the program begins {self.start_s / (1.0 + self.rate):.3f} s after the record; the "
-            f"logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
+            f"{self.record.source}: the program begins {abs(start_s):.3f} s {'after' if start_s >= 0.0 else 'before'} "
+            f"the record; the logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
         ]
         missing = sorted(set(range(len(self.windows))) - set(rows.tolist()))
         if missing:
