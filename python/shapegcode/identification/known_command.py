@@ -296,12 +296,13 @@ class _Clock:
 
     def aligned(self, band_hz: tuple[float, float] | None, chosen: bool) -> _Aligned:
         """Minus the response over the command, with start and clock found."""
-        rows = self._clear_parts()
+        rows = self._recorded(self._clear_parts(), _FEWEST_PARTS)
+        clear = np.isin(np.arange(len(self.windows)), rows)
         spectra = self._spectra(band_hz)
         for _ in range(_ROUNDS):
             self._refine(spectra.of(rows), rows)
             spectra = self._spectra(band_hz)
-            rows = _in_place(spectra, self.shares >= _CORRELATED)
+            rows = self._recorded(_in_place(spectra, clear), _FEWEST_PARTS)
         while True:
             lags = _lags(spectra.of(rows))
             explained = _explained(spectra.of(rows).late(lags))
@@ -313,9 +314,11 @@ class _Clock:
             raise RecordError(
                 self._no_relation(f"parts of the program explain {max(100 * np.min(explained), 0.0):.0f} % of another")
             )
+        rows = self._whole(rows)
+        self._refine(spectra.of(rows), rows)  # Without those that did not go with the others
+        spectra = self._spectra(band_hz)
+        lags = _lags(spectra.of(rows))
         self._refuse_other_speed(spectra)
-        used = self._whole(rows)
-        lags, rows = lags[np.isin(rows, used)], used
         notes = self._notes(rows)
         if chosen:
             notes.append(f"{self.record.source}: of the axes of the sensor this one goes with the command best")
@@ -363,6 +366,8 @@ class _Clock:
         size = 1 << int(np.ceil(np.log2(4 * len(spectra.hertz))))
         found = []
         for row in range(0, len(self.windows) - 1, 2):
+            if not (self._is_recorded(row) and self._is_recorded(row + 1)):
+                continue
             agree = np.zeros(len(_SLOWER))
             for place, slower in enumerate(_SLOWER):
                 one, other = (self._stretched(each, float(slower), spectra.hertz) for each in (row, row + 1))
@@ -396,27 +401,29 @@ class _Clock:
         return _transform(self.command.kicks[first:last], since, period * (1.0 + slower), hertz)
 
     def _whole(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-        """Those of the parts that are recorded until they rang down, with the other one of their two.
+        """Those of the parts of which the other one of their two is there as well.
 
         Of a part alone the ringing is cut off, or that of the part before is in it: both look like modes.
         """
-        first_s = -self.start_s
-        last_s = len(self.values) * self.record.period_s * (1.0 + self.rate) - self.start_s
-        inside = [
-            row
-            for row in rows.tolist()
-            if self.windows[row][0] >= first_s
-            and min(self.windows[row][1], self.command.parts[row][1] + _RINGS_S) <= last_s
-        ]
-        count = len(self.windows)
-        whole = [row for row in inside if row ^ 1 in inside or row ^ 1 == count]
-        if not whole:
+        alone = len(self.windows) - 1 if len(self.windows) % 2 else -1
+        return self._recorded(rows[np.isin(rows ^ 1, rows) | (rows == alone)], 1)
+
+    def _recorded(self, rows: npt.NDArray[np.intp], fewest: int) -> npt.NDArray[np.intp]:
+        """Those of the parts that the record holds until they rang down."""
+        inside = np.array([row for row in rows.tolist() if self._is_recorded(row)], dtype=np.intp)
+        if len(inside) < fewest:
             raise RecordError(
                 f"{self.record.source}: no two parts of {self.command.source} (1 and 2, 3 and 4, ...) are both in the "
                 f"record as commanded, from the begin of the first to {_RINGS_S:g} s behind the second: needed is one "
                 "such pair, a rise and fall of a sweep"
             )
-        return np.array(whole, dtype=np.intp)
+        return inside
+
+    def _is_recorded(self, row: int) -> bool:
+        """Whether the record holds a part from its begin until it rang down, or the next one begins."""
+        last_s = len(self.values) * self.record.period_s * (1.0 + self.rate) - self.start_s
+        begin, end = self.windows[row]
+        return begin >= -self.start_s and min(end, self.command.parts[row][1] + _RINGS_S) <= last_s
 
     def _no_relation(self, found: str) -> str:
         axis = self.command.axis.upper()
