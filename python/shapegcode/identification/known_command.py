@@ -7,7 +7,7 @@ begins in the record and how much faster its clock runs is found from the record
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -54,6 +54,7 @@ _CORRELATED = 0.25  # squared correlation of a part, below 40 Hz
 _SLOWER = np.arange(-0.02, 0.0201, 0.002)  # moves of a part than commanded
 _OTHER_SPEED = 1.2e-3  # within 3e-4 by the right command, 1e-3 by a time constant 10 % off, 1.3e-3 at 99 % override
 _AGREE, _FEWEST_PAIRS = 0.8, 3
+_FINER = 8  # lines between two, for their interpolation
 _OWN = 0.1  # of the largest line of a part, in power
 _SMOOTH_LINES = 31
 _COHERENT = 0.9
@@ -374,17 +375,23 @@ class _Clock:
         A rise and its fall pass the same frequencies the other way round: if they are slower than commanded, what
         they say of a frequency is late in one and early in the other, and agrees only with a command as slow.
         """
-        size = 1 << int(np.ceil(np.log2(4 * len(spectra.hertz))))
         found = []
         for row in range(0, len(self.windows) - 1, 2):
             if not (self._is_recorded(row) and self._is_recorded(row + 1)):
                 continue
+            powers = np.abs(spectra.command[row : row + 2]) ** 2
+            both = np.flatnonzero(np.all(powers > _OWN * powers.max(axis=1)[:, None], axis=0))
+            if len(both) < FEWEST_LINES:
+                continue
+            lines = slice(both[0], both[-1] + 1)
+            hertz, responses = spectra.hertz[lines], spectra.response[row : row + 2, lines]
+            size = 1 << int(np.ceil(np.log2(4 * len(hertz))))
             agree = np.zeros(len(_SLOWER))
-            for place, slower in enumerate(_SLOWER):
-                one, other = (self._stretched(each, float(slower), spectra.hertz) for each in (row, row + 1))
-                powers = np.abs(one) ** 2, np.abs(other) ** 2
-                inside = np.all([power > _OWN * np.max(power) for power in powers], axis=0)
-                crossed = spectra.response[row] * np.conj(one * spectra.response[row + 1]) * other * inside
+            stretched = zip(*(self._stretched(each, hertz) for each in (row, row + 1)), strict=True)
+            for place, (one, other) in enumerate(stretched):
+                powers = np.abs([one, other]) ** 2
+                inside = np.all(powers > _OWN * powers.max(axis=1)[:, None], axis=0)
+                crossed = responses[0] * np.conj(one * responses[1]) * other * inside
                 total = float(np.sum(np.abs(crossed)))
                 if total > 0.0:
                     agree[place] = size * float(np.max(np.abs(np.fft.ifft(crossed, size)))) / total
@@ -404,12 +411,18 @@ class _Clock:
                 )
             )
 
-    def _stretched(self, row: int, slower: float, hertz: FloatArray) -> ComplexArray:
-        """Lines of the command of a part that takes so much longer, about its middle."""
+    def _stretched(self, row: int, hertz: FloatArray) -> Iterator[ComplexArray]:
+        """Lines of the command of a part that takes so much longer about its middle, for each of `_SLOWER`."""
         period, (begin, end) = self.command.period_s, self.windows[row]
         first, last, middle = round(begin / period), round(end / period), 0.5 * sum(self.command.parts[row])
-        since = middle + (first * period - middle) * (1.0 + slower)
-        return _transform(self.command.kicks[first:last], since, period * (1.0 + slower), hertz)
+        # As those of the part itself at frequencies so much higher, which turn slowly when seen from its middle.
+        reach = 1.0 + _SLOWER[-1]
+        fine = np.arange(hertz[0] / reach, hertz[-1] * reach, (hertz[1] - hertz[0]) / _FINER)
+        lines = _transform(self.command.kicks[first:last], first * period - middle, period, fine)
+        turned = np.exp(-2j * np.pi * hertz * middle)
+        for slower in _SLOWER:
+            at = hertz * (1.0 + slower)
+            yield turned * (np.interp(at, fine, lines.real) + 1j * np.interp(at, fine, lines.imag))
 
     def _whole(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
         """Those of the parts of which the other one of their two is there as well.
