@@ -406,8 +406,8 @@ class _Clock:
         if abs(slower) > _OTHER_SPEED:
             raise RecordError(
                 self._no_relation(
-                    f"with its rests as long as commanded, its moves take {100.0 * abs(slower):.2f} % "
-                    f"{'more' if slower > 0.0 else 'less'} time than commanded (limit {100.0 * _OTHER_SPEED:g} %)"
+                    f"its moves and its rests tell of clocks that differ by {100.0 * abs(slower):.2f} % (limit "
+                    f"{100.0 * _OTHER_SPEED:g} %)"
                 )
             )
 
