@@ -126,12 +126,45 @@ def test_behind_a_feed_hold_and_a_jump_of_the_clock_the_part_before_is_used(
     assert any("a jump of the logger's clock" in note for note in found.notes)
 
 
+def test_a_logger_that_starts_late_or_stops_early_shows_no_further_modes(
+    program: Path, motion: tuple[FloatArray, FloatArray], command: KnownCommand
+) -> None:
+    late = found_in(program, record(motion, Logger(begins_s=26.0)))
+    check(late, MODES)
+    assert "s before the record" in late.notes[0]
+    for end_s in (command.parts[5][0] + 0.2, command.parts[8][1] - 0.5):  # what rings in the part before is cut off
+        whole = record(motion)
+        count = int((end_s + 3.3) * 1.01 * 800.0)
+        check(found_in(program, Record("early", whole.period_s, whole.response[:count])), MODES)
+    count = int((command.parts[2][1] + 3.3) * 1.01 * 800.0)
+    first = int((command.parts[1][0] + 3.3) * 1.01 * 800.0)
+    with pytest.raises(RecordError, match=r"no (two parts of .* needed is one such pair|relation)"):
+        found_in(program, Record("middle", whole.period_s, whole.response[first:count]))
+
+
+def test_another_override_within_the_logger_s_clock_is_refused(program: Path, command: KnownCommand) -> None:
+    """The moves take 1 % longer, or .5 % less, and the rests do not: NumPy's interpolation of the command."""
+    for override in (0.99, 1.005):
+        speed = np.ones(len(command.times_s))
+        for begin, end in command.parts:
+            speed[(command.times_s >= begin) & (command.times_s < end)] = override
+        instants = np.concatenate(([0.0], np.cumsum(command.period_s / speed)[:-1]))
+        even = np.arange(int(instants[-1] / command.period_s)) * command.period_s
+        moved = np.interp(even, instants, command.position) * 1e3
+        with pytest.raises(RecordError, match=r"and its rests tell of clocks that differ by 0.* % \(limit 0.12 %\)"):
+            found_in(program, record(shaken(moved, command.period_s, MODES)))
+
+
 def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray, FloatArray], tmp_path: Path) -> None:
     good = record(motion)
     noise = np.random.default_rng(3).standard_normal(len(good.response))
     hum = np.sin(2.0 * np.pi * 50.0 * good.time_s)
     with pytest.raises(RecordError, match=r"no relation to the command .* along X\? .* override of 100 %"):
         found_in(program, Record("other axis", good.period_s, 0.3 * noise + 0.5 * hum))
+    with pytest.raises(RecordError, match=r"every sample is 9.81 m/s²: nothing was measured"):
+        found_in(program, Record("flat", good.period_s, np.full(len(noise), 9.81)))
+    with pytest.raises(RecordError, match=r"correlate with it, the best by [0-9]?[0-9] % \(limit 50 %\)"):
+        found_in(program, Record("noise", good.period_s, noise))
     clipped = Record("clipped", good.period_s, np.clip(good.response, -3.0, 3.0))
     with pytest.raises(RecordError, match=r"overload: the acceleration is cut off at 3 m/s²"):
         found_in(program, clipped)
@@ -146,7 +179,14 @@ def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray
         found_in(program, Record("override", 1.25 * good.period_s, faster))
     with pytest.raises(ArgumentError, match="a sweep needs the machine"):
         identify([good], sweep=program)
-    for text, why in (("X1. F100.\nY1.", "Y by 1 mm too"), ("M00", "nothing moves")):
+    with pytest.raises(RecordError, match=r"band of 0.5 to 1 Hz: 0 lines .* needed are 16 or more"):
+        found_in(program, good, band_hz=(0.5, 1.0))
+    refused = (
+        ("X1. F100.\nY1.", "Y by 1 mm too"),
+        ("M00", "nothing moves"),
+        ("X1. F100.", r"moves without a rest of 0.5 s or more: needed are 2 parts"),
+    )
+    for text, why in refused:
         other = tmp_path / "other.nc"
         other.write_text(f"%\nO1\nG21 G91 G94 G01 {text}\nM30\n%\n")
         with pytest.raises(RecordError, match=why):

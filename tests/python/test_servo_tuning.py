@@ -12,7 +12,7 @@ import pytest
 
 import shapegcode as sg
 from shapegcode.cli import main
-from shapegcode.io.read import read_measurement
+from shapegcode.io.read import read_measurement, read_records
 
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"
 HZ = np.arange(0.0, 400.0, 0.5)
@@ -108,6 +108,7 @@ BOMB = '<!DOCTYPE a [<!ENTITY b "bbbbbbbbbb"><!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b
     [
         ({"axis": "C1"}, "axis C1 turns"),
         ({"axis": "MSP1"}, "axis MSP1 turns"),
+        ({"axis": "SPINDLE"}, "axis SPINDLE turns"),
         ({"begin": BOMB}, r"ast.xml:2: a document type is declared"),
         ({"begin": "<a>" * 100}, "more than 64 elements within each other"),
         ({"begin": "</a>"}, "no whole XML"),
@@ -117,6 +118,8 @@ BOMB = '<!DOCTYPE a [<!ENTITY b "bbbbbbbbbb"><!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b
         ({"parts": response("m_pPlant", plant()).replace("CDATA[\n", 'CDATA[\n"')}, "is no digit to the base 85"),
         ({"parts": response("m_pPlant", plant()[:-1])}, "800 frequencies and 799 values"),
         ({"parts": response("m_pPlant", plant() * np.nan)}, "value 1 of m_pPlant is not finite"),
+        ({"parts": response("m_pPlant", plant() * 1e-300)}, r"value 1 of the response is .*e\+298: must be 0 or from"),
+        ({"parts": response("m_pPlant", plant() * 1e300)}, "value 1 of the response is .*e-302: must be 0 or from"),
         (
             {"parts": response("m_pPlant", plant()) + response("m_pMeasCoherence", np.ones(10), HZ[:10])},
             "other frequencies than m_pPlant",
@@ -134,3 +137,31 @@ def test_an_axis_with_another_name_is_stated(tmp_path: Path) -> None:
     stated = sg.identify(path, sg.ReadOptions(axis="y"))
     assert stated.axis == "y"
     assert not stated.warnings
+
+
+@pytest.mark.parametrize("encoding", ["x-nonsense", "base64", "gb2312", "idna", "IBM037"])
+def test_an_encoding_that_is_none_is_refused(encoding: str, tmp_path: Path) -> None:
+    path = write(tmp_path / "ast.xml")
+    path.write_text(path.read_text().replace("ISO-8859-1", encoding))
+    with pytest.raises(sg.RecordError, match=r"ast\.xml:1: .*(needed is XML in UTF-8|unknown encoding)") as refused:
+        sg.identify(path)
+    assert "\n" not in str(refused.value)
+
+
+def test_utf_16_is_read(tmp_path: Path) -> None:
+    path = write(tmp_path / "ast.xml")
+    path.write_text(path.read_text().replace("ISO-8859-1", "UTF-16"), encoding="utf-16")
+    assert [round(mode.frequency_hz.value) for mode in sg.identify(path).modes] == [47, 131]
+
+
+def test_a_response_without_noise_warns_of_nothing(tmp_path: Path) -> None:
+    """pytest takes a warning of NumPy for an error: a mass alone, as exact as doubles are."""
+    rigid = 1.0 / (2j * np.pi * np.maximum(HZ, 0.1) * MOTOR)
+    found = sg.identify(write(tmp_path / "ast.xml", parts=response("m_pPlant", rigid)))
+    assert not found.modes
+
+
+def test_no_record_over_time(tmp_path: Path) -> None:
+    path = write(tmp_path / "ast.xml")
+    with pytest.raises(sg.RecordError, match=r"ast\.xml: XML, .* needed is a record over time"):
+        read_records(path)

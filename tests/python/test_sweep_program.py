@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from command import run
+from shapegcode.cli import main
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.sweep_program import write_sweep
 from shapegcode.machine import Machine
@@ -111,3 +112,33 @@ def test_the_command_writes_the_program_and_says_the_band_before(tmp_path: Path)
     small = run(tmp_path, "sweep", "-m", "vx500", "-o", "x.nc", "--set", "controller.program_memory_bytes=20000")
     assert small.returncode == 0
     assert "controller.program_memory_bytes" in small.stdout + small.stderr
+
+
+def test_limits_that_contradict_are_refused_with_their_value(tmp_path: Path) -> None:
+    file = tmp_path / "x.nc"
+    with pytest.raises(ArgumentError, match=r"band of 0 to 20 Hz: must be above 0, finite and ascend"):
+        write_sweep(file, VX500, "x", band_hz=(0.0, 20.0))
+    with pytest.raises(ArgumentError, match=r"band of 10 to nan Hz: must be above 0"):
+        write_sweep(file, VX500, "x", band_hz=(10.0, float("nan")))
+    with pytest.raises(ArgumentError, match=r"seconds = 1e\+09: must be at most 100000 \(controller.max_program_s\)"):
+        write_sweep(file, VX500, "x", seconds=1e9)
+    with pytest.raises(ArgumentError, match=r"seconds = 1: 0.83 cycles of 10 Hz .* needed are 3 or more, 3.6 s"):
+        write_sweep(file, VX500, "x", band_hz=(10.0, 80.0), seconds=1.0)
+    with pytest.raises(ArgumentError, match=r"axis = 'w': must be x, y or z"):
+        write_sweep(file, VX500, "w")  # type: ignore[arg-type]
+    assert not file.exists()
+
+
+def test_the_command_writes_all_or_nothing_and_to_standard_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    zero = run(tmp_path, "sweep", "-m", "vx500", "-o", "x.nc", "--frequencies", "0:20")
+    assert (zero.returncode, zero.stderr.count("\n")) == (2, 1)
+    answer = run(tmp_path, "sweep", "-m", "vx500", "-o", "x.nc", "--seconds", "10", "--json", "nowhere/x.json")
+    assert (answer.returncode, list(tmp_path.iterdir())) == (2, [])
+    monkeypatch.chdir(tmp_path)
+    assert main(["sweep", "-m", "vx500", "-o", "-", "--seconds", "10"]) == 0
+    piped = capsys.readouterr().out
+    assert piped.startswith("%\nO7201(SWEEP X)\n")
+    assert piped.endswith("M30\n%\n")
+    assert not list(tmp_path.iterdir())

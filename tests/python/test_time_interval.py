@@ -233,3 +233,9 @@ def test_the_interval_of_a_written_machine_is_that_of_the_result(tmp_path: Path)
     program = sg.Program.from_text(written_program(1), before)
     one, other = (time_interval(program, each, 1.0, 1.0) for each in (before, sg.Machine.load(file)))
     assert one is not None and one == other and one.half_width_s > 0.0
+
+
+def test_a_weight_beyond_reason_is_refused() -> None:
+    rows: list[dict[str, object]] = [{"name": "M08", "values": ["times.tool_change_s = 3.0"], "weight": 1e300}]
+    with pytest.raises(sg.ShapegcodeError, match=r"times\.open\.1\.weight = 1e\+300: must be 1000000000\.0 or less"):
+        machine(rows)

@@ -36,13 +36,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the program."""
-    from shapegcode.identification.sweep_program import write_sweep
+    from shapegcode.identification.sweep_program import plan_sweep
 
     machine = load_machine(args)
     runner.check_files(args)
     with runner.progress("planning the strokes", args):
-        found = write_sweep(
+        found, text = plan_sweep(
             args.output, machine, args.axis, band_hz=args.frequencies, travel_mm=args.travel,
             acceleration_share=args.acceleration, seconds=args.seconds, number=args.program,
         )  # fmt: skip
-    return runner.finish(found, args, wrote=[args.output])
+    return runner.finish(found, args, output=(args.output, text.encode("ascii")))

@@ -332,7 +332,11 @@ def _weighed(lines: Lines, model: ComplexArray) -> Lines:
     left = np.abs(lines.response - model) ** 2
     # Lines without a mode nearby have no model: their noise stays what it was taken to be.
     left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)
-    even, high = (shape * smoothed(left / shape) for shape in (1.0 / lines.weight**2, np.abs(model) ** 2 + 1e-300))
+    # A mean over lines of which some are far larger may be rounded to 0 or below.
+    even, high = (
+        np.maximum(shape * smoothed(left / shape), 1e-300)
+        for shape in (1.0 / lines.weight**2, np.abs(model) ** 2 + 1e-300)
+    )
     noise = min((even, high, 0.5 * (even + high)), key=lambda each: float(np.sum(np.log(each) + left / each)))
     return weighted(lines, noise)
 

@@ -7,7 +7,7 @@ begins in the record and how much faster its clock runs is found from the record
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +24,7 @@ from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
 from shapegcode.identification.parts import Spectra, transform
 from shapegcode.identification.result import Identification, Sweep
-from shapegcode.identification.sweep_program import commanded, moving_parts
+from shapegcode.identification.sweep_program import REST_S, commanded, moving_parts
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_records
 from shapegcode.io.record import FloatArray, ReadOptions, Record
@@ -35,6 +35,7 @@ _CLOCK = 0.025  # the logger's clock may be off by this share
 _COARSE_STEP, _FINE_STEP = 0.001, 5e-5
 _COARSE_HZ = 40.0  # start and clock are first looked for in what lies below
 _AFTER_S = 3.0  # of the record behind the last part
+_RINGS_S = 2.0  # of the record that a part needs behind it, or up to the next part
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # of a part against the others
 _EXPLAINED = 0.5  # share of a part's power that the others must explain
@@ -51,6 +52,10 @@ _AWAY_S, _STANDS_OUT = 0.5, 2.0
 _GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
 _LOWEST_SHARE = 0.15  # of the power of the command
 _CORRELATED = 0.25  # squared correlation of a part, below 40 Hz
+_SLOWER = np.arange(-0.02, 0.0201, 0.002)  # moves of a part than commanded
+_OTHER_SPEED = 1.2e-3  # within 3e-4 by the right command, 1e-3 by a time constant 10 % off, 1.3e-3 at 99 % override
+_AGREE, _FEWEST_PAIRS = 0.8, 3
+_FINER = 8  # lines between two, for their interpolation
 _OWN = 0.1  # of the largest line of a part, in power
 _LAGS_S = np.arange(-0.1, 0.1, 2.5e-4)
 
@@ -195,13 +200,20 @@ class _Clock:
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
             raise RecordError(f"{record.source}: {record.quantity}: a sweep needs an acceleration")
+        if not np.ptp(record.response) > 0.0:
+            raise RecordError(f"{record.source}: every sample is {record.response[0]:.4g} m/s²: nothing was measured")
         if _held_at_ends(record.response):
             raise RecordError(
                 f"{record.source}: overload: the acceleration is cut off at {np.max(np.abs(record.response)):.4g} "
                 "m/s²; needed is a larger range of the sensor, or less acceleration (shapegcode sweep --acceleration)"
             )
-        duration, needed = len(record.response) * record.period_s, command.parts[min(1, len(command.parts) - 1)][1]
-        if len(command.parts) < _FEWEST_PARTS or duration < needed - command.parts[0][0]:
+        if len(command.parts) < _FEWEST_PARTS:
+            raise RecordError(
+                f"{command.source}: moves without a rest of {REST_S:g} s or more: needed are {_FEWEST_PARTS} parts "
+                "with such a rest between them, as shapegcode sweep writes them"
+            )
+        duration, needed = len(record.response) * record.period_s, command.parts[1][1]
+        if duration < needed - command.parts[0][0]:
             raise RecordError(
                 f"{record.source}: {duration:.3g} s: too short, needed are two parts of {command.source} between its "
                 f"rests: {needed:.3g} s or more from its start"
@@ -249,7 +261,9 @@ class _Clock:
                 at = begin + every * np.arange(int((end - begin) / every))
                 wave = np.interp(at, times, smooth.real) + 1j * np.interp(at, times, smooth.imag)
                 found = np.abs(np.fft.ifft(spectrum * np.conj(np.fft.fft(wave, size)))) ** 2
-                own = power[np.minimum(np.arange(size) + len(at), size)] - power[:size]
+                # Behind the end it begins again: a part that began before the record.
+                ends = np.arange(size) + len(at)
+                own = power[np.minimum(ends, size)] - power[:size] + power[np.maximum(ends - size, 0)]
                 own = np.maximum(own, _QUIET * float(np.max(own)))
                 share = found / (own * 0.5 * float(np.sum(np.abs(wave) ** 2)))
                 squares[row] = np.roll(share, -round(begin / every))
@@ -266,12 +280,13 @@ class _Clock:
 
     def aligned(self, band_hz: tuple[float, float] | None, chosen: bool, others: Sequence[Record]) -> _Aligned:
         """Minus the response over the command, with start and clock found; and of others on the same clock."""
-        rows = self._clear_parts()
+        rows = self._recorded(self._clear_parts(), _FEWEST_PARTS)
+        clear = np.isin(np.arange(len(self.windows)), rows)
         spectra = self._spectra(band_hz)
         for _ in range(_ROUNDS):
             self._refine(spectra.of(rows), rows)
             spectra = self._spectra(band_hz)
-            rows = _in_place(spectra, self.shares >= _CORRELATED)
+            rows = self._recorded(_in_place(spectra, clear), _FEWEST_PARTS)
         while True:
             lags = _lags(spectra.of(rows))
             explained = _explained(spectra.of(rows).late(lags))
@@ -281,8 +296,13 @@ class _Clock:
             rows = np.delete(rows, worst)
         if np.min(explained) < _EXPLAINED:
             raise RecordError(
-                self._no_relation(f"parts of the program explain {100 * np.min(explained):.0f} % of another")
+                self._no_relation(f"parts of the program explain {max(100 * np.min(explained), 0.0):.0f} % of another")
             )
+        rows = self._whole(rows)
+        self._refine(spectra.of(rows), rows)  # Without those that did not go with the others
+        spectra = self._spectra(band_hz)
+        lags = _lags(spectra.of(rows))
+        self._refuse_other_speed(spectra)
         notes = self._notes(rows)
         if chosen:
             notes.append(f"{self.record.source}: of the axes of the sensor this one goes with the command best")
@@ -307,6 +327,12 @@ class _Clock:
         longest = max(end - begin for begin, end in self.windows)
         step = 0.5 / longest
         hertz = np.arange(max(low, _LOWEST_HZ), high, step)
+        if len(hertz) < FEWEST_LINES:
+            raise RecordError(
+                f"{self.record.source}: band of {low:g} to {high:.4g} Hz: {len(hertz)} lines between {_LOWEST_HZ:g} Hz "
+                f"and a {_OVER_HALF:g}th of the samples per second: needed are {FEWEST_LINES} or more, "
+                f"{FEWEST_LINES * step:.3g} Hz"
+            )
         rows: list[tuple[ComplexArray, ComplexArray]] = []
         for begin, end in self.windows:
             first, last = (int(np.ceil((each + self.start_s) / period)) for each in (begin, end))
@@ -331,6 +357,86 @@ class _Clock:
                 )
             )
         return rows
+
+    def _refuse_other_speed(self, spectra: Spectra) -> None:
+        """Refuse a program whose moves took another time than commanded, although its rests are where they should be.
+
+        A rise and its fall pass the same frequencies the other way round: if they are slower than commanded, what
+        they say of a frequency is late in one and early in the other, and agrees only with a command as slow.
+        """
+        found = []
+        for row in range(0, len(self.windows) - 1, 2):
+            if not (self._is_recorded(row) and self._is_recorded(row + 1)):
+                continue
+            powers = np.abs(spectra.command[row : row + 2]) ** 2
+            both = np.flatnonzero(np.all(powers > _OWN * powers.max(axis=1)[:, None], axis=0))
+            if len(both) < FEWEST_LINES:
+                continue
+            lines = slice(both[0], both[-1] + 1)
+            hertz, responses = spectra.hertz[lines], spectra.response[row : row + 2, lines]
+            size = 1 << int(np.ceil(np.log2(4 * len(hertz))))
+            agree = np.zeros(len(_SLOWER))
+            stretched = zip(*(self._stretched(each, hertz) for each in (row, row + 1)), strict=True)
+            for place, (one, other) in enumerate(stretched):
+                powers = np.abs([one, other]) ** 2
+                inside = np.all(powers > _OWN * powers.max(axis=1)[:, None], axis=0)
+                crossed = responses[0] * np.conj(one * responses[1]) * other * inside
+                total = float(np.sum(np.abs(crossed)))
+                if total > 0.0:
+                    agree[place] = size * float(np.max(np.abs(np.fft.ifft(crossed, size)))) / total
+            best = int(np.argmax(agree))
+            if 0 < best < len(_SLOWER) - 1 and agree[best] > _AGREE:
+                below, most, above = agree[best - 1 : best + 2]
+                between = (below - above) / (2.0 * (below - 2.0 * most + above))
+                found.append(float(_SLOWER[best] + between * (_SLOWER[1] - _SLOWER[0])))
+        if len(found) < _FEWEST_PAIRS:
+            return
+        slower = float(np.median(found))
+        if abs(slower) > _OTHER_SPEED:
+            raise RecordError(
+                self._no_relation(
+                    f"its moves and its rests tell of clocks that differ by {100.0 * abs(slower):.2f} % (limit "
+                    f"{100.0 * _OTHER_SPEED:g} %)"
+                )
+            )
+
+    def _stretched(self, row: int, hertz: FloatArray) -> Iterator[ComplexArray]:
+        """Lines of the command of a part that takes so much longer about its middle, for each of `_SLOWER`."""
+        period, (begin, end) = self.command.period_s, self.windows[row]
+        first, last, middle = round(begin / period), round(end / period), 0.5 * sum(self.command.parts[row])
+        # As those of the part itself at frequencies so much higher, which turn slowly when seen from its middle.
+        reach = 1.0 + _SLOWER[-1]
+        fine = np.arange(hertz[0] / reach, hertz[-1] * reach, (hertz[1] - hertz[0]) / _FINER)
+        lines = transform(self.command.kicks[first:last], first * period - middle, period, fine)
+        turned = np.exp(-2j * np.pi * hertz * middle)
+        for slower in _SLOWER:
+            at = hertz * (1.0 + slower)
+            yield turned * (np.interp(at, fine, lines.real) + 1j * np.interp(at, fine, lines.imag))
+
+    def _whole(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+        """Those of the parts of which the other one of their two is there as well.
+
+        Of a part alone the ringing is cut off, or that of the part before is in it: both look like modes.
+        """
+        alone = len(self.windows) - 1 if len(self.windows) % 2 else -1
+        return self._recorded(rows[np.isin(rows ^ 1, rows) | (rows == alone)], 1)
+
+    def _recorded(self, rows: npt.NDArray[np.intp], fewest: int) -> npt.NDArray[np.intp]:
+        """Those of the parts that the record holds until they rang down."""
+        inside = np.array([row for row in rows.tolist() if self._is_recorded(row)], dtype=np.intp)
+        if len(inside) < fewest:
+            raise RecordError(
+                f"{self.record.source}: no two parts of {self.command.source} (1 and 2, 3 and 4, ...) are both in the "
+                f"record as commanded, from the begin of the first to {_RINGS_S:g} s behind the second: needed is one "
+                "such pair, a rise and fall of a sweep"
+            )
+        return inside
+
+    def _is_recorded(self, row: int) -> bool:
+        """Whether the record holds a part from its begin until it rang down, or the next one begins."""
+        last_s = len(self.values) * self.record.period_s * (1.0 + self.rate) - self.start_s
+        begin, end = self.windows[row]
+        return begin >= -self.start_s and min(end, self.command.parts[row][1] + _RINGS_S) <= last_s
 
     def _no_relation(self, found: str) -> str:
         axis = self.command.axis.upper()
@@ -361,9 +467,10 @@ class _Clock:
 
     def _notes(self, rows: npt.NDArray[np.intp]) -> list[str]:
         """What is said of the clock, and of parts that are not used."""
+        start_s = self.start_s / (1.0 + self.rate)
         notes = [
-            f"{self.record.source}: the program begins {self.start_s / (1.0 + self.rate):.3f} s after the record; the "
-            f"logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
+            f"{self.record.source}: the program begins {abs(start_s):.3f} s {'after' if start_s >= 0.0 else 'before'} "
+            f"the record; the logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
         ]
         missing = sorted(set(range(len(self.windows))) - set(rows.tolist()))
         if missing:

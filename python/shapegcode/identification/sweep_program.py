@@ -28,7 +28,7 @@ _DESIGNED_PER_OCTAVE = 3.0  # frequencies whose strokes are planned; between the
 _FEEDS = 9
 _TRIED = 8, 24  # strokes of a trial, and of a longer one
 _LONGEST = 1 << 20
-_REST_S = 0.5
+REST_S = 0.5
 _ROUNDS = 6
 _OF_STEP = 0.4  # of the corner speed difference, which a reversal has twice: the control's may be 20 % smaller
 _LEAST_AT_ONCE = 100.0  # mm/min; slower strokes excite too little: those with ramps are taken
@@ -38,6 +38,7 @@ _ENOUGH = 0.98  # of the largest amplitude: a higher feed gains no more
 _MIN_INCREMENTS = 4  # a stroke is no shorter
 _LEAST_MM_S2 = 20.0  # a sensor of 12 bits and ± 2 g resolves 10 mm/s²
 _LOW_HZ, _HIGH_HZ = 8.0, 200.0
+_MIN_CYCLES = 3.0  # of the lowest frequency in its rise: with fewer there is no rise
 _MIN_BAND = 1.5  # upper end over lower end
 
 
@@ -161,13 +162,41 @@ def write_sweep(
         ArgumentError: the control does not reach the band within these limits; what it reaches is said.
         OSError: the file cannot be written.
     """
+    found, text = plan_sweep(
+        file, machine, axis, band_hz=band_hz, travel_mm=travel_mm, acceleration_share=acceleration_share,
+        seconds=seconds, number=number,
+    )  # fmt: skip
+    write_text(file, text)
+    return found
+
+
+def plan_sweep(
+    file: str | Path,
+    machine: Machine | str | Path,
+    axis: Literal["x", "y", "z"] = "x",
+    *,
+    band_hz: tuple[float, float] | None = None,
+    travel_mm: float = 5.0,
+    acceleration_share: float = 0.3,
+    seconds: float = 60.0,
+    number: int = 7201,
+) -> tuple[SweepProgram, str]:
+    """Plan what `write_sweep` writes: the same, and the text, which is not written."""
     machine = Machine.of(machine)
     for name, value in (("travel_mm", travel_mm), ("acceleration_share", acceleration_share), ("seconds", seconds)):
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name} = {value:g}: must be finite and above 0")
     if acceleration_share > 1.0:
         raise ArgumentError(f"acceleration_share = {acceleration_share:g}: must be at most 1, the axis' own limit")
+    if axis not in ("x", "y", "z"):
+        raise ArgumentError(f"axis = {axis!r}: must be x, y or z")
+    if seconds > machine.controller.max_program_s:
+        raise ArgumentError(
+            f"seconds = {seconds:g}: must be at most {machine.controller.max_program_s:g} (controller.max_program_s)"
+        )
     low, high = band_hz or (_LOW_HZ, _HIGH_HZ)
+    if not 0.0 < low < high < math.inf:
+        raise ArgumentError(f"band of {low:g} to {high:g} Hz: must be above 0, finite and ascend")
     planner = _Planner(machine, axis, travel_mm, acceleration_share)
     for _ in range(_ROUNDS):
         strokes, limit = planner.plan(low, high)
@@ -183,14 +212,13 @@ def write_sweep(
         planner.wanted *= 0.99 / over  # What lies between the planned frequencies, and rounding, ask for more
     else:
         raise ArgumentError(f"the acceleration stays {over:.2g} times what is allowed: state less (--acceleration)")
-    write_text(file, text)
     warnings = []
     if len(text) > machine.controller.program_memory_bytes:
         warnings.append(
             f"{len(text)} bytes are more than the memory of {machine.controller.program_memory_bytes} bytes holds "
             "(controller.program_memory_bytes): run it from a card, or state less time (--seconds)"
         )
-    return SweepProgram(
+    found = SweepProgram(
         machine.name,
         axis,
         str(file),
@@ -201,6 +229,7 @@ def write_sweep(
         len(text),
         tuple(warnings),
     )
+    return found, text
 
 
 def commanded(program: Program, machine: Machine) -> tuple[FloatArray, float]:
@@ -333,6 +362,12 @@ def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[lis
     octaves = math.log2(hertz[-1] / hertz[0])
     edges = np.geomspace(hertz[0], hertz[-1], 1 + math.ceil(_BANDS_PER_OCTAVE * octaves))
     lasts_s = 0.5 * seconds / (len(edges) - 1)
+    if lasts_s * hertz[0] < _MIN_CYCLES:
+        needed = 2.0 * (len(edges) - 1) * _MIN_CYCLES / hertz[0]
+        raise ArgumentError(
+            f"seconds = {seconds:g}: {lasts_s * hertz[0]:.2g} cycles of {hertz[0]:g} Hz in each rise and fall: needed "
+            f"are {_MIN_CYCLES:g} or more, {math.ceil(10.0 * needed) / 10.0:g} s"
+        )
     step, digits = machine.controller.least_increment_mm, machine.controller.feed_decimals_mm
     found, carried = [], 0.0
     for low, high in pairwise(edges):
@@ -402,7 +437,7 @@ def moving_parts(x_mm: FloatArray, period_s: float) -> list[tuple[int, int]]:
     rows = np.flatnonzero(np.diff(x_mm))
     if not len(rows):
         return []
-    cuts = np.flatnonzero(np.diff(rows) * period_s > _REST_S)
+    cuts = np.flatnonzero(np.diff(rows) * period_s > REST_S)
     return [
         (int(rows[first]), int(rows[last]) + 2)
         for first, last in zip([0, *(cuts + 1)], [*cuts, len(rows) - 1], strict=True)

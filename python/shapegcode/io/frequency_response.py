@@ -83,6 +83,9 @@ class FrequencyResponse:
         return float(np.median(np.diff(self.frequency_hz)))
 
 
+_SIZES = 1e-50, 1e50  # whose fourth powers are numbers
+
+
 def checked_lines(
     where: str, frequency_hz: FloatArray, response: ComplexArray, coherence: FloatArray | None
 ) -> tuple[FloatArray, ComplexArray, FloatArray | None, list[str]]:
@@ -99,6 +102,14 @@ def checked_lines(
     if coherence is not None and (np.any(coherence < 0.0) or np.any(coherence > 1.0 + 1e-6)):
         row = int(np.flatnonzero((coherence < 0.0) | (coherence > 1.0 + 1e-6))[0])
         raise RecordError(f"{where}: coherence {coherence[row]:.6g} of value {row + 1}: must be from 0 to 1")
+    size = np.abs(response)
+    strange = np.flatnonzero((size > _SIZES[1]) | ((size < _SIZES[0]) & (size > 0.0)))
+    if strange.size:
+        row = int(strange[0])
+        raise RecordError(
+            f"{where}: value {row + 1} of the response is {size[row]:.3g}: must be 0 or from {_SIZES[0]:g} to "
+            f"{_SIZES[1]:g}; is it a response?"
+        )
     if len(frequency_hz) and frequency_hz[0] == 0.0:
         kept = None if coherence is None else coherence[1:]
         return frequency_hz[1:], response[1:], kept, [f"{where}: the line at 0 Hz is left out"]

@@ -35,6 +35,8 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
                 "(--force-scale, --response-scale)"
             )
         return read_wav(path, options)
+    if is_xml(head):
+        raise RecordError(f"{path}: XML, which holds a frequency response at best: needed is a record over time")
     if _is_uff(head):
         return read_uff(path, options)
     for suffixes, kind in (({".uff", ".unv", ".uf", ".uf58"}, "UFF"), ({".wav", ".wave"}, "WAV")):

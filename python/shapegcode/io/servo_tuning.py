@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import codecs
 import re
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ _NEEDED = "needed is the result of an auto servo tuning (Setup, Optimize), saved
 
 def is_xml(head: bytes) -> bool:
     """Whether a file begins as XML does."""
+    if head[:2] in {codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE}:
+        head = head[: len(head) // 2 * 2].decode("utf-16", errors="replace").encode("utf-8")
     return head.lstrip(b"\xef\xbb\xbf \t\r\n")[:5] == b"<?xml"
 
 
@@ -91,6 +94,10 @@ def _root(path: Path) -> Element:
         parser.Parse(read_file(path, _MAX_BYTES), True)
     except expat.ExpatError as error:
         raise RecordError(f"{path}:{error.lineno}: no whole XML: {expat.ErrorString(error.code)}") from error
+    except RecordError:
+        raise
+    except (LookupError, ValueError) as error:  # of the codec that the declaration names
+        raise RecordError(f"{path}:1: {error}: needed is XML in UTF-8, UTF-16 or an encoding of one byte") from error
     return builder.close()
 
 
@@ -99,7 +106,7 @@ def _axis(path: Path, root: Element) -> tuple[str | None, list[str]]:
     linear = re.fullmatch(r"M?([XYZ])\d*", name, re.IGNORECASE)
     if linear:
         return linear[1].lower(), []
-    if re.fullmatch(r"M?(A|B|C|SP|S)\d*", name, re.IGNORECASE):
+    if re.fullmatch(r"M?(A|B|C|SP|S|SPINDLE|SPINDEL)\d*", name, re.IGNORECASE):
         raise RecordError(f"{path}: axis {name} turns: a linear axis (X, Y or Z) is needed")
     return None, [f"{path}: axis {name!r} is not named X, Y or Z: state it with --axis"]
 

@@ -372,7 +372,9 @@ class OpenTime(TomlTable):
 
     name: Text = key("the parameter that it is of, mainly")
     values: tuple[Text, ...] = key('the machine a step further in that direction: "KEY = VALUE" of what differs')
-    weight: Positive = key("variance of the direction over the square of that step", default=1.0)
+    weight: Annotated[Positive, Field(le=1e9)] = key(
+        "variance of the direction over the square of that step", default=1.0
+    )
 
     @model_validator(mode="after")
     def _readable(self) -> Self:
