@@ -117,7 +117,8 @@ void register_simulation(py::module_& module) {
       .def_readonly("feed_excess", &SimulationFigures::feed_excess, "Of the command, where asked for.")
       .def_readonly("end_mm", &SimulationFigures::end_mm, "Last set-point, (3,), mm.")
       .def_readonly("starved", &SimulationFigures::starved, "One per SimulationOptions.starved_blocks.")
-      .def_readonly("other_overrides", &SimulationFigures::other_overrides, "One per SimulationOptions.other_overrides.")
+      .def_readonly("other_overrides", &SimulationFigures::other_overrides,
+                    "One per SimulationOptions.other_overrides.")
       .def_property_readonly(
           "recorded_command", [](const SimulationFigures& self) { return recorded(self.recorded_command); },
           "(n, 3), mm.")
