@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pytest
 
 from command import run
-from shaken_axis import Logger, ShakenMode, logged, random_modes, shaken
+from shaken_axis import Logger, ShakenMode, logged, ran, random_modes, shaken
 from shapegcode.errors import ArgumentError, RecordError
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.identify import identify
@@ -86,9 +86,29 @@ def test_modes_start_and_clock_of_a_logger(program: Path, motion: tuple[FloatArr
     begins = re.search(r"the program begins ([0-9.]+) s after the record", found.notes[0])
     assert begins is not None
     assert float(begins[1]) == pytest.approx(3.3 * 1.01, abs=0.03)
-    assert "clock is +0.99" in found.notes[0], "1.01 seconds are counted in one: 1 % of the control's second"
+    clock = re.search(r"clock is \+([0-9.]+) %", found.notes[0])
+    assert clock is not None
+    assert float(clock[1]) == pytest.approx(100.0 / 101.0, abs=0.003), "1.01 seconds are counted in one"
+    assert not any("than simulated" in note for note in found.notes)
     upside_down = record(motion, Logger(clock=0.99, begins_s=-0.4, rate_hz=1600.0))
     check(found_in(program, Record("turned", upside_down.period_s, -upside_down.response)), MODES)
+
+
+@pytest.mark.parametrize(("ramp_s", "wait_s"), [(0.0, 0.0), (0.02, 0.0), (0.1, 0.0), (0.05, 0.12)])
+def test_ramps_and_waits_of_the_control_need_not_be_those_of_the_machine_file(
+    tmp_path: Path, ramp_s: float, wait_s: float
+) -> None:
+    assert VX500.controller.time_constant_s == 0.05
+    program = tmp_path / "SWEEP.NC"
+    write_sweep(program, VX500, "x")
+    moved = shaken(ran(program.read_text(), 5e-4, ramp_s, wait_s), 5e-4, MODES)
+    found = found_in(program, record(moved, Logger(clock=0.995, begins_s=-6.0), seed=4))
+    check(found, MODES)
+    told = [re.search(r"takes ([0-9]+) ms (longer|less) than simulated", note) for note in found.notes]
+    (match,) = [each for each in told if each]
+    longer = ramp_s + wait_s - 0.05
+    assert match[2] == ("longer" if longer > 0.0 else "less")
+    assert float(match[1]) == pytest.approx(1e3 * abs(longer), abs=6.0)
 
 
 @pytest.mark.slow
