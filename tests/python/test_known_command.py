@@ -192,7 +192,12 @@ def test_the_command_finds_the_axis_of_a_phone_and_writes_the_machine(
     assert sorted(round(mode.frequency_hz) for mode in Machine.load(tmp_path / "mine.toml").axes.x.modes) == [23, 46]
     assert json.loads((tmp_path / "found.json").read_text())["axis"] == "x"
     assert {each.stem for each in (tmp_path / "plots").iterdir()} == {"identify-sweep"}
+    again = run(tmp_path, "identify", "phone.csv", "--axis", "x", "--sweep", program, "-m", "mine.toml")
+    assert again.returncode == 0, "the X axis of the machine, whatever that of the sensor is"
+    assert f"next: shapegcode identify phone.csv --sweep {program} -m mine.toml --update mine.toml" in again.stdout
     bare = run(tmp_path, "identify", "phone.csv", "--sweep", program)
     assert (bare.returncode, "--sweep needs -m" in bare.stderr) == (2, True)
-    found = identify(tmp_path / "phone.csv", ReadOptions(axis="y"), sweep=program, machine=VX500)
+    with pytest.raises(RecordError, match=r"axis Y is asked for, .* moves X: leave the axis out"):
+        identify(tmp_path / "phone.csv", ReadOptions(axis="y"), sweep=program, machine=VX500)
+    found = identify(tmp_path / "phone.csv", sweep=program, machine=VX500)
     assert update_machine(tmp_path / "mine.toml", found, keep_modes="yz").machine.axes.x.modes

@@ -124,6 +124,12 @@ def find_modes_of_command(
     command: KnownCommand, sources: Sequence[str | Path | Record], options: ReadOptions, sought: Sought
 ) -> Identification:
     """Find the modes in records beside a known command; see `identify.identify`."""
+    if options.axis not in (None, command.axis):
+        raise RecordError(
+            f"axis {options.axis.upper()} is asked for, {command.source} moves {command.axis.upper()}: leave the axis "
+            "out, that of the sensor is found from the record"
+        )
+    options = replace(options, axis=None)
     aligned = [_aligned(command, source, options, sought.band_hz) for source in sources]
     ends = [[each.response.frequency_hz[end] for each in aligned] for end in (0, -1)]
     responses = [_between(each.response, max(ends[0]), min(ends[1])) for each in aligned]
