@@ -161,6 +161,13 @@ def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray
         found_in(program, record(motion, Logger(rate_hz=40.0)))
     with pytest.raises(RecordError, match="velocity: a sweep needs an acceleration"):
         found_in(program, Record("laser", good.period_s, good.response, "velocity"))
+    late = Record("late", good.period_s, good.response[8000:])
+    assert re.search(r"the program begins 6\.[67][0-9]+ s before the record", found_in(program, late).notes[0])
+    coarse = found_in(program, record(motion, Logger(rate_hz=100.0)))
+    assert [round(mode.frequency_hz.value) for mode in coarse.modes] == [23]
+    assert any(
+        re.match(r"looked at from \d+ to \d+ Hz; 100 samples per second reach 40 Hz", note) for note in coarse.notes
+    )
     faster = good.response[: len(good.response) // 2]
     with pytest.raises(RecordError, match="no relation to the command"):
         found_in(program, Record("override", 1.25 * good.period_s, faster))

@@ -136,9 +136,12 @@ def find_modes_of_command(
     names = tuple(_name(each) for each in sources)
     found = find_frf_modes(responses, names, replace(sought, phase_known=False))
     first, lines = aligned[0], responses[0].frequency_hz
+    rate = min(1.0 / each.record.period_s for each in aligned)
+    looked = f"looked at from {lines[0]:.0f} to {lines[-1]:.0f} Hz; {rate:.0f} samples per second reach "
+    looked += f"{rate / _OVER_HALF:.0f} Hz"
     return replace(
         found,
-        notes=(*(note for each in aligned for note in each.notes), *found.notes),
+        notes=(*(note for each in aligned for note in each.notes), looked, *found.notes),
         responses=(),
         fitted_lines=(),
         noise_rms=None,
@@ -427,7 +430,8 @@ class _Clock:
         begins_s = self.places_s[first] - self.middles[first] / (1.0 + self.rate)
         waits = np.polyfit(rows, self.places_s[rows] * (1.0 + self.rate) - self.middles[rows], 1)[0]
         notes = [
-            f"{self.record.source}: the program begins {begins_s:.3f} s after the record; the "
+            f"{self.record.source}: the program begins {abs(begins_s):.3f} s "
+            f"{'after' if begins_s >= 0.0 else 'before'} the record; the "
             f"logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
         ]
         if abs(waits) > _TOLD_WAIT_S:
