@@ -173,6 +173,9 @@ def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray
         found_in(program, Record("override", 1.25 * good.period_s, faster))
     with pytest.raises(ArgumentError, match="a sweep needs the machine"):
         identify([good], sweep=program)
+    for band_hz in ((500.0, 900.0), (20.0, 20.05)):
+        with pytest.raises(RecordError, match=rf"lines between {band_hz[0]:g} and {band_hz[1]:g} Hz, .* are needed"):
+            found_in(program, good, band_hz=band_hz)
     for text, why in (("X1. F100.\nY1.", "Y by 1 mm too"), ("M00", "nothing moves")):
         other = tmp_path / "other.nc"
         other.write_text(f"%\nO1\nG21 G91 G94 G01 {text}\nM30\n%\n")

@@ -323,10 +323,10 @@ class _Clock:
     def aligned(self, band_hz: tuple[float, float] | None, chosen: bool) -> _Aligned:
         """Minus the response over the command, with start and clock found."""
         rows = self._clear_parts()
-        spectra = self._spectra(band_hz)
+        spectra = self._spectra(None)
         for furthest in (_FURTHEST_RATE, _FINE_STEP):
             self._refine(rows, furthest)
-            spectra = self._spectra(band_hz)
+            spectra = self._spectra(None)
             rows = _in_place(spectra, self.shares >= _CORRELATED)
         while True:
             lags = _lags(spectra.of(rows), rows)
@@ -342,7 +342,17 @@ class _Clock:
         notes = self._notes(rows)
         if chosen:
             notes.append(f"{self.record.source}: of the axes of the sensor this one goes with the command best")
-        return _Aligned(self.record, self._response(spectra.of(rows).late(lags).in_twos(rows)), tuple(notes))
+        response = self._response(spectra.of(rows).late(lags).in_twos(rows))
+        if band_hz is not None:
+            hertz, (low, high) = response.frequency_hz, band_hz
+            count = np.count_nonzero((hertz >= low) & (hertz <= high))
+            if count < FEWEST_LINES:
+                raise RecordError(
+                    f"{self.record.source}: {count} lines between {low:g} and {high:g} Hz, {FEWEST_LINES} are needed: "
+                    f"there are {len(hertz)} from {hertz[0]:.4g} to {hertz[-1]:.4g} Hz"
+                )
+            response = _between(response, low, high)
+        return _Aligned(self.record, response, tuple(notes))
 
     def _spectra(
         self,
