@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +46,37 @@ def drive(s: ComplexArray, bandwidth_hz: float = 60.0, gain_per_s: float | None 
     omega = 2.0 * np.pi * bandwidth_hz
     inner = omega**2 / (s**2 + 1.4 * omega * s + omega**2) / (1.0 + s / (4.0 * omega))
     return np.asarray(inner if gain_per_s is None else inner * gain_per_s / (s + gain_per_s))
+
+
+def ran(text: str, period_s: float, ramp_s: float, wait_s: float = 0.0) -> FloatArray:
+    """Positions in mm of a control that runs off a sweep: feed built up in a time of its own, late behind each G04.
+
+    Reversals need no ramp. The time along the feed, which goes on evenly but for the two ramps of each part, is turned
+    into positions.
+    """
+    parts: list[list[tuple[float, float]]] = [[]]
+    pauses, feed = [], 0.0
+    for line in text.splitlines():
+        if line.startswith("G04"):
+            pauses.append(float(line[5:]) * 1e-3)
+            parts.append([])
+        elif match := re.fullmatch(r"(?:G01 )?[XYZ](-?[0-9.]+)(?: F([0-9.]+))?", line):
+            feed = float(match[2] or feed)
+            parts[-1].append((float(match[1]), feed / 60.0))
+    found = [np.zeros(1)]
+    for part, pause in zip(parts, [*pauses, 0.0], strict=True):
+        lengths, feeds = np.array(part).reshape(-1, 2).T
+        ends = np.concatenate(([0.0], np.cumsum(np.abs(lengths) / feeds)))
+        at = np.arange(0.0, ends[-1] + ramp_s + period_s, period_s)
+        full = np.clip(at - 0.5 * ramp_s, 0.0, None)
+        if ramp_s:
+            full = np.where(at < ramp_s, at**2 / (2.0 * ramp_s), full)
+            left = np.clip(ends[-1] + ramp_s - at, 0.0, None)
+            full = np.where(left < ramp_s, ends[-1] - left**2 / (2.0 * ramp_s), full)
+        if len(lengths):
+            found.append(found[-1][-1] + np.interp(full, ends, np.concatenate(([0.0], np.cumsum(lengths)))))
+        found.append(np.full(round((pause + wait_s) / period_s), found[-1][-1]))
+    return np.concatenate(found)
 
 
 def shaken(

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pytest
 
 from command import run
-from shaken_axis import Logger, ShakenMode, logged, random_modes, shaken
+from shaken_axis import Logger, ShakenMode, logged, ran, random_modes, shaken
 from shapegcode.errors import ArgumentError, RecordError
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.identify import identify
@@ -86,9 +86,29 @@ def test_modes_start_and_clock_of_a_logger(program: Path, motion: tuple[FloatArr
     begins = re.search(r"the program begins ([0-9.]+) s after the record", found.notes[0])
     assert begins is not None
     assert float(begins[1]) == pytest.approx(3.3 * 1.01, abs=0.03)
-    assert "clock is +0.99" in found.notes[0], "1.01 seconds are counted in one: 1 % of the control's second"
+    clock = re.search(r"clock is \+([0-9.]+) %", found.notes[0])
+    assert clock is not None
+    assert float(clock[1]) == pytest.approx(100.0 / 101.0, abs=0.003), "1.01 seconds are counted in one"
+    assert not any("than simulated" in note for note in found.notes)
     upside_down = record(motion, Logger(clock=0.99, begins_s=-0.4, rate_hz=1600.0))
     check(found_in(program, Record("turned", upside_down.period_s, -upside_down.response)), MODES)
+
+
+@pytest.mark.parametrize(("ramp_s", "wait_s"), [(0.0, 0.0), (0.02, 0.0), (0.1, 0.0), (0.05, 0.12)])
+def test_ramps_and_waits_of_the_control_need_not_be_those_of_the_machine_file(
+    tmp_path: Path, ramp_s: float, wait_s: float
+) -> None:
+    assert VX500.controller.time_constant_s == 0.05
+    program = tmp_path / "SWEEP.NC"
+    write_sweep(program, VX500, "x")
+    moved = shaken(ran(program.read_text(), 5e-4, ramp_s, wait_s), 5e-4, MODES)
+    found = found_in(program, record(moved, Logger(clock=0.995, begins_s=-6.0), seed=4))
+    check(found, MODES)
+    told = [re.search(r"takes ([0-9]+) ms (longer|less) than simulated", note) for note in found.notes]
+    (match,) = [each for each in told if each]
+    longer = ramp_s + wait_s - 0.05
+    assert match[2] == ("longer" if longer > 0.0 else "less")
+    assert float(match[1]) == pytest.approx(1e3 * abs(longer), abs=6.0)
 
 
 @pytest.mark.slow
@@ -142,19 +162,6 @@ def test_a_logger_that_starts_late_or_stops_early_shows_no_further_modes(
         found_in(program, Record("middle", whole.period_s, whole.response[first:count]))
 
 
-def test_another_override_within_the_logger_s_clock_is_refused(program: Path, command: KnownCommand) -> None:
-    """The moves take 1 % longer, or .5 % less, and the rests do not: NumPy's interpolation of the command."""
-    for override in (0.99, 1.005):
-        speed = np.ones(len(command.times_s))
-        for begin, end in command.parts:
-            speed[(command.times_s >= begin) & (command.times_s < end)] = override
-        instants = np.concatenate(([0.0], np.cumsum(command.period_s / speed)[:-1]))
-        even = np.arange(int(instants[-1] / command.period_s)) * command.period_s
-        moved = np.interp(even, instants, command.position) * 1e3
-        with pytest.raises(RecordError, match=r"and its rests tell of clocks that differ by 0.* % \(limit 0.12 %\)"):
-            found_in(program, record(shaken(moved, command.period_s, MODES)))
-
-
 def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray, FloatArray], tmp_path: Path) -> None:
     good = record(motion)
     noise = np.random.default_rng(3).standard_normal(len(good.response))
@@ -174,13 +181,21 @@ def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray
         found_in(program, record(motion, Logger(rate_hz=40.0)))
     with pytest.raises(RecordError, match="velocity: a sweep needs an acceleration"):
         found_in(program, Record("laser", good.period_s, good.response, "velocity"))
+    late = Record("late", good.period_s, good.response[8000:])
+    assert re.search(r"the program begins 6\.[67][0-9]+ s before the record", found_in(program, late).notes[0])
+    coarse = found_in(program, record(motion, Logger(rate_hz=100.0)))
+    assert [round(mode.frequency_hz.value) for mode in coarse.modes] == [23]
+    assert any(
+        re.match(r"looked at from \d+ to \d+ Hz; 100 samples per second reach 40 Hz", note) for note in coarse.notes
+    )
     faster = good.response[: len(good.response) // 2]
     with pytest.raises(RecordError, match="no relation to the command"):
         found_in(program, Record("override", 1.25 * good.period_s, faster))
     with pytest.raises(ArgumentError, match="a sweep needs the machine"):
         identify([good], sweep=program)
-    with pytest.raises(RecordError, match=r"band of 0.5 to 1 Hz: 0 lines .* needed are 16 or more"):
-        found_in(program, good, band_hz=(0.5, 1.0))
+    for band_hz in ((500.0, 900.0), (20.0, 20.05), (0.5, 1.0)):
+        with pytest.raises(RecordError, match=rf"lines between {band_hz[0]:g} and {band_hz[1]:g} Hz, .* are needed"):
+            found_in(program, good, band_hz=band_hz)
     refused = (
         ("X1. F100.\nY1.", "Y by 1 mm too"),
         ("M00", "nothing moves"),
@@ -212,7 +227,12 @@ def test_the_command_finds_the_axis_of_a_phone_and_writes_the_machine(
     assert sorted(round(mode.frequency_hz) for mode in Machine.load(tmp_path / "mine.toml").axes.x.modes) == [23, 46]
     assert json.loads((tmp_path / "found.json").read_text())["axis"] == "x"
     assert {each.stem for each in (tmp_path / "plots").iterdir()} == {"identify-sweep"}
+    again = run(tmp_path, "identify", "phone.csv", "--axis", "x", "--sweep", program, "-m", "mine.toml")
+    assert again.returncode == 0, "the X axis of the machine, whatever that of the sensor is"
+    assert f"next: shapegcode identify phone.csv --sweep {program} -m mine.toml --update mine.toml" in again.stdout
     bare = run(tmp_path, "identify", "phone.csv", "--sweep", program)
     assert (bare.returncode, "--sweep needs -m" in bare.stderr) == (2, True)
-    found = identify(tmp_path / "phone.csv", ReadOptions(axis="y"), sweep=program, machine=VX500)
+    with pytest.raises(RecordError, match=r"axis Y is asked for, .* moves X: leave the axis out"):
+        identify(tmp_path / "phone.csv", ReadOptions(axis="y"), sweep=program, machine=VX500)
+    found = identify(tmp_path / "phone.csv", sweep=program, machine=VX500)
     assert update_machine(tmp_path / "mine.toml", found, keep_modes="yz").machine.axes.x.modes

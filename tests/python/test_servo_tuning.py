@@ -131,6 +131,13 @@ def test_refused(how: dict[str, Any], why: str, tmp_path: Path) -> None:
         sg.identify(write(tmp_path / "ast.xml", **how))
 
 
+def test_an_axis_that_the_file_names_is_no_other_one(tmp_path: Path) -> None:
+    path = write(tmp_path / "ast.xml", "MX1")
+    assert sg.identify(path, sg.ReadOptions(axis="x")).axis == "x"
+    with pytest.raises(sg.RecordError, match="holds the X axis, asked for is Y"):
+        sg.identify(path, sg.ReadOptions(axis="y"))
+
+
 def test_an_axis_with_another_name_is_stated(tmp_path: Path) -> None:
     path = write(tmp_path / "ast.xml", "Q3")
     assert any("--axis" in warning for warning in sg.identify(path).warnings)

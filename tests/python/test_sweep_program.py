@@ -90,7 +90,9 @@ def test_the_planned_acceleration_is_that_of_an_independent_simulation(tmp_path:
 
 def test_what_a_control_does_not_reach_is_said(tmp_path: Path) -> None:
     file = tmp_path / "x.nc"
-    with pytest.raises(ArgumentError, match=r"150 Hz cannot be reached, 86.96 Hz can: a block lasts 5 ms or more"):
+    with pytest.raises(
+        ArgumentError, match=r"150 Hz cannot be reached, 86.96 Hz can: a block lasts 5 ms or more, with 15 % to spare"
+    ):
         write_sweep(file, VX500, "x", band_hz=(10.0, 150.0))
     slow = VX500.with_values("controller.block_time_s", 0.05)
     with pytest.raises(ArgumentError, match=r"band of 8 to 200 Hz: must ascend by 1.5 times or more; .* 8.696 Hz"):
@@ -109,6 +111,7 @@ def test_the_command_writes_the_program_and_says_the_band_before(tmp_path: Path)
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout.startswith("Y axis of VX500: 8 to 86")
     assert "next: run y.nc beside a logger on what the Y axis moves" in answer.stdout
+    assert run(tmp_path, "machine", "show", "vx500", "--for", "y.nc").returncode == 0, "no mark of a shaped program"
     small = run(tmp_path, "sweep", "-m", "vx500", "-o", "x.nc", "--set", "controller.program_memory_bytes=20000")
     assert small.returncode == 0
     assert "controller.program_memory_bytes" in small.stdout + small.stderr

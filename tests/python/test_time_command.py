@@ -280,6 +280,8 @@ def test_the_table_says_where_the_time_goes(folder: Path, capsys: pytest.Capture
         "count 0 s on this machine (3 in the program)", "next: ",
     ):  # fmt: skip
         assert said in out
+    _, out, _ = run(capsys, "part.nc", "-m", "kimm004", "--set", "times.tool_change_s=5.8")
+    assert "1 of 3 tool changes and M codes count 0 s on this machine" in out, "M30 alone"
     code, out, _ = run(capsys, "part.nc", "-m", "kimm004", "--set", "controller.time_constant_s=0.1", "--no-full")
     assert code == 0
     assert "3.516" in out

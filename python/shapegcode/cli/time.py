@@ -61,8 +61,11 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.csv is not None:
         write_lines(args.csv, time.csv_lines())
-    free = sum(block.kind in ("tool_change", "function") and block.duration_s <= 0.0 for block in time.blocks)
+    events = [block for block in time.blocks if block.kind in ("tool_change", "function")]
+    free = sum(block.duration_s <= 0.0 for block in events)
     note = f"tool changes and M codes count 0 s on this machine ({free} in the program)"
+    if free < len(events):
+        note = f"{free} of {len(events)} tool changes and M codes count 0 s on this machine"
     usual = [
         f"{what} at {percent:g} %, as this shop usually runs (times.{key})"
         for what, key, percent, given in (

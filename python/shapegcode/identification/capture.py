@@ -16,7 +16,7 @@ import numpy as np
 from shapegcode.errors import RecordError
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
-from shapegcode.identification.parts import Spectra, transform
+from shapegcode.identification.parts import Spectra, transforms
 from shapegcode.identification.result import Identification, Sweep
 from shapegcode.identification.servo.record import ServoTrace, read_servo_record
 from shapegcode.identification.sweep_program import moving_parts
@@ -98,8 +98,11 @@ def _response(
         raise RecordError(
             f"{source}: a sample every {period_s * 1e3:g} ms tells nothing between {low:g} and {high:g} Hz"
         )
-    rows = [[transform(_kicks(each), 0.0, period_s, hertz) for each in pair] for pair in windows]
-    spectra = Spectra(hertz, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
+    none = np.zeros(len(windows))
+    command, response = (
+        transforms([_kicks(each) for each in parts], none, period_s, hertz) for parts in zip(*windows, strict=True)
+    )
+    spectra = Spectra(hertz, command, response)
     used, coherence = spectra.coherent()
     if np.count_nonzero(used) < FEWEST_LINES:
         raise RecordError(

@@ -2,19 +2,20 @@
 
 The axis moves as commanded but for a smooth lag of its drive, and the sensor on what it carries shows the command's
 acceleration times 1 - sum of G s²/(s² + 2 zeta omega s + omega²). The logger runs on its own clock: where the program
-begins in the record and how much faster its clock runs is found from the record, part by part of the program.
+begins in the record and how much faster its clock runs is found from the record, part by part of the program. The clock
+is found within the parts: how long the control ramps and waits between them is not known, and is found too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.optimize import minimize_scalar
 from scipy.signal import resample_poly
 
@@ -22,7 +23,7 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.across import with_moves
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
-from shapegcode.identification.parts import Spectra, transform
+from shapegcode.identification.parts import Spectra, transforms
 from shapegcode.identification.result import Identification, Sweep
 from shapegcode.identification.sweep_program import REST_S, commanded, moving_parts
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
@@ -32,12 +33,22 @@ from shapegcode.machine import Machine
 from shapegcode.program import Program
 
 _CLOCK = 0.025  # the logger's clock may be off by this share
-_COARSE_STEP, _FINE_STEP = 0.001, 5e-5
+_COARSE_STEP, _FINE_STEP = 0.001, 5e-4
+_FURTHEST_RATE, _EXACT_RATE = 0.003, 3e-6  # from the one that is found below 40 Hz
+_LONGEST_WAIT_S, _WAIT_STEP_S = 0.21, 0.015  # that a part of the program lasts longer or shorter than simulated
+_WAIT_GRID_S = np.arange(-0.025, 0.025, 2.5e-4)  # about the one that is found below 40 Hz
+_TOLD_WAIT_S = 0.005
+_NEAR_S = 0.03
+_CLOCK_HZ = 150.0  # the clock is refined by the lines below
 _COARSE_HZ = 40.0  # start and clock are first looked for in what lies below
 _AFTER_S = 3.0  # of the record behind the last part
 _RINGS_S = 2.0  # of the record that a part needs behind it, or up to the next part
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # of a part against the others
+_IRREGULAR_S = 0.008  # of what is between a rise and its fall
+_LAST_LAG_S = 0.004  # less than half a cycle of the highest strokes
+_LAG_STEP_S = 5e-4
+_UNLIKELY = 0.3  # of a correlation, that a part is the longest lag away
 _EXPLAINED = 0.5  # share of a part's power that the others must explain
 _FEWEST_PARTS = 2
 _LOWEST_HZ = 4.0
@@ -47,15 +58,10 @@ _LOUD = 0.1  # of the loudest part: below 40 Hz
 _QUIET = 0.01
 _LEVELLED_HZ = 1.0
 _SAME_START_S = 0.15
-_ROUNDS = 2
 _AWAY_S, _STANDS_OUT = 0.5, 2.0
 _GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
 _LOWEST_SHARE = 0.15  # of the power of the command
 _CORRELATED = 0.25  # squared correlation of a part, below 40 Hz
-_SLOWER = np.arange(-0.02, 0.0201, 0.002)  # moves of a part than commanded
-_OTHER_SPEED = 1.2e-3  # within 3e-4 by the right command, 1e-3 by a time constant 10 % off, 1.3e-3 at 99 % override
-_AGREE, _FEWEST_PAIRS = 0.8, 3
-_FINER = 8  # lines between two, for their interpolation
 _OWN = 0.1  # of the largest line of a part, in power
 _LAGS_S = np.arange(-0.1, 0.1, 2.5e-4)
 
@@ -125,6 +131,12 @@ def find_modes_of_command(
 
     See `identify.identify`.
     """
+    if options.axis not in (None, command.axis):
+        raise RecordError(
+            f"axis {options.axis.upper()} is asked for, {command.source} moves {command.axis.upper()}: leave the axis "
+            "out, that of the sensor is found from the record"
+        )
+    options = replace(options, axis=None)
     aligned = [_aligned(command, source, options, sought.band_hz, across=across) for source in sources]
     ends = [[each.response.frequency_hz[end] for each in aligned] for end in (0, -1)]
     responses = [_between(each.response, max(ends[0]), min(ends[1])) for each in aligned]
@@ -132,12 +144,14 @@ def find_modes_of_command(
     found = find_frf_modes(responses, names, replace(sought, phase_known=False))
     first, lines = aligned[0], responses[0].frequency_hz
     if across:
-        found = with_moves(
-            found, [_between(one, max(ends[0]), min(ends[1])) for each in aligned for one in each.others]
-        )
+        others = [_between(one, max(ends[0]), min(ends[1])) for each in aligned for one in each.others]
+        found = with_moves(found, others)
+    rate = min(1.0 / each.record.period_s for each in aligned)
+    looked = f"looked at from {lines[0]:.0f} to {lines[-1]:.0f} Hz; {rate:.0f} samples per second reach "
+    looked += f"{rate / _OVER_HALF:.0f} Hz"
     return replace(
         found,
-        notes=(*(note for each in aligned for note in each.notes), *found.notes),
+        notes=(*(note for each in aligned for note in each.notes), looked, *found.notes),
         responses=(),
         fitted_lines=(),
         noise_rms=None,
@@ -195,7 +209,10 @@ def _held_at_ends(values: FloatArray) -> bool:
 
 
 class _Clock:
-    """A record and where the program is in it: program time = logger's time * (1 + rate) - start."""
+    """A record and where the program is in it.
+
+    About the middle of each part, program time = middle + (logger's time - the part's place) * (1 + rate).
+    """
 
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
@@ -229,11 +246,17 @@ class _Clock:
         self.windows = list(
             zip([begin for begin, _ in command.parts], [*ends, command.parts[-1][1] + _AFTER_S], strict=True)
         )
-        self.rate, self.start_s, self.shares = self._coarse()
+        self.middles = np.array([np.mean(each) for each in self.windows])
+        self.rate, start_s, self.wait_s, self.shares = self._coarse()
+        late = self.wait_s * np.arange(len(self.windows))
+        self.places_s = (self.middles + start_s + late) / (1.0 + self.rate)  # of the middles, by the logger's clock
         self.correlation = float(np.mean(self.shares))
 
-    def _coarse(self) -> tuple[float, float, FloatArray]:
-        """Rate, start, and squared correlation of each part, by what lies below 40 Hz and 40 % of the sampling rate."""
+    def _coarse(self) -> tuple[float, float, float, FloatArray]:
+        """Rate, start, wait, and squared correlation of each part, by what lies below 40 Hz and 40 % of the sampling.
+
+        The wait is what a part and the rest behind it last longer than simulated: ramps and waits of the control.
+        """
         command, period = self.command, self.record.period_s
         thinner = max(1, int(0.4 / period / _COARSE_HZ))
         values = resample_poly(self.values, 1, thinner)
@@ -252,10 +275,11 @@ class _Clock:
         spectrum = np.where(inside, spectrum / np.maximum(level, _QUIET * np.max(level)), 0.0)
         values = np.fft.ifft(spectrum).real[: len(values)]
         power = np.concatenate(([0.0], np.cumsum(np.concatenate((values**2, np.zeros(size - len(values)))))))
-        best = (-1.0, 0.0, 0.0, np.zeros(len(self.windows)))
+        best = (-1.0, 0.0, 0.0, 0.0, np.zeros(len(self.windows)))
+        waits = np.arange(-_LONGEST_WAIT_S, _LONGEST_WAIT_S + 1e-9, _WAIT_STEP_S)
         for rate in np.arange(-_CLOCK, _CLOCK + 1e-9, _COARSE_STEP):
             every = step * (1.0 + rate)
-            squares = np.zeros((len(used), size))
+            squares = np.zeros((len(used), size), dtype=np.float32)
             for row, part in enumerate(used):
                 begin, end = self.windows[part]
                 at = begin + every * np.arange(int((end - begin) / every))
@@ -267,28 +291,33 @@ class _Clock:
                 own = np.maximum(own, _QUIET * float(np.max(own)))
                 share = found / (own * 0.5 * float(np.sum(np.abs(wave) ** 2)))
                 squares[row] = np.roll(share, -round(begin / every))
-            total = squares.mean(axis=0)
-            place = int(np.argmax(total))
-            if total[place] > best[0]:
-                first = place - size if place > len(values) else place
-                shares = np.zeros(len(self.windows))
-                reach = max(1, round(_SAME_START_S / every))
-                near = np.arange(place - reach, place + reach + 1) % size
-                shares[used] = squares[:, near].max(axis=1)
-                best = (float(total[place]), float(rate), first * every, shares)
+            wide = maximum_filter1d(squares, 2 * max(1, round(_NEAR_S / every)) + 1, axis=1, mode="wrap")
+            for wait in waits:
+                total = np.zeros(size, dtype=np.float32)
+                for correlated, part in zip(wide, used, strict=True):
+                    total += np.roll(correlated, -round(wait * part / every))
+                place = int(np.argmax(total))
+                if total[place] > best[0]:
+                    first = place - size if place > len(values) else place
+                    shares = np.zeros(len(self.windows))
+                    reach = max(1, round(_SAME_START_S / every))
+                    for correlated, part in zip(squares, used, strict=True):
+                        near = np.arange(-reach, reach + 1) + place + round(wait * part / every)
+                        shares[part] = correlated[near % size].max()
+                    best = (float(total[place]), float(rate), first * every, float(wait), shares)
         return best[1:]
 
     def aligned(self, band_hz: tuple[float, float] | None, chosen: bool, others: Sequence[Record]) -> _Aligned:
         """Minus the response over the command, with start and clock found; and of others on the same clock."""
         rows = self._recorded(self._clear_parts(), _FEWEST_PARTS)
         clear = np.isin(np.arange(len(self.windows)), rows)
-        spectra = self._spectra(band_hz)
-        for _ in range(_ROUNDS):
-            self._refine(spectra.of(rows), rows)
-            spectra = self._spectra(band_hz)
+        spectra = self._spectra(None)
+        for furthest in (_FURTHEST_RATE, _FINE_STEP):
+            self._refine(rows, furthest)
+            spectra = self._spectra(None)
             rows = self._recorded(_in_place(spectra, clear), _FEWEST_PARTS)
         while True:
-            lags = _lags(spectra.of(rows))
+            lags = _lags(spectra.of(rows), rows)
             explained = _explained(spectra.of(rows).late(lags))
             worst = int(np.argmin(explained))
             if explained[worst] >= _EXPLAINED or len(rows) <= _FEWEST_PARTS:
@@ -296,54 +325,64 @@ class _Clock:
             rows = np.delete(rows, worst)
         if np.min(explained) < _EXPLAINED:
             raise RecordError(
-                self._no_relation(f"parts of the program explain {max(100 * np.min(explained), 0.0):.0f} % of another")
+                self._no_relation(f"parts of the program explain {100 * max(np.min(explained), 0.0):.0f} % of another")
             )
         rows = self._whole(rows)
-        self._refine(spectra.of(rows), rows)  # Without those that did not go with the others
-        spectra = self._spectra(band_hz)
-        lags = _lags(spectra.of(rows))
-        self._refuse_other_speed(spectra)
+        if len(rows) > 1:
+            self._refine(rows, _FINE_STEP)  # without those that did not go with the others
+        spectra = self._spectra(None)
+        lags = _lags(spectra.of(rows), rows)
         notes = self._notes(rows)
         if chosen:
             notes.append(f"{self.record.source}: of the axes of the sensor this one goes with the command best")
         used = spectra.of(rows).late(lags).in_twos(rows)
         response = self._response(used)
-        beside = []
+        inside, beside = np.isin(used.hertz, response.frequency_hz), []
         for other in others:
             clock = copy(self)
             clock.record, clock.values = other, other.response - np.mean(other.response)
-            of_other = clock._spectra(band_hz).of(rows).late(lags).in_twos(rows)
+            of_other = clock._spectra(None).of(rows).late(lags).in_twos(rows)
             # Delay, lag and sign that were taken out of the one are taken out of the other.
-            inside = np.isin(used.hertz, response.frequency_hz)
             lines = response.response * (of_other.ratio() / used.ratio())[inside]
             beside.append(replace(response, source=other.source, response=lines, axis=other.axis))
+        if band_hz is not None:
+            hertz, (low, high) = response.frequency_hz, band_hz
+            count = np.count_nonzero((hertz >= low) & (hertz <= high))
+            if count < FEWEST_LINES:
+                raise RecordError(
+                    f"{self.record.source}: {count} lines between {low:g} and {high:g} Hz, {FEWEST_LINES} are needed: "
+                    f"there are {len(hertz)} from {hertz[0]:.4g} to {hertz[-1]:.4g} Hz"
+                )
+            response, *beside = (_between(each, low, high) for each in (response, *beside))
         return _Aligned(self.record, response, tuple(notes), tuple(beside))
 
-    def _spectra(self, band_hz: tuple[float, float] | None) -> Spectra:
+    def _spectra(
+        self,
+        band_hz: tuple[float, float] | None,
+        rate: float | None = None,
+        rows: npt.NDArray[np.intp] | None = None,
+    ) -> Spectra:
         """Lines of command and response of each part."""
-        period = self.record.period_s * (1.0 + self.rate)
+        stretch = 1.0 + (self.rate if rate is None else rate)
+        period = self.record.period_s * stretch
         low, high = band_hz or (_LOWEST_HZ, np.inf)
         high = min(high, 1.0 / (_OVER_HALF * period))
         longest = max(end - begin for begin, end in self.windows)
         step = 0.5 / longest
         hertz = np.arange(max(low, _LOWEST_HZ), high, step)
-        if len(hertz) < FEWEST_LINES:
-            raise RecordError(
-                f"{self.record.source}: band of {low:g} to {high:.4g} Hz: {len(hertz)} lines between {_LOWEST_HZ:g} Hz "
-                f"and a {_OVER_HALF:g}th of the samples per second: needed are {FEWEST_LINES} or more, "
-                f"{FEWEST_LINES * step:.3g} Hz"
-            )
-        rows: list[tuple[ComplexArray, ComplexArray]] = []
-        for begin, end in self.windows:
-            first, last = (int(np.ceil((each + self.start_s) / period)) for each in (begin, end))
-            first, last = max(first, 0), min(last, len(self.values))
-            part = self.values[first:last]
-            part = part - np.mean(part) if len(part) else part
-            response = transform(part, first * period - self.start_s, period, hertz) * period
-            every = self.command.period_s
-            first, last = round(begin / every), round(end / every)
-            rows.append((transform(self.command.kicks[first:last], first * every, every, hertz), response))
-        return Spectra(hertz, np.array([each for each, _ in rows]), np.array([each for _, each in rows]))
+        rows = np.arange(len(self.windows)) if rows is None else rows
+        before = self.places_s * stretch - self.middles  # of the program time of each part in the record
+        begins, ends = (np.array(each) for each in zip(*self.windows, strict=True))
+        first = np.ceil((begins + before) / period).astype(int)
+        last = np.append(first[1:], np.ceil((ends[-1] + before[-1]) / period).astype(int))  # A window ends at the next
+        first, last = np.maximum(first, 0)[rows], np.minimum(last, len(self.values))[rows]
+        parts = [self.values[each:end] for each, end in zip(first, last, strict=True)]
+        parts = [each - np.mean(each) if len(each) else each for each in parts]
+        response = transforms(parts, first * period - before[rows], period, hertz) * period
+        every = self.command.period_s
+        first, last = (np.rint(each[rows] / every).astype(int) for each in (begins, ends))
+        kicks = [self.command.kicks[each:end] for each, end in zip(first, last, strict=True)]
+        return Spectra(hertz, transforms(kicks, first * every, every, hertz), response)
 
     def _clear_parts(self) -> npt.NDArray[np.intp]:
         """Parts of the program that the record shows beyond doubt."""
@@ -357,61 +396,6 @@ class _Clock:
                 )
             )
         return rows
-
-    def _refuse_other_speed(self, spectra: Spectra) -> None:
-        """Refuse a program whose moves took another time than commanded, although its rests are where they should be.
-
-        A rise and its fall pass the same frequencies the other way round: if they are slower than commanded, what
-        they say of a frequency is late in one and early in the other, and agrees only with a command as slow.
-        """
-        found = []
-        for row in range(0, len(self.windows) - 1, 2):
-            if not (self._is_recorded(row) and self._is_recorded(row + 1)):
-                continue
-            powers = np.abs(spectra.command[row : row + 2]) ** 2
-            both = np.flatnonzero(np.all(powers > _OWN * powers.max(axis=1)[:, None], axis=0))
-            if len(both) < FEWEST_LINES:
-                continue
-            lines = slice(both[0], both[-1] + 1)
-            hertz, responses = spectra.hertz[lines], spectra.response[row : row + 2, lines]
-            size = 1 << int(np.ceil(np.log2(4 * len(hertz))))
-            agree = np.zeros(len(_SLOWER))
-            stretched = zip(*(self._stretched(each, hertz) for each in (row, row + 1)), strict=True)
-            for place, (one, other) in enumerate(stretched):
-                powers = np.abs([one, other]) ** 2
-                inside = np.all(powers > _OWN * powers.max(axis=1)[:, None], axis=0)
-                crossed = responses[0] * np.conj(one * responses[1]) * other * inside
-                total = float(np.sum(np.abs(crossed)))
-                if total > 0.0:
-                    agree[place] = size * float(np.max(np.abs(np.fft.ifft(crossed, size)))) / total
-            best = int(np.argmax(agree))
-            if 0 < best < len(_SLOWER) - 1 and agree[best] > _AGREE:
-                below, most, above = agree[best - 1 : best + 2]
-                between = (below - above) / (2.0 * (below - 2.0 * most + above))
-                found.append(float(_SLOWER[best] + between * (_SLOWER[1] - _SLOWER[0])))
-        if len(found) < _FEWEST_PAIRS:
-            return
-        slower = float(np.median(found))
-        if abs(slower) > _OTHER_SPEED:
-            raise RecordError(
-                self._no_relation(
-                    f"its moves and its rests tell of clocks that differ by {100.0 * abs(slower):.2f} % (limit "
-                    f"{100.0 * _OTHER_SPEED:g} %)"
-                )
-            )
-
-    def _stretched(self, row: int, hertz: FloatArray) -> Iterator[ComplexArray]:
-        """Lines of the command of a part that takes so much longer about its middle, for each of `_SLOWER`."""
-        period, (begin, end) = self.command.period_s, self.windows[row]
-        first, last, middle = round(begin / period), round(end / period), 0.5 * sum(self.command.parts[row])
-        # As those of the part itself at frequencies so much higher, which turn slowly when seen from its middle.
-        reach = 1.0 + _SLOWER[-1]
-        fine = np.arange(hertz[0] / reach, hertz[-1] * reach, (hertz[1] - hertz[0]) / _FINER)
-        lines = transform(self.command.kicks[first:last], first * period - middle, period, fine)
-        turned = np.exp(-2j * np.pi * hertz * middle)
-        for slower in _SLOWER:
-            at = hertz * (1.0 + slower)
-            yield turned * (np.interp(at, fine, lines.real) + 1j * np.interp(at, fine, lines.imag))
 
     def _whole(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
         """Those of the parts of which the other one of their two is there as well.
@@ -434,9 +418,11 @@ class _Clock:
 
     def _is_recorded(self, row: int) -> bool:
         """Whether the record holds a part from its begin until it rang down, or the next one begins."""
-        last_s = len(self.values) * self.record.period_s * (1.0 + self.rate) - self.start_s
         begin, end = self.windows[row]
-        return begin >= -self.start_s and min(end, self.command.parts[row][1] + _RINGS_S) <= last_s
+        until = min(end, self.command.parts[row][1] + _RINGS_S)
+        place, middle, stretch = float(self.places_s[row]), float(self.middles[row]), 1.0 + self.rate
+        lasts_s = len(self.values) * self.record.period_s
+        return place + (begin - middle) / stretch >= 0.0 and place + (until - middle) / stretch <= lasts_s
 
     def _no_relation(self, found: str) -> str:
         axis = self.command.axis.upper()
@@ -446,32 +432,54 @@ class _Clock:
             f"machine file of this control? The clock of the logger may be off by {100 * _CLOCK:g} %"
         )
 
-    def _refine(self, spectra: Spectra, rows: npt.NDArray[np.intp]) -> None:
-        """The rate for which the parts agree best on one response."""
-        power = np.maximum(spectra.power, 1e-300)
-        middles = np.array([np.mean(self.windows[row]) for row in rows])
-        middle = float(middles.mean())
-        crossed = np.conj(spectra.command) * spectra.response
+    def _refine(self, rows: npt.NDArray[np.intp], furthest: float) -> None:
+        """The rate for which each part agrees best with the next one, wherever that begins, and the wait between them.
 
-        def missed(change: float) -> float:
-            turned = np.exp(-spectra.turn * change * (middles - middle)[:, None])
-            return -float(np.sum(np.abs(np.sum(crossed * turned, axis=0)) ** 2 / power))
+        A rise and the fall behind it pass a frequency at two instants: their own distance is left free, since it
+        rests on ramps and waits of the control.
+        """
+        band_hz = _LOWEST_HZ, _CLOCK_HZ
 
-        changes = np.arange(-1.5 * _COARSE_STEP, 1.5 * _COARSE_STEP, _FINE_STEP)
-        best = float(changes[int(np.argmin([missed(each) for each in changes]))])
-        found = minimize_scalar(missed, bounds=(best - _FINE_STEP, best + _FINE_STEP), method="bounded")
-        factor = 1.0 + float(found.x)
-        # Program time = (logger's time * (1 + rate) - start), stretched about the middle of the parts.
-        self.rate = (1.0 + self.rate) * factor - 1.0
-        self.start_s = self.start_s * factor + middle * (factor - 1.0)
+        def shares(rate: float) -> Spectra:
+            """With the response times the conjugate of the command, as a share of all parts' power."""
+            spectra = self._spectra(band_hz, rate, rows)
+            share = np.conj(spectra.command) * spectra.response / np.sqrt(np.maximum(spectra.power, 1e-300))
+            return replace(spectra, response=share)
+
+        def missed(rate: float) -> float:
+            """Minus the power on which neighbours agree."""
+            spectra = shares(rate)
+            both = np.conj(spectra.response[:-1]) * spectra.response[1:]
+            agreed = (both @ np.exp(spectra.turn[:, None] * _WAIT_GRID_S)).real
+            return -float(np.sum(np.max(agreed, axis=1)))
+
+        rates = self.rate + np.arange(-furthest, furthest + 1e-9, _FINE_STEP)
+        near = float(rates[int(np.argmin([missed(each) for each in rates]))])
+        bounds = near - _FINE_STEP, near + _FINE_STEP
+        self.rate = float(minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": _EXACT_RATE}).x)
+        spectra = shares(self.rate)
+        turn = spectra.turn * (rows - float(np.mean(rows)))[:, None]
+        agreed = [np.sum(np.abs(np.sum(spectra.response * np.exp(turn * each), axis=0)) ** 2) for each in _WAIT_GRID_S]
+        late = np.arange(len(self.windows)) - float(np.mean(rows))
+        self.places_s = self.places_s + _WAIT_GRID_S[int(np.argmax(agreed))] * late / (1.0 + self.rate)
 
     def _notes(self, rows: npt.NDArray[np.intp]) -> list[str]:
         """What is said of the clock, and of parts that are not used."""
-        start_s = self.start_s / (1.0 + self.rate)
+        first = int(rows[0])
+        begins_s = self.places_s[first] - self.middles[first] / (1.0 + self.rate)
+        waits = np.polyfit(rows, self.places_s[rows] * (1.0 + self.rate) - self.middles[rows], 1)[0]
         notes = [
-            f"{self.record.source}: the program begins {abs(start_s):.3f} s {'after' if start_s >= 0.0 else 'before'} "
-            f"the record; the logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
+            f"{self.record.source}: the program begins {abs(begins_s):.3f} s "
+            f"{'after' if begins_s >= 0.0 else 'before'} the record; the "
+            f"logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
         ]
+        if abs(waits) > _TOLD_WAIT_S:
+            notes.append(
+                f"{self.record.source}: each part of the program with the rest behind it takes {1e3 * abs(waits):.0f} "
+                f"ms {'longer' if waits > 0.0 else 'less'} than simulated: the control's ramps or waits are not those "
+                "of the machine file, on which the modes do not rest; or the override was not 100 %, and frequencies are "
+                "off by as much"
+            )
         missing = sorted(set(range(len(self.windows))) - set(rows.tolist()))
         if missing:
             begin = self.windows[missing[0]][0]
@@ -520,24 +528,49 @@ def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.
     return np.flatnonzero(clear | (near & (rows > ends[0]) & (rows < ends[1])))
 
 
-def _lags(spectra: Spectra) -> FloatArray:
-    """By how much the response of each part is later than the others say, s."""
-    lags = np.zeros(len(spectra.command))
-    for _ in range(_ROUNDS):
-        late = spectra.late(lags)
-        for row in range(len(lags)):
-            others = late.of(np.flatnonzero(np.arange(len(lags)) != row)).ratio()
-            crossed = late.response[row] * np.conj(others * late.command[row])
-            crossed = crossed * (np.abs(late.command[row]) ** 2 > _OWN * np.max(np.abs(late.command[row]) ** 2))
+def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
+    """By how much the response of each part is later than the others say, s.
 
-            def missed(lag: float, crossed: ComplexArray = crossed) -> float:
-                return -float(np.sum((crossed * np.exp(spectra.turn * lag)).real))
+    A rise outweighs the harmonics of the other parts in the band of its fall, and tells what is between the two; so the
+    median of that goes to all parts first. Then both are moved together, since each would hold the other where it is.
+    """
+    power = np.abs(spectra.command) ** 2
+    own = power > _OWN * np.max(power, axis=1, keepdims=True)
+    each = [np.array([part]) for part in range(len(rows))]
+    pairs = [np.flatnonzero(rows // 2 == pair) for pair in np.unique(rows // 2)]
 
-            steps = np.linspace(-_LONGEST_LAG_S, _LONGEST_LAG_S, 81)
-            best = float(steps[int(np.argmin([missed(each) for each in steps]))])
-            width = float(steps[1] - steps[0])
-            lags[row] += float(minimize_scalar(missed, bounds=(best - width, best + width), method="bounded").x)
+    def moved(lags: FloatArray, blocks: list[npt.NDArray[np.intp]], longest_s: float) -> FloatArray:
+        lags = lags.copy()
+        for block in blocks:
+            lags[block] += _lag(spectra.late(lags), block, own, longest_s)
+        return lags
+
+    lags = moved(np.zeros(len(rows)), each, _LONGEST_LAG_S)
+    between = [lags[pair[1]] - lags[pair[0]] for pair in pairs if len(pair) > 1]
+    lags = np.asarray((float(np.median(between)) if between else 0.0) * (rows - np.mean(rows)), dtype=np.float64)
+    lags = moved(lags, each, _IRREGULAR_S)
+    lags = moved(lags, pairs if len(pairs) > 1 else [], _LONGEST_LAG_S)
+    lags = moved(lags, each, _LAST_LAG_S)
     return lags - float(np.mean(lags))
+
+
+def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool_], longest_s: float) -> float:
+    """By how much the response of some parts is later than the others say, s; 0 where these do not explain it."""
+    others = spectra.of(np.setdiff1d(np.arange(len(own)), block)).ratio() * spectra.command[block]
+    expected, response = (np.where(own[block], each, 0.0) for each in (others, spectra.response[block]))
+    whole = float(np.sqrt(np.sum(np.abs(expected) ** 2) * np.sum(np.abs(response) ** 2)))
+    crossed = np.sum(response * np.conj(expected), axis=0) / max(whole, 1e-300)
+
+    def missed(lag: float) -> float:
+        """A cycle away the highest parts correlate nearly as well: the shorter lag is the likelier one."""
+        unlikely = _UNLIKELY * (lag / _LONGEST_LAG_S) ** 2
+        return unlikely - float(np.sum((crossed * np.exp(spectra.turn * lag)).real))
+
+    steps = np.arange(-longest_s, longest_s + 1e-9, _LAG_STEP_S)
+    best = float(steps[int(np.argmin([missed(each) for each in steps]))])
+    width = float(steps[1] - steps[0])
+    found = minimize_scalar(missed, bounds=(best - width, best + width), method="bounded")
+    return float(found.x) if len(block) == 1 or -found.fun > _EXPLAINED else 0.0
 
 
 def _explained(spectra: Spectra) -> FloatArray:

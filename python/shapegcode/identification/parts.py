@@ -73,10 +73,11 @@ class Spectra:
         return used & inside, coherence
 
 
-def transform(values: FloatArray, begin_s: float, period_s: float, hertz: FloatArray) -> ComplexArray:
-    """Sum of the values times exp(-i omega t), at evenly spaced frequencies."""
-    if not len(values):
-        return np.zeros(len(hertz), dtype=np.complex128)
+def transforms(parts: list[FloatArray], begins_s: FloatArray, period_s: float, hertz: FloatArray) -> ComplexArray:
+    """Of each part the sum of its values times exp(-i omega t), at evenly spaced frequencies."""
+    values = np.zeros((len(parts), max(1, *(len(each) for each in parts))))
+    for row, part in zip(values, parts, strict=True):
+        row[: len(part)] = part
     turn = -2j * np.pi * period_s
-    lines = czt(values, len(hertz), np.exp(turn * (hertz[1] - hertz[0])), np.exp(-turn * hertz[0]))
-    return np.asarray(lines * np.exp(-2j * np.pi * hertz * begin_s), dtype=np.complex128)
+    lines = czt(values, len(hertz), np.exp(turn * (hertz[1] - hertz[0])), np.exp(-turn * hertz[0]), axis=-1)
+    return np.asarray(lines * np.exp(-2j * np.pi * hertz * begins_s[:, None]), dtype=np.complex128)

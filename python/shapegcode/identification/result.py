@@ -347,6 +347,9 @@ class Identification(Result):
             return "tap again, longer or more often, for what is not supported (shapegcode identify --tap-plan)"
         if self.machine_file is not None:
             return f"shapegcode shaper -m {self.machine_file.path}"
+        if self.sweep is not None and self.sweep.command:
+            beside = f"--sweep {self.sweep.command} -m mine.toml --update mine.toml"
+            return f"shapegcode identify {' '.join(self.files)} {beside}"
         return f"shapegcode identify {' '.join(self.files)} --axis {self.axis or 'x'} --update mine.toml"
 
     def __repr__(self) -> str:

@@ -267,7 +267,8 @@ class _Planner:
     def plan(self, low: float, high: float) -> tuple[list[_Stroke], str]:
         """Strokes from the lowest frequency to the highest that can be reached, and what limits it."""
         most = 0.5 / (_SPARE * self._block_s)
-        limit = f"a block lasts {1e3 * self._block_s:g} ms or more, so that strokes reach {most:.4g} Hz"
+        spare = f"with {100.0 * (_SPARE - 1.0):.0f} % to spare"
+        limit = f"a block lasts {1e3 * self._block_s:g} ms or more, {spare} strokes reach {most:.4g} Hz"
         if high <= most:
             limit = f"strokes could reach {most:.4g} Hz, with blocks of {1e3 * self._block_s:g} ms"
         top = min(high, most)
@@ -391,7 +392,7 @@ def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) 
     reach = max(stroke.length_mm for band in bands for stroke in band)
     plain = "".join(sign for sign in machine.name.upper() if sign.isalnum() or sign in " -.")[:30]
     lines = [
-        "%", f"O{number:04d}(SWEEP {axis.upper()})", f"(SHAPEGCODE SWEEP FOR {plain})",
+        "%", f"O{number:04d}(SWEEP {axis.upper()})", f"(SWEEP BY SHAPEGCODE FOR {plain})",
         f"(SHAKES {axis.upper()}: 0 TO +{reach:.{decimals}f} MM FROM THE START POINT)",
         "(AIR ONLY: NO SPINDLE, NO OTHER AXIS MOVES, ENDS WHERE IT BEGAN)",
         "(START THE LOGGER FIRST, STOP IT LAST. OVERRIDE 100 PERCENT)",

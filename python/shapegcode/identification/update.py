@@ -428,8 +428,8 @@ class ModeTables:
         values = self._values(mode) | {"participation": (share, f"{meaning}, not measured")}
         self.expected.append({key: value for key, (value, _) in values.items()})
         self.notes.append(
-            f"{toml(values['frequency_hz'][0])} Hz is new: participation {share:g} ({meaning}), as a tap does not tell "
-            "how much of the axis' motion goes into it"
+            f"{toml(values['frequency_hz'][0])} Hz is new: participation {share:g} ({meaning}); how much of the "
+            "axis' motion goes into it was not measured"
         )
         lines = ["[[modes]]", *(_line(key, value, remark) for key, (value, remark) in values.items())]
         (_, tables), *_ = tomlkit.parse("".join(line + self.newline for line in lines)).body

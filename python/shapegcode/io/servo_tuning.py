@@ -44,6 +44,8 @@ def read_servo_tuning(path: Path, options: ReadOptions) -> list[FrequencyRespons
     """
     root = _root(path)
     axis, warnings = _axis(path, root)
+    if options.axis and axis and options.axis != axis:
+        raise RecordError(f"{path}: holds the {axis.upper()} axis, asked for is {options.axis.upper()}")
     controller = next(root.iter("DynamicModelPositionController840DSL"), None)
     plant = _lines(path, controller, "m_pPlant")
     if plant is None:

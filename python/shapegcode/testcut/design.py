@@ -433,7 +433,7 @@ class _Writer:
         edge = "REAR EDGE" if self.side < 0.0 else "FRONT EDGE"
         rate = math.ceil(_SAMPLES_PER_TOOTH * tool.flutes * cut.spindle_rev_per_min / _PER_MINUTE / 10.0) * 10
         yield from _PURPOSES[cut.kind]
-        yield f"SHAPEGCODE TESTCUT FOR {_plain(cut.machine)}"
+        yield f"TESTCUT BY SHAPEGCODE FOR {_plain(cut.machine)}"
         yield f"TOOL IN SPINDLE: D{tool.diameter_mm:g} MM, {tool.flutes} FLUTES,"
         yield f"HELIX {tool.helix_deg:g} DEG, FLUTES OVER {cut.axial_depth_mm:g} MM LONG"
         yield f"STOCK: X {self.design.stock_mm:g} MM LONG, {edge} FREE,"
