@@ -123,6 +123,8 @@ def identify(
     if sweep is not None and (machine is None or response is not None):
         raise ArgumentError("a sweep needs the machine whose controller ran it, and files or records")
     options = options or ReadOptions()
+    if sweep is not None and (stops or start_s is not None or options.ignore_force):
+        raise ArgumentError("a sweep beside a program has neither a start of a decay nor stops: leave them out")
     found = _identified(
         sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is True, strict=strict
     )
