@@ -23,9 +23,9 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.across import with_moves
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
-from shapegcode.identification.parts import Spectra, transforms
+from shapegcode.identification.parts import REST_S, Spectra, moving_parts, transforms
 from shapegcode.identification.result import Identification, Sweep
-from shapegcode.identification.sweep_program import REST_S, commanded, moving_parts
+from shapegcode.identification.sweep_program import commanded
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_records
 from shapegcode.io.record import FloatArray, ReadOptions, Record

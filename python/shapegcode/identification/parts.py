@@ -13,6 +13,7 @@ from scipy.signal import czt
 from shapegcode.io.frequency_response import ComplexArray
 from shapegcode.io.record import FloatArray
 
+REST_S = 0.5  # of a command, between two parts
 _EXCITED = 0.2  # of the median of the command's spectrum, in amplitude: lines below are not used
 _BESIDE = 0.3  # of the lines around, in power: weaker lines show noise
 _SMOOTH_LINES = 31
@@ -81,3 +82,15 @@ def transforms(parts: list[FloatArray], begins_s: FloatArray, period_s: float, h
     turn = -2j * np.pi * period_s
     lines = czt(values, len(hertz), np.exp(turn * (hertz[1] - hertz[0])), np.exp(-turn * hertz[0]), axis=-1)
     return np.asarray(lines * np.exp(-2j * np.pi * hertz * begins_s[:, None]), dtype=np.complex128)
+
+
+def moving_parts(x_mm: FloatArray, period_s: float) -> list[tuple[int, int]]:
+    """First sample and end of each part of a motion between rests of half a second or more."""
+    rows = np.flatnonzero(np.diff(x_mm))
+    if not len(rows):
+        return []
+    cuts = np.flatnonzero(np.diff(rows) * period_s > REST_S)
+    return [
+        (int(rows[first]), int(rows[last]) + 2)
+        for first, last in zip([0, *(cuts + 1)], [*cuts, len(rows) - 1], strict=True)
+    ]

@@ -12,6 +12,7 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError
+from shapegcode.identification.parts import moving_parts
 from shapegcode.io.atomic import write_text
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
@@ -28,7 +29,6 @@ _DESIGNED_PER_OCTAVE = 3.0  # frequencies whose strokes are planned; between the
 _FEEDS = 9
 _TRIED = 8, 24  # strokes of a trial, and of a longer one
 _LONGEST = 1 << 20
-REST_S = 0.5
 _ROUNDS = 6
 _OF_STEP = 0.4  # of the corner speed difference, which a reversal has twice: the control's may be 20 % smaller
 _LEAST_AT_ONCE = 100.0  # mm/min; slower strokes excite too little: those with ramps are taken
@@ -431,15 +431,3 @@ def _swept(bands: list[list[_Stroke]], x_mm: FloatArray, period_s: float) -> tup
             )
         )  # fmt: skip
     return tuple(found)
-
-
-def moving_parts(x_mm: FloatArray, period_s: float) -> list[tuple[int, int]]:
-    """First sample and end of each part of a motion between rests of half a second or more."""
-    rows = np.flatnonzero(np.diff(x_mm))
-    if not len(rows):
-        return []
-    cuts = np.flatnonzero(np.diff(rows) * period_s > REST_S)
-    return [
-        (int(rows[first]), int(rows[last]) + 2)
-        for first, last in zip([0, *(cuts + 1)], [*cuts, len(rows) - 1], strict=True)
-    ]
