@@ -432,7 +432,10 @@ def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], soug
         mode = mode_estimates(values, spread)
         dull = _excitation_refusal(mode.frequency_hz.value, measured)
         refusal = dull or _refusal(window, index, mode, measured, pool, sought)
-        found.append(replace(mode, refusal=refusal, left_out=bool(dull)))
+        # Where a sweep begins to excite, or parts join, a line alone may stand out: no machine vibrates so.
+        width_hz = 2.0 * mode.damping_ratio.value * mode.frequency_hz.value
+        spike = not sought.phase_known and width_hz < _MIN_WIDTH * measured.resolution_hz
+        found.append(replace(mode, refusal=refusal, left_out=bool(dull) or (spike and bool(refusal))))
     return found
 
 

@@ -66,7 +66,7 @@ class IdentifiedMode:
         stiffness_n_per_m: equivalent stiffness; None for a free decay.
         refusal: why the data do not support this mode; empty: they do.
         left_out: refused, but no fault of the test: beyond what the hits excite, beyond the number asked for, or with a
-            peak below 2 % of the highest one.
+            peak below 2 % of the highest one; in a sweep or capture also narrower than the lines are apart.
         moves: how far it moves X, Y and Z, as shares of its motion along the axis along which it was found; null for an
             axis that was not measured. Only where other axes were measured too.
     """
