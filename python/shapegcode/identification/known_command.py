@@ -24,7 +24,7 @@ from shapegcode.identification.across import with_moves
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
 from shapegcode.identification.parts import REST_S, Spectra, moving_parts, transforms
-from shapegcode.identification.result import Identification, Sweep
+from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, Sweep
 from shapegcode.identification.sweep_program import commanded
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_records
@@ -39,6 +39,7 @@ _LONGEST_WAIT_S, _WAIT_STEP_S = 0.21, 0.015  # that a part of the program lasts 
 _WAIT_GRID_S = np.arange(-0.025, 0.025, 2.5e-4)  # about the one that is found below 40 Hz
 _TOLD_WAIT_S = 0.005
 _NEAR_S = 0.03
+_CLOCK_KNOWN = 3e-4  # of a frequency, 95 %
 _CLOCK_HZ = 150.0  # the clock is refined by the lines below
 _COARSE_HZ = 40.0  # start and clock are first looked for in what lies below
 _AFTER_S = 3.0  # of the record behind the last part
@@ -146,6 +147,7 @@ def find_modes_of_command(
     if across:
         others = [_between(one, max(ends[0]), min(ends[1])) for each in aligned for one in each.others]
         found = with_moves(found, others)
+    found = replace(found, modes=tuple(_by_clock(each) for each in found.modes))
     rate = min(1.0 / each.record.period_s for each in aligned)
     looked = f"looked at from {lines[0]:.0f} to {lines[-1]:.0f} Hz; {rate:.0f} samples per second reach "
     looked += f"{rate / _OVER_HALF:.0f} Hz"
@@ -160,6 +162,13 @@ def find_modes_of_command(
             np.abs(responses[0].response), np.abs(found.fitted_lines[0]), command=command.source,
         ),
     )  # fmt: skip
+
+
+def _by_clock(mode: IdentifiedMode) -> IdentifiedMode:
+    """The mode with an interval of its frequency that holds how well the logger's clock is found."""
+    known, own = mode.frequency_hz, _CLOCK_KNOWN * mode.frequency_hz.value
+    below, above = (float(np.hypot(each, own)) for each in (known.value - known.low, known.high - known.value))
+    return replace(mode, frequency_hz=Estimate(known.value, known.value - below, known.value + above))
 
 
 def _name(source: str | Path | Record) -> str:
