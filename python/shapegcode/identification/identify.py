@@ -22,6 +22,7 @@ from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf
 from shapegcode.identification.model_search import (
     ACCEPTED_PERCENT,
     MAX_MODES,
+    OPPOSED,
     Doubts,
     Fit,
     Search,
@@ -126,7 +127,7 @@ def identify(
     found = _identified(
         sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is True, strict=strict
     )
-    if across is False:
+    if across is False or (not found.modes and found.reason):
         return found
     if sweep is not None:
         if across is not True:
@@ -173,12 +174,31 @@ def _identified(
             if stops:
                 return _modes_of_stops(_stops_in(records, None if band_hz is None else band_hz[0]), names, sought)
             ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
-            return find_modes(ready, names, sought)
+            return _turned_if_opposed(ready, find_modes(ready, names, sought), sought)
     except (ArgumentError, NumericError) as error:
         if strict:
             raise
         told: dict[str, Any] = {} if ready is None else {"warnings": ready.warnings, "notes": ready.notes}
         return Identification(files=names, prepared=ready, reason=str(error), **told)
+
+
+def _turned_if_opposed(ready: Prepared, found: Identification, sought: Sought) -> Identification:
+    """What was found; with the sign of the responses turned where all that stands out goes against the push.
+
+    The first moment of the response tells the sign of one mode (`checks`), not that of several.
+    """
+    if found.modes or not any(mode.refusal == OPPOSED for mode in found.refused):
+        return found
+    text = (
+        f"{ready.records[0].source}: every mode goes against the push of the hammer: the sign is turned, as for a "
+        "sensor at the same point that points the other way"
+    )
+    usable = tuple(
+        replace(use, record=replace(use.record, response=-use.record.response), turned=not use.turned)
+        for use in ready.usable
+    )
+    again = find_modes(replace(ready, usable=usable, warnings=(*ready.warnings, text)), found.files, sought)
+    return again if again.modes else found
 
 
 def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record], list[FrequencyResponse]]:

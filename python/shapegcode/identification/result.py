@@ -204,6 +204,7 @@ class Identification(Result):
         chart: poles of the stabilisation chart.
         sweep: spectrum of a sweep without force; None: there is none.
         responses: frequency responses without time record, as far as they were fitted.
+        turned: whether their sign was turned.
         fitted_lines: the model's lines of each, (n,) complex.
         fitted_records: the records as they were fitted, thinned out to what the band needs.
         fitted: response of the model per record, (n,), at the samples that were fitted.
@@ -233,6 +234,7 @@ class Identification(Result):
     chart: tuple[ChartPole, ...] = field(default=(), metadata=hidden())
     sweep: Sweep | None = field(default=None, metadata=hidden())
     responses: tuple[FrequencyResponse, ...] = field(default=(), metadata=hidden())
+    turned: bool = field(default=False, metadata=hidden())
     fitted_lines: tuple[ComplexArray, ...] = field(default=(), metadata=hidden())
     fitted_records: tuple[Record, ...] = field(default=(), metadata=hidden())
     fitted: tuple[FloatArray, ...] = field(default=(), metadata=hidden())
@@ -419,8 +421,8 @@ _MODE_COLUMNS = (
 def _move(letter: str) -> Any:
     def cell(mode: IdentifiedMode) -> str:
         estimate: Estimate | None = getattr(mode.moves, letter)
-        own = estimate is not None and estimate.low == estimate.high
-        return "1" if own else estimate_cell(estimate, 1.0)
+        exact = estimate is not None and estimate.low == estimate.high
+        return f"{estimate.value:g}" if estimate is not None and exact else estimate_cell(estimate, 1.0)
 
     return cell
 
