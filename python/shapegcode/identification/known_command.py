@@ -477,8 +477,8 @@ class _Clock:
             notes.append(
                 f"{self.record.source}: each part of the program with the rest behind it takes {1e3 * abs(waits):.0f} "
                 f"ms {'longer' if waits > 0.0 else 'less'} than simulated: the control's ramps or waits are not those "
-                "of the machine file, on which the modes do not rest; or the override was not 100 %, and frequencies are "
-                "off by as much"
+                "of the machine file, on which the modes do not rest; or the override was not 100 %, and frequencies "
+                "are off by as much"
             )
         missing = sorted(set(range(len(self.windows))) - set(rows.tolist()))
         if missing:
