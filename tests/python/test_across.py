@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -295,6 +296,17 @@ def test_why_there_is_no_mode_comes_before_what_is_missing_across(files: list[Pa
     done = run(tmp_path, "identify", str(files[0]), "--axis", "y", "--across", "--stops")
     assert done.returncode == 2
     assert "holds a force" in done.stdout
+
+
+def test_the_next_step_looks_across_too(files: list[Path], tmp_path: Path) -> None:
+    done = run(tmp_path, "identify", str(files[0]), "--axis", "y", "--across")
+    assert f"next: shapegcode identify {files[0]} --axis y --across --update mine.toml" in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize(("options", "word"), [({"stops": True}, "--stops"), ({"start_s": 0.1}, "--start")])
+def test_a_frequency_response_has_no_stops(options: dict[str, Any], word: str) -> None:
+    with pytest.raises(sg.ArgumentError, match=f"{word} changes nothing"):
+        sg.identify([responses(MODES)["y"]], **options)
 
 
 def test_the_phase_of_next_to_nothing_is_not_told() -> None:
