@@ -169,16 +169,15 @@ def _identified(
                 return find_modes_of_captures(captures, options, sought)
             swept = _swept(sources, options)
             if swept is not None:
+                _refuse_of_decays(f"{swept.source}: a sweep without force", start_s, stops=stops, across=across)
                 return find_swept_modes(swept, names, sought)
             records, responses = _measured(sources, options)
             if responses:
-                if stops or start_s is not None:
-                    raise ArgumentError(
-                        f"{responses[0].source}: a frequency response, in which {'--stops' if stops else '--start'} "
-                        "changes nothing: it goes with a record over time"
-                    )
+                _refuse_of_decays(f"{responses[0].source}: a frequency response", start_s, stops=stops)
                 return find_frf_modes(responses, names, sought)
             if stops:
+                if start_s is not None:
+                    raise ArgumentError(f"start at {start_s:g} s: goes with one decay, --stops finds where each begins")
                 return _modes_of_stops(_stops_in(records, None if band_hz is None else band_hz[0]), names, sought)
             ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
             return _turned_if_opposed(ready, find_modes(ready, names, sought), sought)
@@ -210,6 +209,13 @@ def _refuse_of_sensors(
                 f"{capture}: a capture of command and encoder, in which --{option} changes nothing: it goes with the "
                 "record of a sensor (--response-column names one in a CSV)"
             )
+
+
+def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: bool = False) -> None:
+    """Refuse what is said of a decay or tap where it would silently change nothing."""
+    for option, is_said in (("--stops", stops), ("--start", start_s is not None), ("--across", across)):
+        if is_said:
+            raise ArgumentError(f"{what}, in which {option} changes nothing: it goes with the record of a tap or decay")
 
 
 def _turned_if_opposed(ready: Prepared, found: Identification, sought: Sought) -> Identification:
