@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -216,7 +217,103 @@ def test_what_cannot_tell_is_refused(files: list[Path], tmp_path: Path, options:
     alone = write(tmp_path / "alone.csv", along(hit(MODES, 4), "y"))
     done = run(tmp_path, "identify", str(files[0]), *(each.format(alone=alone) for each in options))
     assert done.returncode == 2
-    assert any(word in done.stderr for word in words.split("|")), done.stderr
+    said = done.stdout + done.stderr
+    assert any(word in said for word in words.split("|")), said
+
+
+def pushed_back(records: Sequence[sg.Record]) -> list[sg.Record]:
+    """The hammer's force has no direction: pushed against the arrow, everything moves the other way."""
+    return [replace(record, response=-record.response) for record in records]
+
+
+@pytest.mark.parametrize("count", [1, 3])  # the first moment tells the sign of one mode, the fit that of several
+def test_a_hit_against_the_arrow_has_the_same_signs(count: int) -> None:
+    records = [record for seed in (1, 2, 3) for record in pushed_back(hit(MODES[:count], seed))]
+    found = sg.identify(along(records, "y"), across=records)
+    check(found, MODES[:count])
+    assert any("sign is turned" in warning for warning in found.warnings)
+
+
+def test_frequency_responses_against_the_arrow() -> None:
+    lines = {letter: replace(each, response=-each.response) for letter, each in responses(MODES).items()}
+    check(sg.identify([lines["y"]], across=[lines["x"], lines["z"]]), MODES)
+
+
+def in_one_file(hits: Sequence[Sequence[sg.Record]], source: str) -> list[sg.Record]:
+    """Hits one after the other."""
+    joined = []
+    for parts in zip(*hits, strict=True):
+        forces = [part.force_n for part in parts if part.force_n is not None]
+        values = np.concatenate([part.response for part in parts])
+        joined.append(replace(parts[0], source=source, response=values, force_n=np.concatenate(forces)))
+    return joined
+
+
+def bounced(records: Sequence[sg.Record], after: int = 500) -> list[sg.Record]:
+    """With a second pulse of 60 %."""
+
+    def twice(values: Vector) -> Vector:
+        return np.asarray(values + 0.6 * np.concatenate((np.zeros(after), values[:-after])))
+
+    forces = [twice(record.force_n) for record in records if record.force_n is not None]
+    return [
+        replace(record, response=twice(record.response), force_n=force)
+        for record, force in zip(records, forces, strict=True)
+    ]
+
+
+def test_several_hits_in_one_file_of_which_one_is_refused(tmp_path: Path) -> None:
+    hits = [hit(MODES, 11), bounced(hit(MODES, 12)), hit(MODES, 13)]
+    found = sg.identify(write(tmp_path / "three.csv", in_one_file(hits, "three")), READ, across=True)
+    check(found, MODES)
+    assert [use.used for use in found.records] == [True, True, False]
+
+
+def test_the_other_axes_of_a_refused_hit_do_not_count(files: list[Path], tmp_path: Path) -> None:
+    twice = write(tmp_path / "twice.csv", bounced(hit(MODES, 2)))
+    found = sg.identify([files[0], twice, files[2]], READ, across=True)
+    check(found, MODES, within=0.005)
+    assert [use.used for use in found.records] == [True, True, False]
+
+
+def test_other_hits_need_their_force() -> None:
+    records = hit(MODES, 1)
+    others = [replace(record, source="stop", force_n=None) for record in along(hit(MODES, 2), "z")]
+    with pytest.raises(RecordError, match=r"stop: no force, but tap1 has one"):
+        sg.identify(along(records, "y"), across=others)
+
+
+@pytest.mark.parametrize(("share", "words"), [(0.0, "is the sensor connected"), (0.3, "overload")])
+def test_a_dead_or_clipped_channel_is_refused(share: float, words: str) -> None:
+    records = hit(MODES, 1)
+    limit = share * float(np.max(np.abs(records[2].response)))
+    records[2] = replace(records[2], response=np.clip(records[2].response, -limit, limit))
+    with pytest.raises(RecordError, match=words):
+        sg.identify(along(records, "y"), across=records)
+
+
+def test_why_there_is_no_mode_comes_before_what_is_missing_across(files: list[Path], tmp_path: Path) -> None:
+    done = run(tmp_path, "identify", str(files[0]), "--axis", "y", "--across", "--stops")
+    assert done.returncode == 2
+    assert "holds a force" in done.stdout
+
+
+def test_the_next_step_looks_across_too(files: list[Path], tmp_path: Path) -> None:
+    done = run(tmp_path, "identify", str(files[0]), "--axis", "y", "--across")
+    assert f"next: shapegcode identify {files[0]} --axis y --across --update mine.toml" in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize(("options", "word"), [({"stops": True}, "--stops"), ({"start_s": 0.1}, "--start")])
+def test_a_frequency_response_has_no_stops(options: dict[str, Any], word: str) -> None:
+    with pytest.raises(sg.ArgumentError, match=f"{word} changes nothing"):
+        sg.identify([responses(MODES)["y"]], **options)
+
+
+def test_the_phase_of_next_to_nothing_is_not_told() -> None:
+    lines = responses(MODES)
+    lines["x"] = replace(lines["x"], response=0.004j * lines["y"].response)
+    found = sg.identify([lines["y"]], across=[lines["x"], lines["z"]])
+    assert not any("behind or ahead" in note for note in found.notes)
 
 
 def test_another_quantity_is_refused() -> None:

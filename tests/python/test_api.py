@@ -51,7 +51,8 @@ def test_signatures_of_the_core_are_true() -> None:
         })  # fmt: skip
         assert function(**bound.arguments) == function(*bound.arguments.values())
         assert "Returns:" in function.__doc__
-    made = "(frequency_hz: 'float', damping_ratio: 'float' = 0.0, participation: 'float' = 1.0)"
+    made = "(frequency_hz: 'float', damping_ratio: 'float' = 0.0, participation: 'float' = 1.0, excited_by: "
+    made += "'Sequence[float]' = [0.0, 0.0, 0.0])"
     assert str(inspect.signature(sg.Mode)) == made
     assert list(inspect.signature(sg.Shaper).parameters) == ["times_s", "amplitudes"]
     # Defaults that are no literals, and what must be named.

@@ -109,3 +109,43 @@ def test_other_files_are_no_captures(tmp_path: Path) -> None:
     alone = tmp_path / "command.csv"
     alone.write_text("time_ms,X,Y_act\n" + "".join(f"{k},{k},{k}\n" for k in range(200)))
     assert not is_capture(alone)
+
+
+def test_the_next_step_takes_the_same_modes(command: KnownCommand, actual_m: FloatArray, tmp_path: Path) -> None:
+    write(tmp_path / "trace.csv", command.position, actual_m)
+    done = run(tmp_path, "identify", "trace.csv", "--axis", "x", "--frequencies", "10:30")
+    assert done.returncode == 0, done.stderr
+    assert "next: shapegcode identify trace.csv --axis x --frequencies 10:30 --update mine.toml" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "options",
+    [["--stops"], ["--across"], ["--decay"], ["--start", "1s"], ["--quantity", "velocity"], ["--sample-period", "1ms"]],
+)
+def test_what_goes_with_a_sensor_is_refused(tmp_path: Path, options: list[str]) -> None:
+    moving = np.cumsum(np.random.default_rng(1).standard_normal(2000)) * 1e-3
+    write(tmp_path / "trace.csv", moving, moving)
+    done = run(tmp_path, "identify", "trace.csv", "--axis", "x", *options)
+    assert done.returncode == 2
+    named = options[0].replace("--decay", "--ignore-force")
+    assert f"a capture of command and encoder, in which {named} changes nothing" in done.stdout
+
+
+def test_a_column_of_a_sensor_makes_it_a_record(tmp_path: Path) -> None:
+    """A trace with an accelerometer beside the positions: the decay of 31 Hz, 2 % behind a stop."""
+    times, omega, zeta = 5e-4 * np.arange(2000), 2.0 * np.pi * 31.0, 0.02
+    sensor = np.exp(-zeta * omega * times) * np.cos(omega * np.sqrt(1.0 - zeta**2) * times)
+    sensor += 1e-3 * np.random.default_rng(2).standard_normal(len(times))
+    rows = np.column_stack((times, 0.0 * times, 0.0 * times, sensor))
+    file = tmp_path / "trace.csv"
+    np.savetxt(file, rows, "%.8g", ",", header="time [s],X [mm],X_act [mm],accX [m/s^2]", comments="")
+    found = sg.identify(file, sg.ReadOptions(axis="x", response_columns=("accX",)))
+    assert found.modes[0].frequency_hz.value == pytest.approx(31.0, rel=0.002)
+    assert found.modes[0].damping_ratio.value == pytest.approx(zeta, rel=0.05)
+
+
+def test_a_band_beyond_the_sampling_is_told_with_its_limits(tmp_path: Path) -> None:
+    moving = np.cumsum(np.random.default_rng(1).standard_normal(20_000)) * 1e-3
+    file = write(tmp_path / "trace.csv", moving, moving)
+    with pytest.raises(sg.RecordError, match=r"tells of 4 to 400 Hz, asked for are 500 to 900 Hz"):
+        sg.identify(file, sg.ReadOptions(axis="x"), band_hz=(500.0, 900.0))

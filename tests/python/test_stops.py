@@ -53,6 +53,17 @@ def test_a_force_has_no_stops() -> None:
         sg.identify([tap], stops=True)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_dead_sensor_is_told() -> None:
+    with pytest.raises(sg.RecordError, match="every sample is 0: no vibration; is the sensor connected"):
+        sg.identify([sg.Record("run", PERIOD_S, np.zeros(20_000))], stops=True)
+
+
+def test_a_start_goes_with_one_decay() -> None:
+    with pytest.raises(sg.ArgumentError, match=r"start at 1 s: goes with one decay"):
+        sg.identify([record(0)], stops=True, start_s=1.0)
+
+
 def test_by_command(tmp_path: Path) -> None:
     values = record(0).response
     rows = np.column_stack((PERIOD_S * np.arange(len(values)), values))

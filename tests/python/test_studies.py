@@ -170,6 +170,25 @@ def test_a_text_is_made_for_what_the_converter_knows_and_for_nothing_else(
     assert found.conversions == texts
 
 
+def test_where_a_mode_moves_is_simulated_and_not_converted_for() -> None:
+    """Z stands still: what is left there is in proportion to the share of Z, and to that of X, which alone moves."""
+    keys = {
+        "axes.y.modes.1.frequency_hz": 46.0, "axes.y.modes.1.excited_by": {"y": 1.0, "x": 0.5},
+        "axes.y.modes.1.moves": {"y": 1.0, "z": 0.5}, "axes.z.rigid": True, "shaping.contour": "command", **ANY_PRICE,
+    }  # fmt: skip
+    shares = [0.1, 0.2, 0.4]
+    for key in ("axes.y.modes.1.moves.z", "axes.y.modes.1.excited_by.x"):
+        vary = {key: shares, "axes.y.modes.1.frequency_hz": [43.0]}
+        program = sg.Program.from_text(SHORT, VX500.with_values(keys))
+        found = sg.study(
+            program, VX500.with_values(keys), vary, sampling="grid", shape_all=True, measure=["residual_z_um"]
+        )
+        left = dict(zip(found.draws[key], found.draws["residual_z_um"], strict=True))
+        assert found.conversions == 1
+        assert left[0.1] > 0.01
+        assert [left[share] / left[0.1] for share in shares] == pytest.approx([1.0, 2.0, 4.0], rel=1e-3)
+
+
 def test_a_known_value_is_converted_for() -> None:
     """The same as `convert` says of the machine with that value."""
     hz = 52.0

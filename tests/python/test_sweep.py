@@ -109,3 +109,11 @@ def test_a_decay_that_klipper_recorded(tmp_path: Path) -> None:
     found = identify(path, ReadOptions(axis="x", ignore_force=True))
     assert found.decay
     assert found.modes[0].frequency_hz.value == pytest.approx(np.hypot(300.0, 12.0) / (2.0 * np.pi), rel=1e-3)
+
+
+@pytest.mark.parametrize("option", [["--across"], ["--stops"], ["--start", "1s"]])
+def test_what_goes_with_a_decay_is_refused(tmp_path: Path, option: list[str]) -> None:
+    save(tmp_path / "raw_data_y_1.csv", *shaken([(1.0, 48.0, 0.06)]), axis=1)
+    done = run(tmp_path, "identify", "raw_data_y_1.csv", "--axis", "y", *option)
+    assert (done.returncode, done.stderr) == (2, "")
+    assert f"a sweep without force, in which {option[0]} changes nothing" in done.stdout

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -144,6 +144,7 @@ def _identify(args: argparse.Namespace) -> int:
             args.files, ReadOptions(**said), max_modes=args.max_modes, modes=args.modes, band_hz=args.frequencies,
             start_s=args.start, stops=args.stops, across=args.across or args.across is not None, strict=False, **shaken,
         )  # fmt: skip
+    found = replace(found, options=_said_again(args))
     notes, wrote = list(found.notes), []
     if args.update is not None and found.modes and found.doubt and not args.force:
         notes.append(f"{args.update}: not changed: {found.doubt} (--force writes all the same)")
@@ -155,6 +156,18 @@ def _identify(args: argparse.Namespace) -> int:
         found, wrote = update.noted_in(found, args.update), [args.update]
         notes += [f"{args.update}: {note}" for note in update.notes]
     return runner.finish(found, args, notes=notes, wrote=wrote)
+
+
+def _said_again(args: argparse.Namespace) -> tuple[str, ...]:
+    """The options on which it depends which modes are found."""
+    said = ["--decay"] * args.ignore_force + ["--stops"] * args.stops
+    if args.frequencies is not None:
+        said.append("--frequencies {:g}:{:g}".format(*args.frequencies))
+    if args.modes is not None:
+        said.append(f"--modes {args.modes}")
+    if args.across is not None:
+        said += ["--across", *args.across]
+    return tuple(said)
 
 
 def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> None:

@@ -262,10 +262,11 @@ def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[
 
 
 def _modes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, name: str) -> Iterator[tuple[str, int]]:
-    """Letter and number of every mode of which a value is unmeasured."""
-    for letter in moving:
-        for number in range(1, len(getattr(machine.axes, letter).modes) + 1):
-            if f"axes.{letter}.modes.{number}.{name}" in unmeasured:
+    """Letter and number of every mode of which a value is unmeasured and that a moving axis excites."""
+    for axis, (letter, table) in enumerate(zip("xyz", machine.axes.as_tuple(), strict=True)):
+        for number, mode in enumerate(table.modes, start=1):
+            excited = any(share and by in moving for share, by in zip(mode.excitation(axis), "xyz", strict=True))
+            if excited and f"axes.{letter}.modes.{number}.{name}" in unmeasured:
                 yield letter, number
 
 

@@ -16,14 +16,14 @@ import numpy as np
 from scipy import stats
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.checks import Prepared, prepare
+from shapegcode.identification.checks import Prepared, is_clipped, prepare
 from shapegcode.identification.frf_model import mode_columns
 from shapegcode.identification.frf_search import cut
 from shapegcode.identification.lines import measured_lines
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_measurement
-from shapegcode.io.record import FloatArray, ReadOptions, Record
+from shapegcode.io.record import UNITS, FloatArray, ReadOptions, Record
 from shapegcode.results.result import Xyz
 
 Measured = Record | FrequencyResponse
@@ -32,6 +32,7 @@ _WIDTHS, _NEAREST = 8.0, 0.08  # half-power widths around a mode, and share of i
 _LOCAL_WIDTHS, _LOCAL_LINES = 2.0, 4  # of what is left around a mode
 _HITS_TO_SCATTER = 5  # fewer say little of how hits differ
 _NO_VIBRATION = 0.3  # damping ratio of what is background
+LEAST_MOVE = 0.01  # of the motion along the axis itself: less is not written, and its phase not told
 _OUT_OF_PHASE = 1.0  # tan of the phase beyond which two directions do not move together
 
 
@@ -56,6 +57,10 @@ class _Amplitudes:
 
     value: ComplexArray  # (m,)
     variance: FloatArray  # (m,) of real and imaginary part together
+
+    def turned(self, is_turned: bool) -> _Amplitudes:
+        """With the sign that the sensor gave: those of the other axes have it."""
+        return _Amplitudes(-self.value, self.variance) if is_turned else self
 
 
 def measured_across(
@@ -89,6 +94,7 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
     """
     if found.axis is None:
         raise RecordError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
+    others = [each for each in others if not _is_of_refused(each, found)]
     by_axis = {letter: [each for each in others if each.axis == letter] for letter in _AXES if letter != found.axis}
     if not any(by_axis.values()):
         raise RecordError(
@@ -108,7 +114,8 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
         moves: dict[str, Estimate | None] = dict.fromkeys(_AXES) | {found.axis: Estimate(1.0, 1.0, 1.0)}
         for letter, parts in along.items():
             ratio, moves[letter] = _ratio(own, parts, index)
-            if abs(ratio.imag) > _OUT_OF_PHASE * abs(ratio.real) and _is_told(moves[letter], abs(ratio)):
+            out_of_phase = abs(ratio.imag) > max(_OUT_OF_PHASE * abs(ratio.real), LEAST_MOVE)
+            if out_of_phase and _is_told(moves[letter], abs(ratio)):
                 notes.append(
                     f"{mode.frequency_hz.value:.4g} Hz: {letter.upper()} moves {abs(ratio):.3g} times as far, "
                     f"{abs(np.degrees(np.angle(ratio))):.0f}° behind or ahead: only the part in phase is taken"
@@ -151,13 +158,14 @@ def _amplitudes(
                 "axes"
             )
     if ready is None:
-        own = [_in_lines(each, poles) for each in found.responses]
+        own = [_in_lines(each, poles).turned(found.turned) for each in found.responses]
         along = {
             letter: [_in_lines(each, poles) for each in parts if isinstance(each, FrequencyResponse)]
             for letter, parts in by_axis.items()
         }
     else:
-        own = [_in_time(part, poles) for part in _free_parts(ready, ready.records)]
+        parts_of_own = zip(_free_parts(ready, ready.records), ready.usable, strict=True)
+        own = [_in_time(part, poles).turned(use.turned) for part, use in parts_of_own]
         along = {}
         for letter, parts in by_axis.items():
             records = [each for each in parts if isinstance(each, Record)]
@@ -184,6 +192,13 @@ def _parts_of(ready: Prepared, records: Sequence[Record], files: Sequence[str]) 
     if not records:
         return
     together = all(any(_same_file(use, each, files) for use in ready.records) for each in records)
+    if not together and ready.records[0].force_n is not None:
+        for each in records:
+            if each.force_n is None:
+                raise RecordError(
+                    f"{each.source}: no force, but {ready.records[0].source} has one: amplitudes of different hits "
+                    "are comparable over their forces only; needed is the hammer's signal in both"
+                )
     if together or ready.records[0].force_n is None:
         if not together:
             raise RecordError(
@@ -207,7 +222,26 @@ def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Rec
     begin = round((use.start_s - first.start_s) / first.period_s)
     if abs(first.period_s / use.period_s - 1.0) > 1e-6 or begin < 0 or begin + len(use.response) > len(first.response):
         raise RecordError(f"{first.source}: was not recorded together with {use.source}")
-    return replace(first, response=first.response[begin : begin + len(use.response)])
+    inside = slice(begin, begin + len(use.response))
+    force_n = None if first.force_n is None else first.force_n[inside]
+    beside = replace(first, response=first.response[inside], force_n=force_n)
+    if not np.ptp(beside.response) > 0.0:
+        raise RecordError(
+            f"{beside.source}: every sample of the response is {beside.response[0]:g}: is the sensor connected?"
+        )
+    if is_clipped(beside.response):
+        raise RecordError(
+            f"{beside.source}: overload: the response ({beside.quantity}) is cut off at "
+            f"{np.max(np.abs(beside.response)):.5g} {UNITS[beside.quantity]}; needed is a larger range of the input or "
+            "a softer hit"
+        )
+    return beside
+
+
+def _is_of_refused(each: Measured, found: Identification) -> bool:
+    """Whether it was recorded together with hits or stops none of which is used."""
+    own = any(f"{each.source} ".startswith(f"{name} ") for name in found.files)
+    return own and isinstance(each, Record) and not any(_same_file(use, each, found.files) for use in found.taps)
 
 
 def _same_file(use: Record, other: Record, files: Sequence[str]) -> bool:

@@ -69,8 +69,10 @@ def _axis_of(source: str, traces: Sequence[ServoTrace], axis: str | None) -> Ser
     named = [each for each in linear if axis is not None and axis in _letters(each.name)]
     if len(named) == 1 or (axis is not None and len(linear) == 1 and not _letters(linear[0].name)):
         return (named or linear)[0]
-    names = ", ".join(each.name for each in traces)
-    wanted = "say --axis x, y or z" if axis is None else f"none or several are called {axis.upper()}"
+    names = ", ".join(f"{each.name}{'' if each in linear else ' (turns)'}" for each in traces)
+    wanted = "say --axis x, y or z"
+    if axis is not None:
+        wanted = f"{'several are' if named else 'no linear one is'} called {axis.upper()}"
     raise RecordError(f"{source}: holds command and actual position of {names}: {wanted}")
 
 
@@ -94,8 +96,10 @@ def _response(
     longest = max(len(command) for command, _ in windows) * period_s
     hertz = np.arange(max(low, _LOWEST_HZ), high, 0.5 / longest)
     if len(hertz) < FEWEST_LINES:
+        asked = "" if band_hz is None else f", asked for are {band_hz[0]:g} to {band_hz[1]:g} Hz"
         raise RecordError(
-            f"{source}: a sample every {period_s * 1e3:g} ms tells nothing between {low:g} and {high:g} Hz"
+            f"{source}: a sample every {period_s * 1e3:g} ms tells of {_LOWEST_HZ:g} to "
+            f"{1.0 / (_OVER_HALF * period_s):.4g} Hz{asked}"
         )
     none = np.zeros(len(windows))
     command, response = (

@@ -55,6 +55,7 @@ class Usable:
     response_noise: float | None = None  # RMS noise of the response before the hit, in its unit; None: not measured
     excited_hz: float | None = None  # frequency up to which the force excites (-20 dB)
     hit: Hit | None = None  # the pulse
+    turned: bool = False  # whether the sign of the response was turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,8 +214,9 @@ def _windowed(
             f"{'the' if band_hz else 'the strongest vibration at'} {wanted:.4g} Hz"
             f"{' asked for' if band_hz else ''}: take a harder tip"
         )
-    response = _orient(record, hit, response, force, warnings)
-    return Usable(replace(record, response=response, force_n=force), sigma, noise, reached, hit)
+    oriented = _orient(record, hit, response, force, warnings)
+    turned = oriented is not response
+    return Usable(replace(record, response=oriented, force_n=force), sigma, noise, reached, hit, turned)
 
 
 def _decay(record: Record, band_hz: float | None, start_s: float | None, warnings: list[str]) -> Usable:

@@ -137,11 +137,19 @@ def _rest_after_motion(quiet: FloatArray, period_samples: float, level: float, s
     return start + int(rest[0]) if rest.size else start
 
 
+def _refuse_still(record: Record) -> None:
+    if not np.ptp(record.response) > 0.0:
+        raise RecordError(
+            f"{record.source}: every sample is {record.response[0]:zg}: no vibration; is the sensor connected?"
+        )
+
+
 def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
     """One record for each stop of an ordinary run behind which the machine rests, those with least motion first.
 
     Of many the strongest ones. `lowest_hz`: no mode lies below; what is slower is motion of the axis.
     """
+    _refuse_still(record)
     quiet = np.asarray(record.response - np.median(record.response), dtype=np.float64)
     period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
     envelope = _envelope(quiet, period, _ENVELOPE_PERIODS * period)
@@ -172,8 +180,7 @@ def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
 def _overview(record: Record) -> tuple[FloatArray, float, float]:
     """A record without its median; in samples the period of its strongest frequency, and of a first envelope."""
     response = record.response
-    if not np.ptp(response) > 0.0:
-        raise RecordError(f"{record.source}: every sample is {response[0]:zg}: no vibration; is the sensor connected?")
+    _refuse_still(record)
     frequency = _fast_frequency_hz(response, record.period_s)
     if frequency == 0.0:
         raise RecordError(f"{record.source}: {len(response)} samples and no vibration with three periods or more")

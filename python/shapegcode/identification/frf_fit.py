@@ -149,6 +149,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
         warnings=(*dict.fromkeys(warning for each in responses for warning in each.warnings), *turned),
         notes=tuple(notes),
         responses=tuple(used),
+        turned=bool(turned),
         chart=found.chart,
         fitted_lines=tuple(lines),
     )

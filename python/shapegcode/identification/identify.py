@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf
 from shapegcode.identification.model_search import (
     ACCEPTED_PERCENT,
     MAX_MODES,
+    OPPOSED,
     Doubts,
     Fit,
     Search,
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from shapegcode.program import Program
 
 _LARGEST_MODEL = 99
+_OPTIONS = {"period_s": "sample_period", "exponential_window_s": "exponential_window"}  # where they are called else
 _MIN_SAMPLES = 3
 _FIRST_STOPS, _STOP_LEFT = 4, 0.1  # with least motion; of a stop's energy that their modes may leave
 
@@ -122,17 +124,17 @@ def identify(
     sought = Sought(band_hz, max_modes, modes, accepted_percent, window_s)
     if sweep is not None and (machine is None or response is not None):
         raise ArgumentError("a sweep needs the machine whose controller ran it, and files or records")
+    if sweep is not None and not isinstance(across, bool):
+        raise ArgumentError("across: a sweep needs one record of all axes: the channels beside its own are taken")
     options = options or ReadOptions()
     if sweep is not None and (stops or start_s is not None or options.ignore_force):
         raise ArgumentError("a sweep beside a program has neither a start of a decay nor stops: leave them out")
     found = _identified(
-        sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is True, strict=strict
+        sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is not False, strict=strict
     )
-    if across is False:
+    if across is False or (not found.modes and found.reason):
         return found
     if sweep is not None:
-        if across is not True:
-            raise ArgumentError("across: a sweep needs one record of all axes: the channels beside its own are taken")
         return found
     return with_moves(found, measured_across(sources, across, options), window_s)
 
@@ -161,26 +163,80 @@ def _identified(
                 from shapegcode.identification.known_command import find_modes_of_command, known_command
 
                 return find_modes_of_command(known_command(sweep, machine), sources, options, sought, across=across)
-            captures = [Path(each) for each in sources if isinstance(each, str | Path) and is_capture(Path(each))]
+            captures = _captures(sources, options)
             if captures:
+                _refuse_of_sensors(captures[0], options, start_s, stops=stops, across=across)
                 if len(captures) < len(sources):
                     raise RecordError(f"{captures[0]}: a capture of command and encoder: other files go apart")
                 return find_modes_of_captures(captures, options, sought)
             swept = _swept(sources, options)
             if swept is not None:
+                _refuse_of_decays(f"{swept.source}: a sweep without force", start_s, stops=stops, across=across)
                 return find_swept_modes(swept, names, sought)
             records, responses = _measured(sources, options)
             if responses:
+                _refuse_of_decays(f"{responses[0].source}: a frequency response", start_s, stops=stops)
                 return find_frf_modes(responses, names, sought)
             if stops:
+                if start_s is not None:
+                    raise ArgumentError(f"start at {start_s:g} s: goes with one decay, --stops finds where each begins")
                 return _modes_of_stops(_stops_in(records, None if band_hz is None else band_hz[0]), names, sought)
             ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
-            return find_modes(ready, names, sought)
+            return _turned_if_opposed(ready, find_modes(ready, names, sought), sought)
     except (ArgumentError, NumericError) as error:
         if strict:
             raise
         told: dict[str, Any] = {} if ready is None else {"warnings": ready.warnings, "notes": ready.notes}
         return Identification(files=names, prepared=ready, reason=str(error), **told)
+
+
+def _captures(sources: Sequence[Any], options: ReadOptions) -> list[Path]:
+    """Captures of command and encoder; a column that is named as a sensor's makes the file a record of that sensor."""
+    if options.response_columns:
+        return []
+    return [Path(each) for each in sources if isinstance(each, str | Path) and is_capture(Path(each))]
+
+
+def _refuse_of_sensors(
+    capture: Path, options: ReadOptions, start_s: float | None, *, stops: bool, across: bool
+) -> None:
+    """Refuse what is said of a sensor's record where a capture would silently go without it."""
+    said = {each.name: getattr(options, each.name) != each.default for each in fields(options)} | {
+        "start": start_s is not None, "stops": stops, "across": across, "axis": False,
+    }  # fmt: skip
+    for name, is_said in said.items():
+        if is_said:
+            option = _OPTIONS.get(name, name).replace("_", "-")
+            raise ArgumentError(
+                f"{capture}: a capture of command and encoder, in which --{option} changes nothing: it goes with the "
+                "record of a sensor (--response-column names one in a CSV)"
+            )
+
+
+def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: bool = False) -> None:
+    """Refuse what is said of a decay or tap where it would silently change nothing."""
+    for option, is_said in (("--stops", stops), ("--start", start_s is not None), ("--across", across)):
+        if is_said:
+            raise ArgumentError(f"{what}, in which {option} changes nothing: it goes with the record of a tap or decay")
+
+
+def _turned_if_opposed(ready: Prepared, found: Identification, sought: Sought) -> Identification:
+    """What was found; with the sign of the responses turned where all that stands out goes against the push.
+
+    The first moment of the response tells the sign of one mode (`checks`), not that of several.
+    """
+    if found.modes or not any(mode.refusal == OPPOSED for mode in found.refused):
+        return found
+    text = (
+        f"{ready.records[0].source}: every mode goes against the push of the hammer: the sign is turned, as for a "
+        "sensor at the same point that points the other way"
+    )
+    usable = tuple(
+        replace(use, record=replace(use.record, response=-use.record.response), turned=not use.turned)
+        for use in ready.usable
+    )
+    again = find_modes(replace(ready, usable=usable, warnings=(*ready.warnings, text)), found.files, sought)
+    return again if again.modes else found
 
 
 def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record], list[FrequencyResponse]]:

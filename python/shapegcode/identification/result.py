@@ -204,6 +204,8 @@ class Identification(Result):
         chart: poles of the stabilisation chart.
         sweep: spectrum of a sweep without force; None: there is none.
         responses: frequency responses without time record, as far as they were fitted.
+        turned: whether their sign was turned.
+        options: of the command line, for the next one.
         fitted_lines: the model's lines of each, (n,) complex.
         fitted_records: the records as they were fitted, thinned out to what the band needs.
         fitted: response of the model per record, (n,), at the samples that were fitted.
@@ -233,6 +235,8 @@ class Identification(Result):
     chart: tuple[ChartPole, ...] = field(default=(), metadata=hidden())
     sweep: Sweep | None = field(default=None, metadata=hidden())
     responses: tuple[FrequencyResponse, ...] = field(default=(), metadata=hidden())
+    turned: bool = field(default=False, metadata=hidden())
+    options: tuple[str, ...] = field(default=(), metadata=hidden())
     fitted_lines: tuple[ComplexArray, ...] = field(default=(), metadata=hidden())
     fitted_records: tuple[Record, ...] = field(default=(), metadata=hidden())
     fitted: tuple[FloatArray, ...] = field(default=(), metadata=hidden())
@@ -347,10 +351,11 @@ class Identification(Result):
             return "tap again, longer or more often, for what is not supported (shapegcode identify --tap-plan)"
         if self.machine_file is not None:
             return f"shapegcode shaper -m {self.machine_file.path}"
-        if self.sweep is not None and self.sweep.command:
-            beside = f"--sweep {self.sweep.command} -m mine.toml --update mine.toml"
-            return f"shapegcode identify {' '.join(self.files)} {beside}"
-        return f"shapegcode identify {' '.join(self.files)} --axis {self.axis or 'x'} --update mine.toml"
+        if self.sweep is not None and self.sweep.command not in ("", self.sweep.source):
+            how = f"--sweep {self.sweep.command} -m mine.toml"
+        else:
+            how = f"--axis {self.axis or 'x'}"
+        return f"shapegcode identify {' '.join((*self.files, how, *self.options))} --update mine.toml"
 
     def __repr__(self) -> str:
         """One line per mode; what else there is stays in the attributes."""
@@ -419,8 +424,8 @@ _MODE_COLUMNS = (
 def _move(letter: str) -> Any:
     def cell(mode: IdentifiedMode) -> str:
         estimate: Estimate | None = getattr(mode.moves, letter)
-        own = estimate is not None and estimate.low == estimate.high
-        return "1" if own else estimate_cell(estimate, 1.0)
+        exact = estimate is not None and estimate.low == estimate.high
+        return f"{estimate.value:g}" if estimate is not None and exact else estimate_cell(estimate, 1.0)
 
     return cell
 

@@ -17,7 +17,7 @@ from scipy.optimize import linear_sum_assignment
 from tomlkit.items import AoT, Key, SingleKey, Table
 
 from shapegcode.errors import ArgumentError, MachineError
-from shapegcode.identification.across import told_moves
+from shapegcode.identification.across import LEAST_MOVE, told_moves
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, MachineFile
 from shapegcode.machine import Machine, check_axes
 from shapegcode.settings.edit import (
@@ -201,7 +201,6 @@ def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[
 _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
 _SUM_SLACK = 1e-3  # of the participations: rounding
-_LEAST_MOVE = 0.01  # of the motion along the axis itself: less is not written
 _KEYS = (
     "frequency_hz",
     "damping_ratio",
@@ -415,7 +414,7 @@ class ModeTables:
 
     def _moves(self, mode: IdentifiedMode) -> dict[str, tuple[Any, str]]:
         """What a mode moves of other axes, where that was measured and is told from nothing."""
-        told = {letter: each for letter, each in told_moves(mode).items() if abs(each.value) >= _LEAST_MOVE}
+        told = {letter: each for letter, each in told_moves(mode).items() if abs(each.value) >= LEAST_MOVE}
         if len(told) < 2:
             return {}
         others = ", ".join(

@@ -176,7 +176,7 @@ Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]
 # A machine may differ from its file in these, and they are read when blocks are simulated.
 _SIMULATED = re.compile(
     r"axes\.[xyz]\.(modes|rigid|drive\..+|rapid_mm_per_min)"
-    r"|axes\.[xyz]\.modes\.\d+\.(frequency_hz|damping_ratio|participation|frequency_over(\..+)?)"
+    r"|axes\.[xyz]\.modes\.\d+\.(frequency_hz|damping_ratio|participation|(frequency_over|moves|excited_by)(\..+)?)"
     r"|controller\.(interpolation_period_s|block_end|shaped_\w+|(position_gain_per_s|feed_forward_ratio)(\.[xyz])?)"
     r"|controller\.(in_position|rapid)\w*(\.[xyz])?"
     r"|shaping\.part_mass_kg|times\..+"
