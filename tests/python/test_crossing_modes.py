@@ -74,6 +74,7 @@ def test_by_axis_that_moves_and_by_axis_that_excites() -> None:
         ({"axes.y.modes.1.moves": {"y": 0.0}}, r"axes\.y\.modes\.1\.moves.*x, y and z are 0"),
         ({"axes.y.modes.1.moves": {"a": 1.0}}, r"axes\.y\.modes\.1\.moves\.a"),
         ({"axes.y.modes.1.moves": {"z": float("inf")}}, r"axes\.y\.modes\.1\.moves\.z"),
+        ({"axes.y.modes.1.moves": {"y": 1e300}}, r"axes\.y\.modes\.1\.moves\.y"),
     ],
 )
 def test_bad_directions_are_refused(keys: dict[str, Any], words: str) -> None:

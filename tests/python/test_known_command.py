@@ -94,7 +94,10 @@ def test_modes_start_and_clock_of_a_logger(program: Path, motion: tuple[FloatArr
     check(found_in(program, Record("turned", upside_down.period_s, -upside_down.response)), MODES)
 
 
-@pytest.mark.parametrize(("ramp_s", "wait_s"), [(0.0, 0.0), (0.02, 0.0), (0.1, 0.0), (0.05, 0.12)])
+@pytest.mark.parametrize(
+    ("ramp_s", "wait_s"),
+    [(0.02, 0.0), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((0.0, 0.0), (0.1, 0.0), (0.05, 0.12)))],
+)
 def test_ramps_and_waits_of_the_control_need_not_be_those_of_the_machine_file(
     tmp_path: Path, ramp_s: float, wait_s: float
 ) -> None:

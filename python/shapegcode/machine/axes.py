@@ -154,12 +154,15 @@ class FrequencyOver(InlineTable):
         return (self.position_mm if self.mass_kg is None else self.mass_kg) or ()
 
 
+Share = Annotated[Float, Field(ge=-1000, le=1000)]
+
+
 class Direction(InlineTable):
     """Shares of X, Y and Z; one that is left out is 0."""
 
-    x: Float = key("share of the X axis", unit="1", default=0.0)
-    y: Float = key("share of the Y axis", unit="1", default=0.0)
-    z: Float = key("share of the Z axis", unit="1", default=0.0)
+    x: Share = key("share of the X axis", unit="1", default=0.0)
+    y: Share = key("share of the Y axis", unit="1", default=0.0)
+    z: Share = key("share of the Z axis", unit="1", default=0.0)
 
     @model_validator(mode="after")
     def _points_somewhere(self) -> Direction:
@@ -179,7 +182,7 @@ class AxisMode(TomlTable):
         "natural frequency; from a tap test, or from the decay after a rapid stop"
     )
     damping_ratio: Annotated[NonNegative, Field(lt=1)] = key("damping ratio (1 = critically damped)")
-    participation: Positive = key(
+    participation: Annotated[Positive, Field(le=1000)] = key(
         "share of this mode in the axis's deflection; several modes of one axis need not add up to 1",
         unit="1",
         default=1.0,
