@@ -15,6 +15,7 @@ import pytest
 
 import shapegcode as sg
 from acceptance import Judged, close, convert, machine_with
+from command import run
 from judge import Mode, Move, contour_error_um, durations, play, residual_um, response, starts
 from judge.player import BlockEnd, moving_average
 from shapegcode.cli import main
@@ -310,16 +311,15 @@ def test_the_worst_case_that_counts_decides(keys: dict[str, Any], words: str) ->
     assert worst["contour_error_um"]["command"] is not None
 
 
-def test_exit_code_and_table_follow_the_worst_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_exit_code_and_table_follow_the_worst_case(tmp_path: Path) -> None:
     (tmp_path / "part.nc").write_text(PART)
     for low, code in ((100.0, 0), (80.0, 1)):
         machine = machine_with({"verdict.override_percent": [low, 100.0], **STRICT})
         (tmp_path / "machine.toml").write_text(machine.to_toml(), encoding="utf-8")
         args = ["part.nc", "-m", "machine.toml", "-o", f"out{low:g}.nc", "--shape-all", "--json", "report.json"]
-        with pytest.MonkeyPatch.context() as patch:
-            patch.chdir(tmp_path)
-            assert main(["convert", *args]) == code
-        out = capsys.readouterr().out
+        done = run(tmp_path, "convert", *args)
+        assert done.returncode == code
+        out = done.stdout
         report = json.loads((tmp_path / "report.json").read_text())
         (line,) = (line for line in out.splitlines() if "<- worst" in line)
         assert line.startswith(report["worst_case"]["name"])

@@ -273,7 +273,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "calculation": (
         "plant", "no_full", "look_ahead", "drive", "continuous", "family", "objective", "negative", "taps", "speed",
         "radius", "modes", "max_modes", "frequencies", "travel", "acceleration", "seconds", "ignore_force",
-        "start", "station", "cutoff", "lambda_s",
+        "stops", "across", "start", "station", "cutoff", "lambda_s",
     ),
     "modes that were not measured on this machine": ("keep_modes", "rigid"),
     "what a file does not say": (
