@@ -31,6 +31,7 @@ from shapegcode.settings.edit import (
     take_tail,
     with_origin_table,
     with_remarks,
+    without_origins,
 )
 from shapegcode.settings.keys import toml
 from shapegcode.settings.load import read_text
@@ -217,7 +218,8 @@ class ModeTables:
 
     def __init__(self, text: str, axis: str, source: str, file: str) -> None:
         """Find them."""
-        text = with_origin_table(text)
+        self._remarks = remarks_of(text)
+        text = without_origins(text)
         self.newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
         self._last_end = "" if text.endswith("\n") else self.newline
         self.document = parse_exactly(text + self._last_end, file)
@@ -228,7 +230,6 @@ class ModeTables:
         self.name = f"axes.{self.axis}.modes"
         self.old: list[dict[str, Any]] = list(self.data["axes"][self.axis].get("modes", []))
         self.expected: list[dict[str, Any]] = []
-        self._remarks = remarks_of(text)
         self._said: dict[int, dict[str, str]] = {}
         """Of a table, by its identity: where the values that were put into it come from."""
         self.home = self._axis_table()

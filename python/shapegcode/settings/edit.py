@@ -7,6 +7,7 @@ place; then the document is rendered. Whoever edits reads the result again and c
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -26,6 +27,7 @@ from shapegcode.settings.remarks import (
 
 Entry = tuple[Key | None, Item]
 
+_HEADER = re.compile(r"^[ \t]*\[+[ \t]*([^\[\]\n]*?)[ \t]*\]", re.MULTILINE)
 _COMMENTED_KEY = re.compile(r"#\s*([A-Za-z0-9_-]+)\s*=\s*\.\.\.")
 _COMMENTED_TABLE = re.compile(r"#\s*\[\[\s*([^\[\]]+?)\s*\]\]")
 
@@ -107,14 +109,25 @@ def origin_lines(remarks: Mapping[str, str]) -> list[str]:
 def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> str:
     """A file with its origins in a table at its end; the rest stays byte for byte, but for values with an origin."""
     remarks = remarks_of(text) if remarks is None else remarks
-    document = tomlkit.parse(text)
-    if take_origins(document)[1] is not None:
-        document.pop(ORIGIN, None)
-        _unwrap(document)
-        text = document.as_string()
+    text = without_origins(text)
     newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
     table = "".join(line + newline for line in origin_lines(remarks))
     return text.rstrip("\r\n") + 2 * newline + table if table else text
+
+
+def without_origins(text: str) -> str:
+    """A file without what it says of where values come from; the rest stays byte for byte."""
+    data = tomllib.loads(text)
+    if take_origins(data)[1] is None:
+        return text
+    # Mostly they are one table at the end: what tomlkit takes a second for is a cut then.
+    *_, last = _HEADER.finditer(text)
+    if last[1] == ORIGIN and tomllib.loads(head := text[: last.start()]) == take_origins(data)[0]:
+        return head
+    document = tomlkit.parse(text)
+    document.pop(ORIGIN, None)
+    _unwrap(document)
+    return document.as_string()
 
 
 def _unwrap(table: Any) -> None:
