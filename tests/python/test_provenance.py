@@ -19,7 +19,7 @@ from shapegcode.cli import main
 from shapegcode.conversion.sensitivity import _Region
 from shapegcode.identification.result import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_modes
-from shapegcode.settings.edit import with_remarks
+from shapegcode.settings.edit import with_remarks, without_origins
 from shapegcode.settings.remarks import origin_of, remarks_of
 from shapegcode.shaping.grid import choose_grid
 
@@ -548,3 +548,17 @@ def test_one_value_has_one_origin(twice: str) -> None:
         text += '"axes.x.max_feed_mm_per_min" = "measured"\n'
     with pytest.raises(sg.MachineError, match=r"origin\.axes\.x\.max_feed_mm_per_min = .*this value has two"):
         sg.Machine.from_toml(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [
+        ('a.b = { value = 1, origin = "measured" }\n', "a.b = 1\n"),  # no heading at all
+        ('[a]\nb = 1\n[origin]\na.b = "measured"\n', "[a]\nb = 1\n"),
+        ('[origin]\na.b = "measured"\n[a]\nb = 1  # stays\n', "[a]\nb = 1  # stays\n"),
+        ('a = """\n[origin]\n"""\nb = { value = 1, origin = "measured" }\n', 'a = """\n[origin]\n"""\nb = 1\n'),
+        ("a = 1\n", "a = 1\n"),
+    ],
+)
+def test_origins_are_taken_out_wherever_they_stand(text: str, plain: str) -> None:
+    assert without_origins(text) == plain

@@ -6,6 +6,7 @@ place; then the document is rendered. Whoever edits reads the result again and c
 
 from __future__ import annotations
 
+import contextlib
 import re
 import tomllib
 from collections.abc import Callable, Mapping
@@ -117,13 +118,16 @@ def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> st
 
 def without_origins(text: str) -> str:
     """A file without what it says of where values come from; the rest stays byte for byte."""
-    data = tomllib.loads(text)
-    if take_origins(data)[1] is None:
+    plain, stated = take_origins(tomllib.loads(text))
+    if stated is None:
         return text
     # Mostly they are one table at the end: what tomlkit takes a second for is a cut then.
-    *_, last = _HEADER.finditer(text)
-    if last[1] == ORIGIN and tomllib.loads(head := text[: last.start()]) == take_origins(data)[0]:
-        return head
+    headers = list(_HEADER.finditer(text))
+    if headers and headers[-1][1] == ORIGIN:
+        head = text[: headers[-1].start()]
+        with contextlib.suppress(tomllib.TOMLDecodeError):  # what looks like a heading stands in a text
+            if tomllib.loads(head) == plain:
+                return head
     document = tomlkit.parse(text)
     document.pop(ORIGIN, None)
     _unwrap(document)
