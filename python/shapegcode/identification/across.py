@@ -192,22 +192,18 @@ def _parts_of(ready: Prepared, records: Sequence[Record], files: Sequence[str]) 
     if not records:
         return
     together = all(any(_same_file(use, each, files) for use in ready.records) for each in records)
-    if not together and ready.records[0].force_n is not None:
-        for each in records:
-            if each.force_n is None:
-                raise RecordError(
-                    f"{each.source}: no force, but {ready.records[0].source} has one: amplitudes of different hits "
-                    "are comparable over their forces only; needed is the hammer's signal in both"
-                )
-    if together or ready.records[0].force_n is None:
-        if not together:
-            raise RecordError(
-                f"{records[0].source}: a free decay tells what moves across only beside the axis it was found along: "
-                "needed is one record of all axes"
-            )
-        yield from _free_parts(ready, [_beside(use, records, files) for use in ready.records])
-        return
-    hits = prepare(records)
+    if not together and ready.records[0].force_n is None:
+        raise RecordError(
+            f"{records[0].source}: a free decay tells what moves across only beside the axis it was found along: "
+            "needed is one record of all axes"
+        )
+    forceless = [] if together else [each for each in records if each.force_n is None]
+    if forceless:
+        raise RecordError(
+            f"{forceless[0].source}: no force, but {ready.records[0].source} has one: amplitudes of different hits "
+            "are comparable over their forces only; needed is the hammer's signal in both"
+        )
+    hits = ready if together else prepare(records)
     yield from _free_parts(hits, [_beside(use, records, files) for use in hits.records])
 
 

@@ -93,7 +93,7 @@ def _response(
         )
     low, high = band_hz or (_LOWEST_HZ, np.inf)
     high = min(high, 1.0 / (_OVER_HALF * period_s))
-    longest = max(len(command) for command, _ in windows) * period_s
+    longest = (max(len(command) for command, _ in windows) + 2) * period_s
     hertz = np.arange(max(low, _LOWEST_HZ), high, 0.5 / longest)
     if len(hertz) < FEWEST_LINES:
         asked = "" if band_hz is None else f", asked for are {band_hz[0]:g} to {band_hz[1]:g} Hz"
@@ -102,9 +102,7 @@ def _response(
             f"{1.0 / (_OVER_HALF * period_s):.4g} Hz{asked}"
         )
     none = np.zeros(len(windows))
-    command, response = (
-        transforms([_kicks(each) for each in parts], none, period_s, hertz) for parts in zip(*windows, strict=True)
-    )
+    command, response = (transforms(list(parts), none, period_s, hertz) for parts in zip(*windows, strict=True))
     spectra = Spectra(hertz, command, response)
     used, coherence = spectra.coherent()
     if np.count_nonzero(used) < FEWEST_LINES:
@@ -118,7 +116,10 @@ def _response(
 
 
 def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, FloatArray]]:
-    """Command and actual position of each part between rests; of a motion without rests, tapered windows."""
+    """Kicks of command and actual position in each part between rests; of a motion without rests, tapered windows.
+
+    A kick is the change of speed at a sample, mm per period.
+    """
     found: list[tuple[FloatArray, FloatArray]] = []
     after, size = round(_AFTER_S / period_s), round(_WINDOW_S / period_s)
     for command, actual in zip(trace.command, trace.actual, strict=True):
@@ -126,17 +127,9 @@ def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, Float
         followed = [*(first for first, _ in parts[1:]), len(command)][: len(parts)]
         for (begin, end), following in zip(parts, followed, strict=True):
             stop = min(following, end + after)
-            if end - begin <= 2 * size:
-                found.append((command[begin:stop], actual[begin:stop]))
-                continue
-            taper = np.hanning(size)
-            for first in range(begin, stop - size + 1, size // 2):
-                both = (each[first : first + size] for each in (command, actual))
-                one, other = (np.cumsum(np.cumsum(np.diff(each, 2) * taper[1:-1])) for each in both)
-                found.append((one, other))
+            ranges, taper = [slice(begin, stop)], np.ones(1)
+            if end - begin > 2 * size:
+                starts = range(begin, stop - size + 1, size // 2)
+                ranges, taper = [slice(first, first + size) for first in starts], np.hanning(size)[1:-1]
+            found += [(np.diff(command[each], 2) * taper, np.diff(actual[each], 2) * taper) for each in ranges]
     return found
-
-
-def _kicks(position: FloatArray) -> FloatArray:
-    """Change of speed at each sample, mm per period."""
-    return np.asarray(np.diff(position, 2), dtype=np.float64)

@@ -43,6 +43,7 @@ from shapegcode.identification.model_search import (
     MIN_SWINGS,
     OPPOSED,
     SCATTER_PROBABILITY,
+    TURNED,
     Sought,
     Starts,
     chart_of,
@@ -126,10 +127,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
     found = _in_responses(measured, sought)
     turned: list[str] = []
     if _all_opposed(found):
-        turned.append(
-            f"{responses[0].source}: every mode goes against the push of the hammer: the sign is turned, as for a "
-            "sensor at the same point that points the other way"
-        )
+        turned.append(f"{responses[0].source}: {TURNED}")
         merged = [replace(each, response=-each.response) for each in merged]
         used = [replace(each, response=-each.response) for each in used]
         measured = _of_responses(merged, sought.exponential_window_s)

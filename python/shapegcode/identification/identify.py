@@ -23,6 +23,7 @@ from shapegcode.identification.model_search import (
     ACCEPTED_PERCENT,
     MAX_MODES,
     OPPOSED,
+    TURNED,
     Doubts,
     Fit,
     Search,
@@ -132,9 +133,7 @@ def identify(
     found = _identified(
         sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is not False, strict=strict
     )
-    if across is False or (not found.modes and found.reason):
-        return found
-    if sweep is not None:
+    if across is False or sweep is not None or (not found.modes and found.reason):
         return found
     return with_moves(found, measured_across(sources, across, options), window_s)
 
@@ -227,10 +226,7 @@ def _turned_if_opposed(ready: Prepared, found: Identification, sought: Sought) -
     """
     if found.modes or not any(mode.refusal == OPPOSED for mode in found.refused):
         return found
-    text = (
-        f"{ready.records[0].source}: every mode goes against the push of the hammer: the sign is turned, as for a "
-        "sensor at the same point that points the other way"
-    )
+    text = f"{ready.records[0].source}: {TURNED}"
     usable = tuple(
         replace(use, record=replace(use.record, response=-use.record.response), turned=not use.turned)
         for use in ready.usable

@@ -230,6 +230,10 @@ LASTING = 0.8
 _RIVAL_PROBABILITY = 0.05
 _UNKNOWN = 7.0  # half width of a logarithm that says nothing: a factor of a thousand
 SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
+TURNED = (
+    "every mode goes against the push of the hammer: the sign is turned, as for a sensor at the same point that points "
+    "the other way"
+)
 OPPOSED = "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
 
 

@@ -75,23 +75,27 @@ def own_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> 
 def excited_modes(machine: Machine) -> list[list[_core.Mode]]:
     """The modes that X, Y, Z excite, for their shapers: each as far as its axis moves the tool by it."""
     found: list[list[_core.Mode]] = [[], [], []]
-    for _, axis, mode in numbered_modes(machine):
-        still, length = _shifted(mode, 0.0, machine), math.hypot(*mode.motion(axis))
-        for exciting, share in enumerate(mode.excitation(axis)):
-            if share:
-                weight = still.participation * abs(share) * length
-                found[exciting].append(_core.Mode(still.frequency_hz, still.damping_ratio, weight))
+    for exciting, share, axis, mode in _excitations(machine):
+        still = _shifted(mode, 0.0, machine)
+        weight = still.participation * abs(share) * math.hypot(*mode.motion(axis))
+        found[exciting].append(_core.Mode(still.frequency_hz, still.damping_ratio, weight))
     return found
 
 
 def slowest_excited_hz(machine: Machine) -> list[float]:
     """Lowest frequency that X, Y, Z excite, by the tables of their modes; infinite for an axis without any."""
     found = [math.inf] * 3
+    for exciting, _, _, mode in _excitations(machine):
+        found[exciting] = min(found[exciting], slowest_mode(mode)[0])
+    return found
+
+
+def _excitations(machine: Machine) -> Iterator[tuple[int, float, int, AxisMode]]:
+    """An axis, by which share it excites a mode, the axis at which that stands, and the mode."""
     for _, axis, mode in numbered_modes(machine):
         for exciting, share in enumerate(mode.excitation(axis)):
             if share:
-                found[exciting] = min(found[exciting], slowest_mode(mode)[0])
-    return found
+                yield exciting, share, axis, mode
 
 
 def _shifted(mode: AxisMode, off: float, machine: Machine) -> _core.Mode:
