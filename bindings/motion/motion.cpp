@@ -1,11 +1,17 @@
 #include <pybind11/stl.h>
 
 #include <memory>
+#include <optional>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "arrays.hpp"
 #include "register.hpp"
+#include "shapegcode/error.hpp"
 #include "shapegcode/motion.hpp"
+#include "shapegcode/path.hpp"
+#include "shapegcode/planner.hpp"
 
 namespace py = pybind11;
 
@@ -21,6 +27,68 @@ py::array phase_table(const SpeedProfile& profile) {
         phases[i].speed_mm_per_s, phases[i].acceleration_mm_per_s2;
   }
   return take(std::move(table));
+}
+
+using PerAxis = std::variant<double, Vector3>;
+
+Vector3 each_axis(const PerAxis& limit) {
+  return std::holds_alternative<double>(limit) ? Vector3(Vector3::Constant(std::get<double>(limit)))
+                                               : std::get<Vector3>(limit);
+}
+
+// A polyline through points; without a feed as fast as the axes can be.
+Path path_of(const MatrixArray& points_mm, std::optional<double> feed_mm_per_s, const TrajectoryLimits& limits) {
+  const Samples points = samples_from(points_mm, 1.0);
+  const double feed = feed_mm_per_s.value_or(limits.max_feed_mm_per_s.norm());
+  std::vector<Segment> segments;
+  for (Eigen::Index k = 1; k < points.positions_mm.rows(); ++k) {
+    segments.push_back(make_line(points.positions_mm.row(k - 1), points.positions_mm.row(k), feed));
+  }
+  return Path(std::move(segments));
+}
+
+void register_trajectory(py::module_& module) {
+  using AnyPath = std::variant<std::shared_ptr<Path>, MatrixArray>;
+  module.def(
+      "time_optimal_trajectory",
+      [](const AnyPath& given, const PerAxis& feed, const PerAxis& acceleration, const PerAxis& jerk,
+         double contour_tolerance_mm, std::optional<double> feed_mm_per_s, double period_s) {
+        const TrajectoryLimits limits{each_axis(feed), each_axis(acceleration), each_axis(jerk), contour_tolerance_mm};
+        const auto* path = std::get_if<std::shared_ptr<Path>>(&given);
+        if (path != nullptr && feed_mm_per_s) {
+          throw Error(ErrorKind::argument, "a feed is for points: the segments of a path have their own");
+        }
+        const Path planned = path != nullptr ? **path : path_of(std::get<MatrixArray>(given), feed_mm_per_s, limits);
+        Samples samples;
+        {
+          const py::gil_scoped_release release;
+          samples = time_optimal_trajectory(planned, limits, period_s);
+        }
+        return take(std::move(samples.positions_mm));
+      },
+      py::arg("path").none(false), py::kw_only(), py::arg("max_feed_mm_per_s"), py::arg("max_acceleration_mm_per_s2"),
+      py::arg("max_jerk_mm_per_s3"), py::arg("contour_tolerance_mm") = TrajectoryLimits{}.contour_tolerance_mm,
+      py::arg("feed_mm_per_s") = py::none(), py::arg("period_s") = 0.001,
+      R"(Set-points of a whole path from rest to rest, nearly as fast as the limits of every axis allow.
+
+Junctions are rounded within the tolerance, jerk is limited, and the motion rests at segments with `stop_at_end`. Limits
+hold for the differences of the set-points (1.001); programmed feeds are kept. See docs/concepts/time_optimal.md.
+
+Args:
+    path: A path whose segments have a feed, or the points of a polyline, (n, 3), mm.
+    max_feed_mm_per_s: Limit of every axis, mm/s: a number for all, or one for each, shape (3,).
+    max_acceleration_mm_per_s2: Likewise, mm/s^2.
+    max_jerk_mm_per_s3: Likewise, mm/s^3.
+    contour_tolerance_mm: By which the path may be left where its direction or curvature jumps, mm; 0: rest there.
+    feed_mm_per_s: Feed along the polyline through points, mm/s; None: as fast as the axes can be.
+    period_s: Between two set-points, s.
+
+Returns:
+    Set-points, (n_samples, 3), mm, read-only: the start first, the end to the last bit last.
+
+Raises:
+    ArgumentError: A limit or a period that is not above zero and finite, a tolerance below zero, a segment without feed.
+    NumericError: The limits cannot be kept.)");
 }
 
 }  // namespace
@@ -115,6 +183,8 @@ void register_motion(py::module_& module) {
       },
       py::arg("path").none(false), py::arg("profile").none(false), py::arg("period_s"),
       "All set-points of a path, (n_samples, 3), mm, read-only. Raises ArgumentError on a period <= 0.");
+
+  register_trajectory(module);
 }
 
 }  // namespace shapegcode::bindings

@@ -43,6 +43,7 @@ from shapegcode._core import (
     minimal_two_mode as minimal_two_mode,
     repeated_zv as repeated_zv,
     sweep as sweep,
+    time_optimal_trajectory as time_optimal_trajectory,
     wall_error_um as wall_error_um,
     wall_errors_um as wall_errors_um,
     worst_residual as worst_residual,

@@ -128,14 +128,16 @@ def _distance(points: Array, path: Array) -> float:
     return float(away.max())
 
 
-def ours(driver: Path, route: Route, limits: Limits, file: Path, **settings: object) -> tuple[Array, dict[str, Any]]:
-    """Set-points of `MotionController`, and what its steps took."""
+def ours(
+    driver: Path, route: Route, limits: Limits, file: Path, how: str = "play", **settings: object
+) -> tuple[Array, dict[str, Any]]:
+    """Set-points of `MotionController`, and what its steps took; `how` "plan": of `time_optimal_trajectory`."""
     task = [f"{name} {value}" for name, value in {"period": PERIOD_S, **settings}.items()]
     for name in ("feed", "acceleration", "jerk"):
         task.append(" ".join([name, *(f"{value:.17g}" for value in getattr(limits, name))]))
     task.append(" ".join(["start", *(f"{value:.17g}" for value in route.start)]))
     task += [piece.words() for piece in route.pieces]
-    run = subprocess.run([driver, "play", file], input="\n".join(task), capture_output=True, text=True, check=False)
+    run = subprocess.run([driver, how, file], input="\n".join(task), capture_output=True, text=True, check=False)
     if run.returncode != 0:
         raise RuntimeError(run.stderr.strip())
     return read_points(file), json.loads(run.stdout)

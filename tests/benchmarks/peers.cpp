@@ -4,6 +4,7 @@
 //     peers window WINDOW... -- PROGRAM... < task
 //     peers random COUNT FIRST_SEED [TRACE]
 #include "peers.hpp"
+#include "shapegcode/planner.hpp"
 
 #include <time.h>
 
@@ -157,12 +158,39 @@ int play(const Task& task, const char* file) {
   return 0;
 }
 
+// The same path and limits, planned as a whole.
+int plan(const Task& task, const char* file) {
+  if (task.segments.empty()) throw std::runtime_error("the task has no segments");
+  const MotionLimits& given = task.settings.limits;
+  const TrajectoryLimits limits{given.max_feed_mm_per_s, given.max_acceleration_mm_per_s2, given.max_jerk_mm_per_s3,
+                                task.settings.contour_tolerance_mm};
+  const Path path(task.segments);
+  std::int64_t least_ns = std::numeric_limits<std::int64_t>::max();
+  Samples samples;
+  for (int pass = 0; pass < std::max(task.passes, 1); ++pass) {
+    const std::int64_t begin = now_ns();
+    samples = time_optimal_trajectory(path, limits, task.settings.period_s);
+    least_ns = std::min(least_ns, now_ns() - begin);
+  }
+  std::ofstream out(file, std::ios::binary);
+  for (Eigen::Index k = 0; k < samples.positions_mm.rows(); ++k) {
+    const Vector3 point = samples.positions_mm.row(k);
+    out.write(reinterpret_cast<const char*>(point.data()), axis_count * sizeof(double));
+  }
+  if (!out) throw std::runtime_error(std::string(file) + " cannot be written");
+  std::printf("{\"steps\": %lld, \"plan_us\": %.4f}\n", static_cast<long long>(samples.positions_mm.rows()),
+              1e-3 * static_cast<double>(least_ns) / static_cast<double>(task.segments.size()));
+  return 0;
+}
+
 int run(std::span<const char* const> arguments) {
   const std::string_view what = arguments.empty() ? "" : arguments[0];
   if (what == "play" && arguments.size() == 2) return play(read_task(std::cin), arguments[1]);
+  if (what == "plan" && arguments.size() == 2) return plan(read_task(std::cin), arguments[1]);
   if (what == "window" && arguments.size() > 1) return compare_windows(read_task(std::cin), arguments.subspan(1));
   if (what == "random" && (arguments.size() == 3 || arguments.size() == 4)) return random_motion(arguments.subspan(1));
-  throw std::runtime_error("usage: play OUT | window WINDOW... -- PROGRAM... | random COUNT FIRST_SEED [TRACE]");
+  throw std::runtime_error(
+      "usage: play OUT | plan OUT | window WINDOW... -- PROGRAM... | random COUNT FIRST_SEED [TRACE]");
 }
 
 }  // namespace

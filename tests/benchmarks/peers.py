@@ -46,6 +46,7 @@ RECORDED = HERE / "data" / "linuxcnc_small_arcs.csv.gz"
 WINDOWS = (10, 20, 50, 100, 200, 500)
 ASKED_WINDOW, ASKED_LOSS = 100, 0.01
 ALLOWED_RATIO = 1.001
+ASKED_MEDIAN, ASKED_WORST = 1.03, 1.10  # of our time over the shortest
 CURVE_LINES = 20_000
 
 ONE_AXIS = Limits.of(100.0, 1000.0, 50_000.0)
@@ -123,7 +124,11 @@ def single_moves(driver: Path, peers: Peers, folder: Path, passes: int) -> tuple
             found = figures(points, limits, route)
             kept += [found.speed, found.acceleration, found.jerk]
             times = (f"{told['push_us']:.1f}", f"{told['step_us']:.2f}", f"{told['longest_step_us']:.1f}")
-            lines.append(row(name, f"shapegcode, smoothing {1e3 * smoothing_s:g} ms", found, *times))
+            lines.append(row(name, f"shapegcode online, smoothing {1e3 * smoothing_s:g} ms", found, *times))
+        points, told = ours(driver, route, limits, folder / "ours", "plan", tolerance=0.05, passes=passes)
+        found = figures(points, limits, route)
+        kept += [found.speed, found.acceleration, found.jerk]
+        lines.append(row(name, "shapegcode, time-optimal", found, f"{told['plan_us']:.0f}", "", ""))
     return markdown([*HEAD, "calculation or push, us", "set-point, us", "longest, us"], lines), kept
 
 
@@ -171,8 +176,12 @@ def small_arcs(driver: Path, peers: Peers, folder: Path) -> tuple[str, list[floa
         points, _ = ours(driver, route, limits, folder / "ours", smoothing=0.01, tolerance=tolerance_mm)
         own = figures(points, limits)
         kept += [own.speed, own.acceleration, own.jerk]
-        who = f"shapegcode, tolerance {tolerance_mm} mm" + (", as much jerk as LinuxCNC" if limits is JERKY else "")
-        lines.append(row("small arcs", who, figures(points, LINUXCNC, route)))
+        more = f", tolerance {tolerance_mm} mm" + (", as much jerk as LinuxCNC" if limits is JERKY else "")
+        lines.append(row("small arcs", f"shapegcode online{more}", figures(points, LINUXCNC, route)))
+        points, _ = ours(driver, route, limits, folder / "ours", "plan", tolerance=tolerance_mm)
+        own = figures(points, limits)
+        kept += [own.speed, own.acceleration, own.jerk]
+        lines.append(row("small arcs", f"shapegcode, time-optimal{more}", figures(points, LINUXCNC, route)))
     return markdown(HEAD, lines), kept
 
 
@@ -209,8 +218,80 @@ def programs(driver: Path, peers: Peers, folder: Path) -> tuple[str, list[float]
         found = figures(points, MILL, route)
         kept += [found.speed, found.acceleration, found.jerk]
         spent_us = told["step_us"] * told["steps"] / len(route.pieces)
-        lines.append(row(name, "shapegcode, smoothing 10 ms", found, f"{spent_us:.1f}"))
+        lines.append(row(name, "shapegcode online, smoothing 10 ms", found, f"{spent_us:.1f}"))
+        points, told = ours(driver, route, MILL, folder / "ours", "plan", tolerance=0.05)
+        found = figures(points, MILL, route)
+        kept += [found.speed, found.acceleration, found.jerk]
+        lines.append(row(name, "shapegcode, time-optimal", found, f"{told['plan_us']:.1f}"))
     return markdown([*HEAD, "us per move"], lines), kept
+
+
+def random_route(seed: int) -> tuple[Route, Limits, float]:
+    """A polyline in space, gently bent in a plane, or nearly in a plane, with limits and a tolerance for it."""
+    draw = np.random.default_rng(seed)
+    count = int(draw.integers(3, 25))
+    if seed % 3 == 0:
+        legs = draw.normal(0.0, 10.0 ** draw.uniform(-0.3, 0.9), (count, 3))
+    elif seed % 3 == 1:
+        heading, length = np.cumsum(draw.normal(0.0, 0.25, count)), 10.0 ** draw.uniform(-0.5, 0.7, count)
+        legs = np.column_stack([length * np.cos(heading), length * np.sin(heading), np.zeros(count)])
+    else:
+        legs = draw.normal(0.0, 3.0, (count, 3)) * [1.0, 1.0, 0.05]
+    acceleration = 10.0 ** draw.uniform(2.5, 3.5)
+    jerk, feed = acceleration * 10.0 ** draw.uniform(1.2, 2.2), 10.0 ** draw.uniform(1.2, 2.3)
+    each = [
+        tuple(float(value) for value in most * draw.uniform(low, high, 3))
+        for most, low, high in ((feed, 0.7, 1.5), (acceleration, 0.6, 1.0), (jerk, 0.6, 1.0))
+    ]
+    pieces = [Piece(tuple(map(float, point)), feed) for point in np.cumsum(legs, axis=0)]
+    return Route(pieces), Limits(*each), 10.0 ** draw.uniform(-2.2, -1.0)
+
+
+def half_widths(route: Route, tolerance_mm: float) -> Array:
+    """Over which each corner is rounded: the largest d with which the corners within 2 d stay within the tolerance."""
+    points = np.vstack([route.start, [piece.end for piece in route.pieces]])
+    legs = np.diff(points, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    turn = np.linalg.norm(np.diff(legs / lengths[:, None], axis=0), axis=1)
+    at, whole = np.cumsum(lengths)[:-1], float(lengths.sum())
+    found = []
+    for place in at:
+        away = np.abs(at - place)
+        order = np.argsort(away)
+        total = np.cumsum(turn[order])
+        reach = np.append(away[order][1:], np.inf) / 2.0
+        width = next(max(6.0 * tolerance_mm / sum_, low) for sum_, low, high in zip(
+            total, away[order] / 2.0, reach, strict=True) if 6.0 * tolerance_mm / sum_ < high)  # fmt: skip
+        found.append(min(width, 3.0, place, whole - place))
+    return np.array(found)
+
+
+def shortest_time(driver: Path, folder: Path, count: int) -> tuple[str, list[float]]:
+    """Our time over that of an oracle on the same rounded path."""
+    sys.path.insert(0, str(HERE.parent / "oracles"))
+    from time_optimal import Limits as OracleLimits, rounded_polyline, time_optimal
+
+    ratios, kept = [], []
+    for seed in range(count):
+        route, limits, tolerance_mm = random_route(seed)
+        points, _ = ours(driver, route, limits, folder / "ours", "plan", tolerance=tolerance_mm)
+        found = figures(points, limits, route)
+        kept += [found.speed, found.acceleration, found.jerk, found.off_mm / tolerance_mm]
+        corners = np.vstack([route.start, [piece.end for piece in route.pieces]])
+        oracle = time_optimal(
+            rounded_polyline(corners, half_widths(route, tolerance_mm)),
+            OracleLimits(
+                np.array(limits.feed), np.array(limits.acceleration), np.array(limits.jerk),
+                feed=lambda p, feed=route.pieces[0].feed: np.full(len(p), feed),
+            ),
+        )  # fmt: skip
+        ratios.append(found.time_s / oracle.time_s)
+    shares = np.percentile(ratios, [50, 90, 100])
+    text = markdown(
+        ["paths", "median", "90 % below", "worst", "largest share of a limit or the tolerance"],
+        [[str(count), *(f"{share:.3f}" for share in shares), f"{max(kept):.4f}"]],
+    )
+    return text, [*kept, shares[0] / ASKED_MEDIAN, shares[2] / ASKED_WORST]
 
 
 def fine_blocks() -> str:
@@ -291,6 +372,7 @@ def main() -> int:
             "Single moves": lambda: single_moves(driver, peers, folder, 3 if arguments.quick else 20),
             "Small arcs": lambda: small_arcs(driver, peers, folder),
             "Programs": lambda: programs(driver, peers, folder),
+            "Beside the shortest time": lambda: shortest_time(driver, folder, 20 if arguments.quick else 200),
             "Window of the look-ahead": lambda: windows(driver, folder, arguments.quick),
             "Random paths": lambda: random_paths(driver, 500 if arguments.quick else 10_000),
         }

@@ -30,6 +30,7 @@ FOLDERS = [
     "filter",
     "motion",
     "controller",
+    "planner",
     "program",
     "shaper",
     "plant",
@@ -43,8 +44,8 @@ FOLDERS = [
     "c",
 ]
 NOT_FROM = {
-    "program": {"filter", "motion", "controller"},
-    "measure": {"filter", "motion", "controller", "program", "shaper", "plant"},
+    "program": {"filter", "motion", "controller", "planner"},
+    "measure": {"filter", "motion", "controller", "planner", "program", "shaper", "plant"},
 }
 # Public headers whose folder of sources has another name; one that is named like a folder, or lies in it, is its own.
 HEADER_FOLDERS = {

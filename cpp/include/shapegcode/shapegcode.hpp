@@ -32,6 +32,7 @@
 #include "shapegcode/mode.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/path.hpp"
+#include "shapegcode/planner.hpp"
 #include "shapegcode/plant/feed_drive.hpp"
 #include "shapegcode/plant/linear_plant.hpp"
 #include "shapegcode/plant/modal.hpp"

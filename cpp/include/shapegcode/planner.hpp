@@ -1,0 +1,26 @@
+#pragma once
+
+#include "shapegcode/path.hpp"
+#include "shapegcode/samples.hpp"
+
+namespace shapegcode {
+
+/// What a time-optimal trajectory keeps.
+struct TrajectoryLimits {
+  Vector3 max_feed_mm_per_s = Vector3::Constant(250.0);
+  Vector3 max_acceleration_mm_per_s2 = Vector3::Constant(1000.0);
+  Vector3 max_jerk_mm_per_s3 = Vector3::Constant(50'000.0);
+  /// By which the path may be left where its direction or its curvature jumps: there it is rounded. 0: the motion comes
+  /// to rest there instead.
+  double contour_tolerance_mm = 0.05;
+};
+
+/// Set-points of a whole path from rest to rest, one per period: nearly as fast as speed, acceleration and jerk of
+/// every axis and the programmed feeds allow. Limits hold for the differences of the set-points (1.001), the end is
+/// reached to the last bit, and the motion rests at segments with `stop_at_end`. How: docs/concepts/time_optimal.md.
+///
+/// Throws Error(argument) on limits that are not above zero and finite, a tolerance below zero, a segment without a
+/// feed, or more set-points than can be numbered; Error(numeric) if the limits cannot be kept.
+[[nodiscard]] Samples time_optimal_trajectory(const Path& path, const TrajectoryLimits& limits, double period_s);
+
+}  // namespace shapegcode

@@ -1,0 +1,361 @@
+#include "planner/controllable_set.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shapegcode {
+namespace {
+
+// Smaller coefficients of c than this (of the tangent: per mm) are none.
+constexpr double no_coefficient = 1e-9;
+// Squares of speeds below this are rest, mm^2/s^2.
+constexpr double at_rest = 1e-12;
+// Where in an interval the jerk is looked at: so that its parabola passes by no more at the ends than in the middle.
+constexpr std::array<double, 2> looked_at{0.15, 0.85};
+// And the acceleration, beside both ends.
+constexpr std::array<double, 2> accelerations_at{0.25, 0.75};
+// Share of the acceleration that a valley may be passed with.
+constexpr double valley_share = 0.02;
+// Of the hardest braking, where the lower bound of the speed is laid.
+constexpr std::array<double, 2> braking_tangents{0.6, 1.0};
+// Share of the highest square of the speed that is expected at least.
+constexpr double least_expected = 1e-4;
+// Share of the jerk for the last interval before a stop: the rest is for landing in whole periods.
+constexpr double stopping_share = 0.85;
+
+// A polygon while it is cut.
+class Polygon {
+ public:
+  void add(double b, double a) noexcept {
+    b_[count_] = b;
+    a_[count_++] = a;
+  }
+  [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
+
+  // Keeps what has on_b b + on_a a <= most.
+  void cut(double on_b, double on_a, double most) noexcept {
+    std::array<double, room> beyond;
+    bool cuts = false;
+    for (std::size_t i = 0; i < count_; ++i) {
+      beyond[i] = on_b * b_[i] + on_a * a_[i] - most;
+      cuts = cuts || beyond[i] > 0.0;
+    }
+    if (!cuts) return;
+    Polygon kept;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const std::size_t next = i + 1 == count_ ? 0 : i + 1;
+      if (beyond[i] <= 0.0) kept.add(b_[i], a_[i]);
+      if ((beyond[i] < 0.0 && beyond[next] > 0.0) || (beyond[i] > 0.0 && beyond[next] < 0.0)) {
+        const double share = beyond[i] / (beyond[i] - beyond[next]);
+        kept.add(b_[i] + share * (b_[next] - b_[i]), a_[i] + share * (a_[next] - a_[i]));
+      }
+    }
+    if (kept.count_ > limit) kept.simplify(limit);
+    *this = kept;
+  }
+
+  // Corners are left out where that costs the least area: what remains lies within.
+  void simplify(std::size_t most) noexcept {
+    while (count_ > most) {
+      std::size_t fastest = 0;
+      for (std::size_t i = 1; i < count_; ++i) {
+        if (b_[i] > b_[fastest] || (b_[i] == b_[fastest] && a_[i] > a_[fastest])) fastest = i;
+      }
+      std::size_t least_at = 0;
+      double least = std::numeric_limits<double>::infinity();
+      for (std::size_t i = 0; i < count_; ++i) {
+        // Without these a motion could not begin, or not go on at its highest speed.
+        if (b_[i] <= at_rest || i == fastest) continue;
+        const std::size_t before = i == 0 ? count_ - 1 : i - 1;
+        const std::size_t after = i + 1 == count_ ? 0 : i + 1;
+        const double area =
+            std::abs((b_[i] - b_[before]) * (a_[after] - a_[before]) - (a_[i] - a_[before]) * (b_[after] - b_[before]));
+        if (area < least) {
+          least = area;
+          least_at = i;
+        }
+      }
+      for (std::size_t i = least_at; i + 1 < count_; ++i) {
+        b_[i] = b_[i + 1];
+        a_[i] = a_[i + 1];
+      }
+      --count_;
+    }
+  }
+
+  [[nodiscard]] ControllableSet set() const noexcept {
+    ControllableSet set;
+    set.count = count_;
+    std::copy_n(b_.begin(), count_, set.b.begin());
+    std::copy_n(a_.begin(), count_, set.a.begin());
+    return set;
+  }
+
+ private:
+  // Convex: a cut adds one corner at most. Rounding may add some more.
+  static constexpr std::size_t limit = 28;
+  static constexpr std::size_t room = 2 * limit;
+  std::size_t count_ = 0;
+  std::array<double, room> b_, a_;
+};
+
+// Bounds of c that are linear in the state.
+struct Bound {
+  double constant = 0.0, on_b = 0.0, on_a = 0.0;
+};
+
+class Bounds {
+ public:
+  // A row either bounds c or cuts the polygon itself.
+  void add(const Row& row, double none, Polygon& polygon) noexcept {
+    if (std::abs(row.on_c) <= none) {
+      polygon.cut(row.on_b, row.on_a, row.most);
+      return;
+    }
+    const Bound bound{row.most / row.on_c, -row.on_b / row.on_c, -row.on_a / row.on_c};
+    if (row.on_c > 0.0) {
+      upper_[n_upper_++] = bound;
+    } else {
+      lower_[n_lower_++] = bound;
+    }
+  }
+  // States for which some c is left.
+  void cut(Polygon& polygon) const noexcept {
+    for (std::size_t u = 0; u < n_upper_; ++u) {
+      for (std::size_t l = 0; l < n_lower_; ++l) {
+        polygon.cut(lower_[l].on_b - upper_[u].on_b, lower_[l].on_a - upper_[u].on_a,
+                    upper_[u].constant - lower_[l].constant);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::size_t most = Rows::most + ControllableSet::max_corners;
+  std::array<Bound, most> upper_, lower_;
+  std::size_t n_upper_ = 0, n_lower_ = 0;
+};
+
+// An edge of a set as a row at the begin of an interval of this length.
+Row edge_row(const ControllableSet& set, std::size_t i, double length) noexcept {
+  const std::size_t next = i + 1 == set.count ? 0 : i + 1;
+  const double on_b = set.a[next] - set.a[i];
+  const double on_a = set.b[i] - set.b[next];
+  return {on_b * length * length + on_a * length, on_b, 2.0 * length * on_b + on_a, on_b * set.b[i] + on_a * set.a[i]};
+}
+
+// 1 / sqrt(b) is above its tangent: a bound of the jerk that is linear in b, and safe wherever it is laid.
+struct Tangent {
+  double constant, on_b;
+  explicit Tangent(double b) noexcept {
+    const double inverse = 1.0 / std::sqrt(std::max(b, at_rest));
+    constant = 1.5 * inverse;
+    on_b = 0.5 * inverse * inverse * inverse;
+  }
+};
+
+// |first c + 3 second a + third b| <= jerk / v, at x mm behind the begin.
+struct Bend {
+  double first, second, third;
+};
+void add_jerk(const Bend& path, double jerk, const Tangent& tangent, double x, Rows& rows) noexcept {
+  for (const double sign : {-1.0, 1.0}) {
+    const double on_b = sign * path.third + jerk * tangent.on_b;
+    const double on_a = sign * 3.0 * path.second;
+    rows.add({sign * path.first + x * (on_a + x * on_b), on_b, on_a + 2.0 * x * on_b, jerk * tangent.constant});
+  }
+}
+
+}  // namespace
+
+void ControllableSets::rows_of(const Station& station, const PlannedSegment& segment, const Stretch& stretch,
+                               Rows& rows) const noexcept {
+  const auto& [x, length, b_begin, b_end, cap] = stretch;
+  const AxisLimits limits = limits_.share(station.share);
+  rows.count = 0;
+  for (const double share : looked_at) {
+    const double at = share * length;
+    const Tangent tangent(b_begin + share * (b_end - b_begin));
+    if (station.straight) {
+      add_jerk({1.0, 0.0, 0.0}, station.straight_jerk, tangent, at, rows);
+      continue;
+    }
+    const Derivatives path = derivatives_at(station, segment, x + at);
+    for (std::size_t i = 0; i < axis_count; ++i) {
+      if (path.first[i] == 0.0 && path.second[i] == 0.0 && path.third[i] == 0.0) continue;
+      add_jerk({path.first[i], path.second[i], path.third[i]}, limits.jerk[i], tangent, at, rows);
+    }
+  }
+  const double middle = 0.5 * length;
+  rows.add({middle * middle, 1.0, 2.0 * middle, cap});
+  if (station.straight) return;
+  for (const double share : accelerations_at) {
+    const double at = share * length;
+    const Derivatives path = derivatives_at(station, segment, x + at);
+    for (std::size_t i = 0; i < axis_count; ++i) {
+      if (path.first[i] == 0.0 && path.second[i] == 0.0) continue;
+      for (const double sign : {-1.0, 1.0}) {
+        const double on_b = sign * path.second[i];
+        const double on_a = sign * path.first[i];
+        rows.add({at * (on_a + at * on_b), on_b, on_a + 2.0 * at * on_b, limits.acceleration[i]});
+      }
+    }
+  }
+}
+
+Range ControllableSets::leading_to(const ControllableSet& next, PathState state, double length) noexcept {
+  Range range;
+  for (std::size_t i = 0; i < next.count; ++i) {
+    const Row row = edge_row(next, i, length);
+    const double left = row.most - row.on_b * state.speed_squared - row.on_a * state.acceleration;
+    if (row.on_c > 0.0) {
+      range.high = std::min(range.high, left / row.on_c);
+    } else if (row.on_c < 0.0) {
+      range.low = std::max(range.low, left / row.on_c);
+    }
+  }
+  return range;
+}
+
+Range ControllableSets::within(const Rows& rows, PathState state, Range range) noexcept {
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    const Row& row = rows.rows[i];
+    const double left = row.most - row.on_b * state.speed_squared - row.on_a * state.acceleration;
+    if (row.on_c > no_coefficient) {
+      range.high = std::min(range.high, left / row.on_c);
+    } else if (row.on_c < -no_coefficient) {
+      range.low = std::max(range.low, left / row.on_c);
+    } else if (left < 0.0) {
+      range.low = std::numeric_limits<double>::infinity();
+    }
+  }
+  return range;
+}
+
+PathState ControllableSets::hardest_before(const Station& station, const PlannedSegment& segment, double cap,
+                                           PathState end) const noexcept {
+  const double h = station.length;
+  const double b = end.speed_squared - 2.0 * end.acceleration * h;  // with c = 0
+  Rows rows;
+  rows_of(station, segment, {0.0, h, b, end.speed_squared, std::max(cap, b)}, rows);
+  double c = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    const Row& row = rows.rows[i];
+    const double on_c = row.on_c + h * (h * row.on_b - row.on_a);
+    if (on_c > no_coefficient) c = std::min(c, (row.most - row.on_b * b - row.on_a * end.acceleration) / on_c);
+  }
+  if (!std::isfinite(c)) c = 0.0;
+  c = std::max(c, 0.0);
+  return {b + c * h * h, end.acceleration - c * h};
+}
+
+double ControllableSets::steady(const ControllableSet& set) noexcept {
+  double most = 0.0;
+  for (std::size_t i = 0; i < set.count; ++i) {
+    const std::size_t next = i + 1 == set.count ? 0 : i + 1;
+    if (set.a[i] == 0.0) most = std::max(most, set.b[i]);
+    if ((set.a[i] < 0.0 && set.a[next] > 0.0) || (set.a[i] > 0.0 && set.a[next] < 0.0)) {
+      const double share = set.a[i] / (set.a[i] - set.a[next]);
+      most = std::max(most, set.b[i] + share * (set.b[next] - set.b[i]));
+    }
+  }
+  return most;
+}
+
+namespace {
+
+// What is expected, if it is known, but not next to nothing.
+double near(double expected, double most) noexcept {
+  return expected >= 0.0 ? std::max(expected, least_expected * most) : most;
+}
+
+}  // namespace
+
+ControllableSet ControllableSets::before(const Station& station, const PlannedSegment& segment, const Making& making,
+                                         const ControllableSet& next) const noexcept {
+  const AxisLimits limits = limits_.share(station.share);
+  const double cap = making.cap;
+  const double length = station.length;
+  const Derivatives path = derivatives_at(station, segment, 0.0);
+  double b_most = 0.0;   // at the begin, with c = 0
+  double b_after = 0.0;  // at the end
+  for (std::size_t i = 0; i < next.count; ++i) {
+    b_most = std::max(b_most, next.b[i] - 2.0 * next.a[i] * length);
+    b_after = std::max(b_after, next.b[i]);
+  }
+  b_most = std::min(b_most, cap);
+  Polygon polygon;
+  const double steepest = along(path.first, limits.acceleration);
+  // On a curve what turns the path may leave more; the cuts below say how much.
+  const double widest = station.straight ? steepest : 4.0 * steepest;
+  polygon.add(0.0, -widest);
+  polygon.add(cap, -widest);
+  polygon.add(cap, widest);
+  polygon.add(0.0, widest);
+  if (std::isfinite(making.least_acceleration)) polygon.cut(0.0, -1.0, -making.least_acceleration);
+  if (station.valley) polygon.cut(0.0, 1.0, valley_share * steepest);
+  if (!station.straight) {
+    for (std::size_t i = 0; i < axis_count; ++i) {
+      if (path.first[i] == 0.0 && path.second[i] == 0.0) continue;
+      polygon.cut(path.second[i], path.first[i], limits.acceleration[i]);
+      polygon.cut(-path.second[i], -path.first[i], limits.acceleration[i]);
+    }
+  }
+  // Braking must end before the motion does: v >= a^2 / 2 j, so b >= a^4 / 4 j^2, by its tangents.
+  const double jerk = along(path.first, limits.jerk);
+  for (const double share : braking_tangents) {
+    const double a = -share * steepest;
+    const double v = a * a / (2.0 * jerk);
+    const double slope = 2.0 * v * a / jerk;
+    polygon.cut(-1.0, slope, slope * a - v * v);
+  }
+  Rows rows;
+  const Stretch whole{0.0, length, near(making.b_begin, b_most), near(making.b_end, b_after), cap};
+  rows_of(station, segment, whole, rows);
+  Bounds bounds;
+  for (std::size_t i = 0; i < rows.count; ++i) bounds.add(rows.rows[i], no_coefficient, polygon);
+  for (std::size_t i = 0; i < next.count; ++i) bounds.add(edge_row(next, i, length), 0.0, polygon);
+  bounds.cut(polygon);
+  polygon.simplify(ControllableSet::max_corners);
+  return polygon.set();
+}
+
+// Whether all axes keep the limits in this state with this jerk.
+bool ControllableSets::keeps(const Derivatives& path, PathState state, double jerk, const AxisLimits& limits) noexcept {
+  const double v = std::sqrt(state.speed_squared);
+  for (std::size_t i = 0; i < axis_count; ++i) {
+    const double acceleration = path.first[i] * state.acceleration + path.second[i] * state.speed_squared;
+    const double axis_jerk =
+        path.first[i] * jerk + v * (3.0 * path.second[i] * state.acceleration + path.third[i] * state.speed_squared);
+    if (std::abs(acceleration) > stopping_share * limits.acceleration[i]) return false;
+    if (std::abs(axis_jerk) > stopping_share * limits.jerk[i]) return false;
+  }
+  return true;
+}
+
+// A stop by constant jerk, and what is slower: v = j t^2 / 2, a = -j t, length = j t^3 / 6.
+ControllableSet ControllableSets::before_stop(const Station& station, const PlannedSegment& segment,
+                                              double cap) const noexcept {
+  const AxisLimits limits = limits_.share(station.share);
+  const double length = station.length;
+  const Derivatives path = derivatives_at(station, segment, 0.0);
+  const double steepest = along(path.first, limits.acceleration);
+  double jerk = stopping_share * along(path.first, limits.jerk);
+  // No steeper and no faster than may be: a^3 = 6 length j^2, v^3 = 4.5 j length^2.
+  jerk = std::min(jerk, std::sqrt(std::pow(stopping_share * steepest, 3.0) / (6.0 * length)));
+  jerk = std::min(jerk, std::pow(cap, 1.5) / (4.5 * length * length));
+  double b = 0.0;
+  double a = 0.0;
+  for (int n = 0; n < 40; ++n, jerk *= 0.8) {
+    b = std::pow(4.5 * jerk * length * length, 2.0 / 3.0);
+    a = -std::cbrt(6.0 * length * jerk * jerk);
+    if (station.straight || keeps(path, {b, a}, jerk, limits)) break;
+  }
+  Polygon polygon;
+  polygon.add(0.0, 0.0);
+  polygon.add(b, a);
+  // From rest, and to rest again: a^3 = 1.45 length j^2 at most.
+  polygon.add(0.0, 0.8 * std::cbrt(length * jerk * jerk));
+  return polygon.set();
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,306 @@
+#include "planner/rounded_path.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace shapegcode {
+namespace {
+
+// Widest rounding, mm.
+constexpr double widest_mm = 3.0;
+// Less is a stop: what could be passed at a crawl only.
+constexpr double narrowest_mm = 2e-4;
+// Intervals within a rounding: so many on its half-width. Closer breaks are passed over.
+constexpr double intervals_on_half = 8.0;
+constexpr double closest_on_half = 300.0;
+// An interval turns by no more on an arc.
+constexpr double radians_of_arc = 0.1;
+// Periods that an interval lasts at the programmed feed.
+constexpr double periods_of_interval = 4.0;
+// Towards a stop intervals shrink with the way that is left, down to what the jerk travels in so many periods.
+constexpr double share_before_stop = 0.4;
+constexpr double stopping_periods = 5.0;
+// Junctions that are looked at to each side.
+constexpr std::size_t lookahead = 16;
+// Nothing is shorter, mm.
+constexpr double shortest_mm = 1e-9;
+
+// The curve that rounds a jump of 1 of the first derivative over |u| <= 1, u = x / d: its second derivative is the
+// triangle of area 1. Times d.
+struct Rounding {
+  double position = 0.0, first = 0.0, second = 0.0, third = 0.0;
+};
+
+Rounding turn_rounding(double u, bool before) noexcept {
+  const double left = 1.0 - std::abs(u);
+  const double side = before ? 1.0 : -1.0;
+  return {left * left * left / 6.0, side * 0.5 * left * left, left, side};
+}
+
+// The same of a jump of 1 of the second derivative, times d^2: odd, linear in pieces, without area and first moment
+// against the jump, so that it is nothing beyond.
+Rounding bend_rounding(double u, bool before) noexcept {
+  const double side = before ? -1.0 : 1.0;
+  const double w = std::abs(u);
+  if (w >= 0.5) {
+    const double left = 1.0 - w;
+    return {side * left * left * left / 36.0, -left * left / 12.0, side * left / 6.0, -1.0 / 6.0};
+  }
+  return {side * w * (1.0 / 12.0 + w * (-0.25 + w * (7.0 / 36.0))), 1.0 / 12.0 + w * (-0.5 + w * (7.0 / 12.0)),
+          side * (w * (7.0 / 6.0) - 0.5), 7.0 / 6.0};
+}
+
+}  // namespace
+
+RoundedPath::RoundedPath(std::vector<PlannedSegment> segments, const AxisLimits& limits, double period_s)
+    : segments_(std::move(segments)), limits_(limits), period_s_(period_s) {
+  const double jerk = *std::ranges::min_element(limits.jerk);
+  const double time_s = stopping_periods * period_s;
+  stopping_length_ = jerk * time_s * time_s * time_s / 6.0;
+  for (std::size_t i = 0; i < segments_.size(); ++i) segments_[i].distance = starts_anew(i) ? 0.0 : end_of(i - 1);
+  for (std::size_t i = 0; i < segments_.size(); ++i) choose(i);
+}
+
+bool RoundedPath::starts_anew(std::size_t segment) const noexcept { return segment == 0 || segments_[segment].stop; }
+
+double RoundedPath::end_of(std::size_t segment) const noexcept {
+  const PlannedSegment& entry = segments_[segment];
+  return entry.distance + entry.segment.length_mm;
+}
+
+// As wide as a rounding may be whatever follows.
+double RoundedPath::widest(std::size_t junction) const noexcept {
+  const PlannedSegment& entry = segments_[junction];
+  double width = std::min(widest_mm, entry.distance);
+  std::size_t before = junction;
+  for (std::size_t n = 0; n < lookahead && !starts_anew(before); ++n) --before;
+  if (!starts_anew(before)) width = std::min(width, 0.5 * (entry.distance - segments_[before].distance));
+  const double share = entry.turn_share * width + entry.bend_share * width * width;
+  if (share > 1.0) {
+    const double half = 0.5 * entry.turn_share;
+    width = 1.0 / (half + std::sqrt(half * half + entry.bend_share));
+  }
+  return width;
+}
+
+// The largest half-width d for which the junctions within 2 d, rounded as widely, stay within the tolerance together:
+// whoever reaches a place is within 2 d of the widest that does.
+void RoundedPath::choose(std::size_t junction) noexcept {
+  PlannedSegment& entry = segments_[junction];
+  entry.half_width = 0.0;
+  entry.passed = starts_anew(junction) ? 0.0 : std::numeric_limits<double>::infinity();
+  if (starts_anew(junction) || (entry.turn_share <= 0.0 && entry.bend_share <= 0.0)) return;
+  double width = widest(junction);
+  double turn = entry.turn_share;
+  double bend = entry.bend_share;
+  std::size_t left = junction;
+  std::size_t right = junction;
+  while (true) {
+    // The nearest junction that has not been counted.
+    double to_left = std::numeric_limits<double>::infinity();
+    double to_right = to_left;
+    if (!starts_anew(left)) to_left = entry.distance - segments_[left - 1].distance;
+    const double end = end_of(right) - entry.distance;
+    if (ends_in_stop(right)) {
+      width = std::min(width, end);
+    } else if (right - junction >= lookahead) {
+      width = std::min(width, 0.5 * end);
+    } else {
+      to_right = end;
+    }
+    const double nearest = std::min(to_left, to_right);
+    if (nearest >= 2.0 * width) break;
+    const bool is_left = to_left <= to_right;
+    const std::size_t next = is_left ? --left : ++right;
+    if (starts_anew(next)) continue;  // at a stop nothing jumps that counts
+    turn += segments_[next].turn_share;
+    bend += segments_[next].bend_share;
+    const double half = 0.5 * turn;
+    const double within = 1.0 / (half + std::sqrt(half * half + bend));
+    if (within < width) width = std::max(within, 0.5 * nearest);
+    if (width <= 0.5 * nearest) break;
+  }
+  if (width < narrowest_mm) return stop_at(junction);
+  entry.half_width = width;
+  for (std::size_t i = 0; i < axis_count; ++i) {
+    const double jump = std::abs(entry.turn[i]) / width + std::abs(entry.bend[i]);
+    if (jump <= 0.0) continue;
+    entry.passed =
+        std::min({entry.passed, limits_.acceleration[i] / jump, std::pow(limits_.jerk[i] * width / jump, 2.0 / 3.0)});
+  }
+}
+
+// Distances count from there.
+void RoundedPath::stop_at(std::size_t junction) noexcept {
+  segments_[junction].stop = true;
+  segments_[junction].passed = 0.0;
+  double distance = 0.0;
+  for (std::size_t i = junction; i < segments_.size(); ++i) {
+    if (i > junction && starts_anew(i)) break;
+    segments_[i].distance = distance;
+    distance += segments_[i].segment.length_mm;
+  }
+}
+
+bool RoundedPath::ends_in_stop(std::size_t segment) const noexcept {
+  return segment + 1 == segments_.size() || starts_anew(segment + 1);
+}
+
+// How far it is to the next stop, as far as that matters.
+double RoundedPath::to_stop() const noexcept {
+  for (std::size_t i = segment_; segments_[i].distance <= x_ + 4.0 * widest_mm; ++i) {
+    if (ends_in_stop(i)) return end_of(i) - x_;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+// Every junction whose rounding may begin within the segment at hand or reach it.
+template <class See>
+void RoundedPath::see_roundings(const See& see) const noexcept {
+  const std::size_t last = std::min(segments_.size(), segment_ + lookahead + 2);
+  for (std::size_t i = segment_ + 1; i < last && !starts_anew(i); ++i) {
+    if (segments_[i].distance - x_ > 4.0 * widest_mm) break;
+    see(segments_[i], true);
+  }
+  std::size_t i = segment_;
+  for (std::size_t n = 0; n <= lookahead && !starts_anew(i); ++n, --i) {
+    if (x_ - segments_[i].distance > widest_mm) break;
+    see(segments_[i], false);
+  }
+}
+
+// The next place where the third derivative jumps.
+double RoundedPath::next_break() const noexcept {
+  double at = end_of(segment_);
+  double close = std::numeric_limits<double>::infinity();
+  see_roundings([&](const PlannedSegment& junction, bool) {
+    if (std::abs(x_ - junction.distance) < junction.half_width) {
+      close = std::min(close, junction.half_width / closest_on_half);
+    }
+  });
+  const double least = x_ + (close < std::numeric_limits<double>::infinity() ? close : shortest_mm);
+  see_roundings([&](const PlannedSegment& junction, bool) {
+    const double d = junction.half_width;
+    if (d <= 0.0) return;
+    for (const double u : {-1.0, -0.5, 0.5, 1.0}) {
+      if (std::abs(u) < 1.0 && junction.bend_share <= 0.0) continue;
+      const double place = junction.distance + u * d;
+      if (place > least && place < at) at = place;
+    }
+  });
+  return at;
+}
+
+// The square of the speed that the junctions around let a motion have.
+double RoundedPath::squared_speed() const noexcept {
+  const double gain = 2.0 * *std::min_element(limits_.acceleration.begin(), limits_.acceleration.end());
+  double squared = gain * x_;
+  see_roundings([&](const PlannedSegment& junction, bool) {
+    squared = std::min(squared, junction.passed + gain * std::abs(x_ - junction.distance));
+  });
+  return squared;
+}
+
+// How long an interval may be here.
+double RoundedPath::step() const noexcept {
+  const PlannedSegment& entry = segments_[segment_];
+  const Vector3 tangent = tangent_at(entry.segment, x_ - entry.distance);
+  double speed = std::min(entry.segment.feed_mm_per_s, along({tangent[0], tangent[1], tangent[2]}, limits_.speed));
+  double step = widest_mm;
+  if (entry.segment.kind == SegmentKind::arc) {
+    const double bend = curvature(entry.segment);
+    speed = std::min(speed, std::sqrt(*std::ranges::max_element(limits_.acceleration) / bend));
+    step = std::min(step, radians_of_arc / bend);
+  }
+  speed = std::min(speed, std::sqrt(squared_speed()));
+  step = std::clamp(periods_of_interval * period_s_ * speed, stopping_length_, step);
+  see_roundings([&](const PlannedSegment& junction, bool) {
+    const double d = junction.half_width;
+    if (d > 0.0 && x_ >= junction.distance - d - shortest_mm && x_ < junction.distance + d - shortest_mm) {
+      step = std::min(step, d / intervals_on_half);
+    }
+  });
+  return step;
+}
+
+bool RoundedPath::next(Station& station) noexcept {
+  if (segment_ == segments_.size()) return false;
+  double end = next_break();
+  double length = step();
+  const double left = to_stop();
+  if (left > stopping_length_ + shortest_mm) {
+    length = std::min(length, std::max(share_before_stop * (left - stopping_length_), stopping_length_));
+    end = std::min(end, x_ + left - stopping_length_);
+  }
+  const double room = end - x_;
+  if (length < room) end = x_ + room / std::ceil(room / length);
+  station = Station{};
+  station.distance = x_;
+  station.segment = segment_;
+  station.offset = x_ - segments_[segment_].distance;
+  fill(end - x_, station);
+  x_ = end;
+  if (x_ >= end_of(segment_) - shortest_mm) {
+    x_ = ends_in_stop(segment_) ? 0.0 : end_of(segment_);
+    ++segment_;
+  }
+  return true;
+}
+
+Derivatives RoundedPath::roundings_at(double x, AxisValues& position) const noexcept {
+  Derivatives sum;
+  see_roundings([&](const PlannedSegment& junction, bool ahead) {
+    const double d = junction.half_width;
+    if (d <= 0.0) return;
+    const double u = (x - junction.distance) / d;
+    if (std::abs(u) >= 1.0) return;
+    const Rounding turn = turn_rounding(u, ahead);
+    const Rounding bend = bend_rounding(u, ahead);
+    for (std::size_t i = 0; i < axis_count; ++i) {
+      position[i] += d * (junction.turn[i] * turn.position + junction.bend[i] * d * bend.position);
+      sum.first[i] += junction.turn[i] * turn.first + junction.bend[i] * d * bend.first;
+      sum.second[i] += junction.turn[i] * turn.second / d + junction.bend[i] * bend.second;
+      sum.third[i] += junction.turn[i] * turn.third / (d * d) + junction.bend[i] * bend.third / d;
+    }
+  });
+  return sum;
+}
+
+void RoundedPath::fill(double length, Station& station) const noexcept {
+  const PlannedSegment& entry = segments_[segment_];
+  station.length = length;
+  station.arc = entry.segment.kind == SegmentKind::arc;
+  station.speed_limit = entry.segment.feed_mm_per_s;
+  station.share = entry.limit_share;
+  station.stop = x_ <= 0.0;
+  if (station.offset <= shortest_mm) {
+    station.valley = entry.half_width > 0.0 &&
+                     entry.passed < entry.segment.feed_mm_per_s * entry.segment.feed_mm_per_s &&
+                     entry.passed <= squared_speed();
+  }
+  AxisValues position{};
+  const Derivatives begin = roundings_at(x_, position);
+  AxisValues unused{};
+  const Derivatives end = roundings_at(x_ + length, unused);
+  bool rounded = false;
+  for (std::size_t i = 0; i < axis_count; ++i) {
+    station.position[i] = position[i];
+    station.first[i] = begin.first[i];
+    station.second[i] = begin.second[i];
+    station.third[i] = (end.second[i] - begin.second[i]) / length;
+    rounded = rounded || begin.second[i] != 0.0 || end.second[i] != 0.0;
+  }
+  if (!station.arc) {
+    const Vector3 point = point_at(entry.segment, station.offset);
+    const Vector3 tangent = tangent_at(entry.segment, 0.0);
+    for (std::size_t i = 0; i < axis_count; ++i) {
+      station.position[i] += point[static_cast<Eigen::Index>(i)];
+      station.first[i] += tangent[static_cast<Eigen::Index>(i)];
+    }
+  }
+  station.straight = !station.arc && !rounded;
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,61 @@
+#include "planner/stations.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shapegcode {
+namespace {
+
+// Of an axis that does not move.
+constexpr double no_share = 1e-9;
+
+// What an arc adds to the cubic: it turns by the same angle for every mm.
+void add_arc(const Segment& arc, double s_mm, Derivatives& derivatives) noexcept {
+  const Vector3 tangent = tangent_at(arc, s_mm);
+  const Vector3 point = point_at(arc, s_mm);
+  const double turning = arc.sweep_rad / arc.length_mm;
+  for (std::size_t i = 0; i < axis_count; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    derivatives.first[i] += tangent[axis];
+    if (axis == arc.normal) continue;
+    derivatives.second[i] -= turning * turning * (point[axis] - arc.centre_mm[axis]);
+    derivatives.third[i] -= turning * turning * tangent[axis];
+  }
+}
+
+}  // namespace
+
+double along(const AxisValues& direction, const AxisValues& limits) noexcept {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < axis_count; ++i) {
+    const double share = std::abs(direction[i]);
+    if (share > no_share) least = std::min(least, limits[i] / share);
+  }
+  return least;
+}
+
+Derivatives derivatives_at(const Station& station, const PlannedSegment& segment, double x) noexcept {
+  Derivatives derivatives;
+  for (std::size_t i = 0; i < axis_count; ++i) {
+    derivatives.first[i] = station.first[i] + x * (station.second[i] + 0.5 * x * station.third[i]);
+    derivatives.second[i] = station.second[i] + x * station.third[i];
+    derivatives.third[i] = station.third[i];
+  }
+  if (station.arc) add_arc(segment.segment, station.offset + x, derivatives);
+  return derivatives;
+}
+
+AxisValues position_at(const Station& station, const PlannedSegment& segment, double x) noexcept {
+  AxisValues position{};
+  for (std::size_t i = 0; i < axis_count; ++i) {
+    position[i] = station.position[i] +
+                  x * (station.first[i] + x * (0.5 * station.second[i] + x * station.third[i] * (1.0 / 6.0)));
+  }
+  if (station.arc) {
+    const Vector3 point = point_at(segment.segment, station.offset + x);
+    for (std::size_t i = 0; i < axis_count; ++i) position[i] += point[static_cast<Eigen::Index>(i)];
+  }
+  return position;
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,57 @@
+// The path as the planner has it: intervals between stations, with all derivatives by the path parameter.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+
+#include "planner/segments.hpp"
+
+namespace shapegcode {
+
+/// Limits of every axis, all finite.
+struct AxisLimits {
+  AxisValues speed{}, acceleration{}, jerk{};
+  /// So much of acceleration and jerk.
+  [[nodiscard]] AxisLimits share(double share) const noexcept {
+    AxisLimits less = *this;
+    for (std::size_t i = 0; i < axis_count; ++i) {
+      less.acceleration[i] *= share;
+      less.jerk[i] *= share;
+    }
+    return less;
+  }
+};
+
+/// The limit of a motion along a direction.
+[[nodiscard]] double along(const AxisValues& direction, const AxisValues& limits) noexcept;
+
+/// First to third derivative of the positions by the path parameter, which is the length of the programmed path.
+struct Derivatives {
+  AxisValues first{}, second{}, third{};
+};
+
+/// A place of the path and the interval from there to the next one, on which the position of every axis is a cubic: of
+/// an arc, what is added to the arc.
+struct Station {
+  double distance = 0.0;  ///< since the last stop
+  double length = 0.0;    ///< of the interval
+  double offset = 0.0;    ///< from the start of the segment
+  std::size_t segment = 0;
+  bool stop = false;  ///< the motion comes to rest here, and goes on when all that follows is at rest
+  bool arc = false;
+  bool valley = false;                                      ///< the slowest place around: braking is over here
+  bool straight = false;                                    ///< a line that no rounding reaches
+  double speed_limit = 0.0;                                 ///< of the interval: feed and axes
+  double share = 1.0;                                       ///< of acceleration and jerk that is planned here
+  double straight_acceleration = 0.0, straight_jerk = 0.0;  ///< of a straight one
+  AxisValues position{}, first{}, second{}, third{};        ///< at its begin
+
+  [[nodiscard]] double squared_limit() const noexcept { return speed_limit * speed_limit; }
+};
+
+/// Derivatives at `x` mm behind a station.
+[[nodiscard]] Derivatives derivatives_at(const Station& station, const PlannedSegment& segment, double x) noexcept;
+/// Position there.
+[[nodiscard]] AxisValues position_at(const Station& station, const PlannedSegment& segment, double x) noexcept;
+
+}  // namespace shapegcode

@@ -1,0 +1,180 @@
+#include "shapegcode/planner.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "base/checks.hpp"
+#include "base/refuse.hpp"
+#include "planner/path_motion.hpp"
+#include "planner/path_plan.hpp"
+#include "planner/segments.hpp"
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+// What rounding a jump of a derivative over the half-width d to both sides takes off the path: of the direction, times
+// d, and of the second derivative, times d^2.
+constexpr double turn_deviation = 1.0 / 6.0;
+constexpr double bend_deviation = 1.0 / 120.0;
+// Jumps of a derivative that are rounding of coordinates.
+constexpr double no_jump = 1e-9;
+// Share of acceleration and jerk that is planned. Between the places where an interval is looked at the limits may be
+// passed by a little: then less is planned around there, at least so much of it.
+constexpr double planned_share = 0.9998;
+constexpr double kept = 1.0005;
+constexpr double most_less = 0.7;
+constexpr int most_plans = 24;
+
+// Second derivative of a segment by the distance: towards the centre of an arc.
+Vector3 bend_at(const Segment& segment, double s_mm) noexcept {
+  if (segment.kind != SegmentKind::arc) return Vector3::Zero();
+  const double turning = segment.sweep_rad / segment.length_mm;
+  Vector3 inwards = segment.centre_mm - point_at(segment, s_mm);
+  inwards[segment.normal] = 0.0;
+  return turning * turning * inwards;
+}
+
+double size_of(const Vector3& jump) noexcept {
+  const double size = jump.norm();
+  return size > no_jump ? size : 0.0;
+}
+
+std::vector<PlannedSegment> planned_segments(const Path& path, double tolerance_mm) {
+  std::vector<PlannedSegment> segments;
+  segments.reserve(path.size());
+  for (const Segment& segment : path.segments()) {
+    if (!(segment.feed_mm_per_s > 0.0) || !std::isfinite(segment.feed_mm_per_s)) {
+      throw Error(ErrorKind::argument, "segment without a feed greater than zero", segment.line);
+    }
+    if (!(segment.length_mm > 0.0)) {
+      if (!segments.empty()) segments.back().segment.stop_at_end |= segment.stop_at_end;
+      continue;
+    }
+    PlannedSegment planned;
+    planned.segment = segment;
+    if (!segments.empty()) {
+      const Segment& before = segments.back().segment;
+      planned.stop = before.stop_at_end;
+      const Vector3 turn = tangent_at(segment, 0.0) - tangent_at(before, before.length_mm);
+      const Vector3 bend = bend_at(segment, 0.0) - bend_at(before, before.length_mm);
+      std::copy_n(turn.data(), axis_count, planned.turn.begin());
+      std::copy_n(bend.data(), axis_count, planned.bend.begin());
+      const double turned = size_of(turn);
+      const double bent = size_of(bend);
+      if (turned > 0.0) planned.turn_share = turn_deviation * turned / tolerance_mm;
+      if (bent > 0.0) planned.bend_share = bend_deviation * bent / tolerance_mm;
+    }
+    segments.push_back(planned);
+  }
+  return segments;
+}
+
+// Set-points, and the segment of each.
+struct Run {
+  std::vector<Vector3> points;
+  std::vector<std::size_t> segments;
+};
+
+Run run(const std::vector<PlannedSegment>& segments, const AxisLimits& limits, double period_s) {
+  const PathPlan plan(segments, limits, period_s);
+  PathMotion motion(plan, period_s);
+  Run run{{segments.front().segment.start_mm}, {0}};
+  while (!motion.at_end()) {
+    motion.advance();
+    const AxisValues position = motion.position();
+    run.points.emplace_back(position[0], position[1], position[2]);
+    run.segments.push_back(motion.segment());
+    static_cast<void>(require_count(static_cast<double>(run.points.size()), max_set_points, "a path", "set-points"));
+  }
+  run.points.back() = segments.back().segment.end_mm;
+  return run;
+}
+
+double largest(const Vector3& value, const Vector3& limit) noexcept {
+  return value.cwiseAbs().cwiseQuotient(limit).maxCoeff();
+}
+
+// Largest differences of the set-points over the limits. Where acceleration or jerk are beyond them, less is planned on
+// the segments around.
+double worst_of(const Run& run, const TrajectoryLimits& limits, double period_s, std::vector<PlannedSegment>& segments,
+                double& feed_share) {
+  const std::ptrdiff_t last = std::ssize(run.points) - 1;
+  const auto index = [last](std::ptrdiff_t k) {
+    return static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last));
+  };
+  const auto at = [&](std::ptrdiff_t k) -> const Vector3& { return run.points[index(k)]; };
+  std::vector<double> share(segments.size(), 1.0);
+  double fastest = 0.0;
+  double worst = 0.0;
+  for (std::ptrdiff_t k = 1; k <= last + 3; ++k) {
+    const Vector3 speed = (at(k) - at(k - 1)) / period_s;
+    const Vector3 acceleration = (at(k) - 2.0 * at(k - 1) + at(k - 2)) / (period_s * period_s);
+    const Vector3 jerk = (at(k) - 3.0 * at(k - 1) + 3.0 * at(k - 2) - at(k - 3)) / (period_s * period_s * period_s);
+    // A coordinate is rounded: what its last bits do to a difference is no motion.
+    const double rounded = 8.0 * at(k).cwiseAbs().maxCoeff() * std::numeric_limits<double>::epsilon();
+    const Vector3 noise = Vector3::Constant(rounded / (period_s * period_s * period_s));
+    fastest = std::max(fastest, largest(speed, limits.max_feed_mm_per_s));
+    const double beyond = std::max(largest(acceleration, limits.max_acceleration_mm_per_s2),
+                                   largest((jerk.cwiseAbs() - noise).cwiseMax(0.0), limits.max_jerk_mm_per_s3));
+    worst = std::max(worst, beyond);
+    if (beyond <= kept) continue;
+    const std::size_t first = run.segments[index(k - 4)];
+    const std::size_t end = std::min(segments.size(), run.segments[index(k + 1)] + 2);
+    for (std::size_t i = first - std::min<std::size_t>(first, 1); i < end; ++i) {
+      share[i] = std::min(share[i], std::max(most_less, 1.0 / beyond));
+    }
+  }
+  for (std::size_t i = 0; i < segments.size(); ++i) segments[i].limit_share *= share[i];
+  if (fastest > kept) feed_share /= fastest;
+  return std::max(worst, fastest);
+}
+
+void check(const TrajectoryLimits& limits, double period_s) {
+  require_period(period_s);
+  require_not_below_zero(limits.contour_tolerance_mm, "contour tolerance", "mm");
+  for (int i = 0; i < axis_count; ++i) {
+    require_above_zero(limits.max_feed_mm_per_s[i], "axis feed limit", "mm/s");
+    require_above_zero(limits.max_acceleration_mm_per_s2[i], "axis acceleration limit", "mm/s2");
+    require_above_zero(limits.max_jerk_mm_per_s3[i], "axis jerk limit", "mm/s3");
+  }
+}
+
+}  // namespace
+
+Samples time_optimal_trajectory(const Path& path, const TrajectoryLimits& limits, double period_s) {
+  check(limits, period_s);
+  std::vector<PlannedSegment> segments = planned_segments(path, limits.contour_tolerance_mm);
+  Samples samples;
+  samples.period_s = period_s;
+  if (segments.empty()) {
+    samples.positions_mm.resize(0, axis_count);
+    return samples;
+  }
+  double feed_share = 1.0;
+  for (int n = 0; n < most_plans; ++n) {
+    AxisLimits axes;
+    for (std::size_t i = 0; i < axis_count; ++i) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      axes.speed[i] = feed_share * limits.max_feed_mm_per_s[axis];
+      axes.acceleration[i] = planned_share * limits.max_acceleration_mm_per_s2[axis];
+      // No more than what changes the acceleration within a period.
+      axes.jerk[i] = std::min(planned_share * limits.max_jerk_mm_per_s3[axis], axes.acceleration[i] / period_s);
+    }
+    const Run found = run(segments, axes, period_s);
+    if (worst_of(found, limits, period_s, segments, feed_share) > kept) continue;
+    samples.positions_mm.resize(std::ssize(found.points), axis_count);
+    for (std::size_t k = 0; k < found.points.size(); ++k) {
+      samples.positions_mm.row(static_cast<Eigen::Index>(k)) = found.points[k];
+    }
+    return samples;
+  }
+  throw Error(ErrorKind::numeric, "no motion within the limits was found");
+}
+
+}  // namespace shapegcode
