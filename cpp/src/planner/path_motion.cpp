@@ -14,14 +14,14 @@ constexpr double rounding = 1e-9;
 constexpr int candidates = 12;
 constexpr int halvings = 14;
 // So many landings are tried, each a little longer, and within so many stopping lengths.
-constexpr int landings = 48;
+constexpr int landings = 96;
 constexpr double landing_lengths = 40.0;
 // What a landing may be beyond the limits.
 constexpr double landing_rounding = 5e-4;
 // What is tried where no landing keeps them.
 constexpr double first_excess = 1.1;
 constexpr double next_excess = 1.5;
-constexpr double last_excess = 1e6;
+constexpr double last_excess = 16.0;
 // Where in a period the jerk is looked at, by its length.
 constexpr std::array<double, 4> jerk_looked_at{0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0};
 // How near an end is it.
@@ -215,7 +215,7 @@ bool PathMotion::land(double way, double excess) noexcept {
   // No shorter than with a jerk that is constant.
   const double shortest_s = 0.5 * std::max(std::abs(a) / most_jerk, std::cbrt(6.0 * way / most_jerk));
   int periods = std::max(3, static_cast<int>(shortest_s / period_s_));
-  for (int n = 0; n < landings; ++n, periods += 1 + periods / 32) {
+  for (int n = 0; n < landings; ++n, periods += 1 + periods / (n < landings / 3 ? 32 : 8)) {
     Landing found;
     found.periods = {periods / 3, periods - 2 * (periods / 3), periods / 3};
     std::array<double, 3> time{};
@@ -279,7 +279,7 @@ void PathMotion::move(double jerk, double time_s) noexcept {
   acceleration_ += jerk * t;
   jerk_ = jerk;
   pass(way);
-  if (t < time_s) speed_ = acceleration_ = jerk_ = 0.0;
+  if (t < time_s || (speed_ <= 0.0 && acceleration_ < 0.0)) speed_ = acceleration_ = jerk_ = 0.0;
 }
 
 void PathMotion::come_to_rest() noexcept {
@@ -318,7 +318,10 @@ void PathMotion::follow() noexcept {
   double rest = period_s_;
   while (rest > rounding * period_s_) {
     const double left = plan_->station(station_).length - offset_;
-    if (plan_->ends_in_stop(station_) || left <= 0.0) return move(0.0, rest);  // a landing begins with a period
+    if (plan_->ends_in_stop(station_)) {
+      // A landing begins with a period; none was found where the end is reached.
+      return left <= at_end_mm ? come_to_rest() : move(0.0, rest);
+    }
     const PathState state{speed_ * speed_, acceleration_};
     const double c = course(left, state);
     if (acceleration_ < 0.0 && -acceleration_ < c * left && acceleration_ * acceleration_ > c * state.speed_squared) {
@@ -346,6 +349,8 @@ void PathMotion::follow() noexcept {
     jerk_ = c * speed_;
     pass(way);
     rest -= t;
+    // There is no way back.
+    if (speed_ <= 0.0 && acceleration_ < 0.0) acceleration_ = 0.0;
   }
 }
 

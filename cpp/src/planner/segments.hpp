@@ -18,6 +18,7 @@ struct PlannedSegment {
   AxisValues bend{};         ///< jump of the second derivative, 1/mm
   double turn_share = 0.0;   ///< of the tolerance, per mm of the half-width of its rounding
   double bend_share = 0.0;   ///< the same per mm^2
+  double programmed = 0.0;   ///< feed; that of the segment is the one that is planned, mm/s
   double limit_share = 1.0;  ///< of acceleration and jerk that is planned on it
 
   double distance = 0.0;    ///< of its start, since the last stop

@@ -28,8 +28,13 @@ constexpr double no_jump = 1e-9;
 // passed by a little: then less is planned around there, at least so much of it.
 constexpr double planned_share = 0.9998;
 constexpr double kept = 1.0005;
+constexpr double kept_feed = 1.0009;
 constexpr double most_less = 0.7;
+constexpr double least_share = 0.3;
 constexpr int most_plans = 24;
+// A motion that gets on by less in so many periods does not end.
+constexpr std::size_t progress_periods = 4096;
+constexpr double progress_mm = 1e-6;
 
 // Second derivative of a segment by the distance: towards the centre of an arc.
 Vector3 bend_at(const Segment& segment, double s_mm) noexcept {
@@ -58,6 +63,7 @@ std::vector<PlannedSegment> planned_segments(const Path& path, double tolerance_
     }
     PlannedSegment planned;
     planned.segment = segment;
+    planned.programmed = segment.feed_mm_per_s;
     if (!segments.empty()) {
       const Segment& before = segments.back().segment;
       planned.stop = before.stop_at_end;
@@ -75,22 +81,30 @@ std::vector<PlannedSegment> planned_segments(const Path& path, double tolerance_
   return segments;
 }
 
-// Set-points, and the segment of each.
+// Set-points, and the segment of each; `ends`: at the end of the path.
 struct Run {
   std::vector<Vector3> points;
   std::vector<std::size_t> segments;
+  bool ends = true;
 };
 
 Run run(const std::vector<PlannedSegment>& segments, const AxisLimits& limits, double period_s) {
   const PathPlan plan(segments, limits, period_s);
   PathMotion motion(plan, period_s);
   Run run{{segments.front().segment.start_mm}, {0}};
+  Vector3 seen = run.points.back();
   while (!motion.at_end()) {
     motion.advance();
     const AxisValues position = motion.position();
     run.points.emplace_back(position[0], position[1], position[2]);
     run.segments.push_back(motion.segment());
     static_cast<void>(require_count(static_cast<double>(run.points.size()), max_set_points, "a path", "set-points"));
+    if (run.points.size() % progress_periods != 0) continue;
+    if ((run.points.back() - seen).norm() < progress_mm) {
+      run.ends = false;
+      return run;
+    }
+    seen = run.points.back();
   }
   run.points.back() = segments.back().segment.end_mm;
   return run;
@@ -110,6 +124,7 @@ double worst_of(const Run& run, const TrajectoryLimits& limits, double period_s,
   };
   const auto at = [&](std::ptrdiff_t k) -> const Vector3& { return run.points[index(k)]; };
   std::vector<double> share(segments.size(), 1.0);
+  std::vector<double> slower = share;
   double fastest = 0.0;
   double worst = 0.0;
   for (std::ptrdiff_t k = 1; k <= last + 3; ++k) {
@@ -122,7 +137,17 @@ double worst_of(const Run& run, const TrajectoryLimits& limits, double period_s,
     fastest = std::max(fastest, largest(speed, limits.max_feed_mm_per_s));
     const double beyond = std::max(largest(acceleration, limits.max_acceleration_mm_per_s2),
                                    largest((jerk.cwiseAbs() - noise).cwiseMax(0.0), limits.max_jerk_mm_per_s3));
+    const std::size_t now = run.segments[index(k)];
+    const double feed = std::max(segments[run.segments[index(k - 1)]].programmed, segments[now].programmed);
+    const double faster = speed.norm() / feed;
     worst = std::max(worst, beyond);
+    if (faster > kept_feed) {
+      worst = std::max(worst, faster);
+      for (const std::ptrdiff_t i : {k - 1, k}) {
+        double& less = slower[run.segments[index(i)]];
+        less = std::min(less, 1.0 / faster);
+      }
+    }
     if (beyond <= kept) continue;
     const std::size_t first = run.segments[index(k - 4)];
     const std::size_t end = std::min(segments.size(), run.segments[index(k + 1)] + 2);
@@ -130,7 +155,19 @@ double worst_of(const Run& run, const TrajectoryLimits& limits, double period_s,
       share[i] = std::min(share[i], std::max(most_less, 1.0 / beyond));
     }
   }
-  for (std::size_t i = 0; i < segments.size(); ++i) segments[i].limit_share *= share[i];
+  if (!run.ends) {
+    worst = std::numeric_limits<double>::infinity();
+    const std::size_t where = run.segments.back();
+    for (std::size_t i = where - std::min<std::size_t>(where, 1); i < std::min(segments.size(), where + 3); ++i) {
+      share[i] = most_less;
+    }
+  }
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    segments[i].limit_share *= share[i];
+    segments[i].segment.feed_mm_per_s *= slower[i];
+    // What is still beyond them when little is planned is run from rest to rest.
+    if (share[i] < 1.0 && i > 0 && segments[i].limit_share < least_share) segments[i].stop = true;
+  }
   if (fastest > kept) feed_share /= fastest;
   return std::max(worst, fastest);
 }
