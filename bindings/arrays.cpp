@@ -6,6 +6,11 @@
 
 namespace shapegcode::bindings {
 
+Vector3 each_axis(const PerAxis& value) {
+  return std::holds_alternative<double>(value) ? Vector3(Vector3::Constant(std::get<double>(value)))
+                                               : std::get<Vector3>(value);
+}
+
 pybind11::array view(const Eigen::MatrixXd& matrix, pybind11::handle base) {
   constexpr auto stride = static_cast<pybind11::ssize_t>(sizeof(double));
   pybind11::array array(pybind11::dtype::of<double>(), {matrix.rows(), matrix.cols()}, {stride, stride * matrix.rows()},

@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <utility>
+#include <variant>
 
 #include "shapegcode/samples.hpp"
 
@@ -17,6 +18,10 @@ using MatrixArray = pybind11::array_t<double, pybind11::array::f_style | pybind1
 
 /// Contiguous float64, converted if needed.
 using VectorArray = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
+
+/// A number for all axes, or one for each.
+using PerAxis = std::variant<double, Vector3>;
+[[nodiscard]] Vector3 each_axis(const PerAxis& value);
 
 /// Read-only NumPy view of a matrix that lives as long as `base`.
 pybind11::array view(const Eigen::MatrixXd& matrix, pybind11::handle base);

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "arrays.hpp"
 #include "register.hpp"
 #include "shapegcode/controller.hpp"
 #include "shapegcode/filter.hpp"
@@ -22,14 +23,12 @@ namespace py = pybind11;
 namespace shapegcode::bindings {
 namespace {
 
-using AxisLimit = std::optional<std::variant<double, Vector3>>;
+using AxisLimit = std::optional<PerAxis>;
 using AxisShaper = std::variant<Shaper, Fir, Mode>;
 using AnyShaper = std::optional<std::variant<Shaper, Fir, Mode, std::vector<AxisShaper>, FollowingFir>>;
 
 void limit_axes(Vector3& limits, const AxisLimit& given) {
-  if (!given) return;
-  limits = std::holds_alternative<double>(*given) ? Vector3(Vector3::Constant(std::get<double>(*given)))
-                                                  : std::get<Vector3>(*given);
+  if (given) limits = each_axis(*given);
 }
 
 Fir filter_of(const Shaper& design, double period_s) { return to_fir(design, period_s); }

@@ -29,13 +29,6 @@ py::array phase_table(const SpeedProfile& profile) {
   return take(std::move(table));
 }
 
-using PerAxis = std::variant<double, Vector3>;
-
-Vector3 each_axis(const PerAxis& limit) {
-  return std::holds_alternative<double>(limit) ? Vector3(Vector3::Constant(std::get<double>(limit)))
-                                               : std::get<Vector3>(limit);
-}
-
 // A polyline through points; without a feed as fast as the axes can be.
 Path path_of(const MatrixArray& points_mm, std::optional<double> feed_mm_per_s, const TrajectoryLimits& limits) {
   const Samples points = samples_from(points_mm, 1.0);

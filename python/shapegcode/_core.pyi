@@ -1,280 +1,64 @@
 """
 Compiled core of shapegcode: program text, motion, filters, shapers, plant and metrology.
 """
-
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-
-__all__: list[str] = [
-    "AccelerationLaw",
-    "Activity",
-    "ArcFigures",
-    "ArgumentError",
-    "Arma",
-    "BlockEnd",
-    "BlockKind",
-    "BlockMark",
-    "ChipThickness",
-    "CircleFigures",
-    "CircleFit",
-    "CodeBindings",
-    "ComparedKind",
-    "ContourSolver",
-    "ContourTarget",
-    "ContourTracker",
-    "ControllerState",
-    "CornerCut",
-    "CornerEngagement",
-    "CornerSection",
-    "CuttingCoefficients",
-    "CycleTime",
-    "DecayFit",
-    "DesignError",
-    "DeviationStats",
-    "EndMill",
-    "EngagementTrack",
-    "EquivalentMass",
-    "ExtraInsensitive",
-    "FanucModel",
-    "FeedDrive",
-    "FeedDriveParameters",
-    "FeedDriveRealTime",
-    "FeedExcess",
-    "FeedLimit",
-    "FeedLimits",
-    "FeedStretch",
-    "FeedWriterOptions",
-    "FilterShape",
-    "FilterTolerance",
-    "Fir",
-    "FirStream",
-    "FitOptions",
-    "FittedBlocks",
-    "FollowingFir",
-    "FollowingLimits",
-    "ForceCurve",
-    "ForceFigures",
-    "FrequencyBand",
-    "FrictionModel",
-    "FrictionParameters",
-    "InPosition",
-    "InterpolatedTime",
-    "Interpolator",
-    "LimitedFeed",
-    "LinearPlant",
-    "Material",
-    "MetrologyOptions",
-    "MillingForce",
-    "MinimalBranches",
-    "MinimalShapers",
-    "ModalFit",
-    "ModalState",
-    "Mode",
-    "ModeRanking",
-    "ModeTable",
-    "MotionController",
-    "MotionKind",
-    "MotionLimits",
-    "NumericError",
-    "OverrideFigures",
-    "Path",
-    "PathFollower",
-    "PathSection",
-    "PositionFeedback",
-    "ProgramComparison",
-    "ProgramEntry",
-    "ProgramError",
-    "ProgramText",
-    "PushResult",
-    "RapidPath",
-    "ReaderOptions",
-    "RefedRegion",
-    "Region",
-    "RegionNote",
-    "RegionShaper",
-    "RestVibration",
-    "Roughness",
-    "SectionFigures",
-    "SectionKind",
-    "SectionMetrology",
-    "Segment",
-    "SegmentKind",
-    "ServoLag",
-    "ShapedCommand",
-    "ShapedRegions",
-    "ShapegcodeError",
-    "Shaper",
-    "ShapingOptions",
-    "SideFigures",
-    "SimulationChunk",
-    "SimulationFigures",
-    "SimulationOptions",
-    "SimulationStream",
-    "SpeedProfile",
-    "SpindleSense",
-    "StarvedFigures",
-    "StepKind",
-    "ToolBeam",
-    "ToolOffset",
-    "ToolTime",
-    "TrackFigures",
-    "Travel",
-    "VaryingFir",
-    "VaryingFirStream",
-    "WallFigures",
-    "WallSide",
-    "WorkLimits",
-    "WorstResidual",
-    "WriterOptions",
-    "acceleration_filters",
-    "arma_decay",
-    "arma_driven",
-    "block_overlap_time_s",
-    "busiest_per_s",
-    "compare_programs",
-    "contour_kernel",
-    "convolve",
-    "convolved_zv",
-    "count_slowed_blocks",
-    "csv_rows",
-    "divisible_segments",
-    "equivalent_mass_bisection",
-    "equivalent_mass_closed_form",
-    "extra_insensitive",
-    "fastest_block_ends",
-    "feeds_per_minute",
-    "fit_blocks",
-    "fit_circle",
-    "fit_decay",
-    "fit_modes",
-    "for_shaped_blocks",
-    "gaussian_low_pass",
-    "grid_polynomial",
-    "in_position_wait_behind_s",
-    "in_position_wait_s",
-    "insensitive_band",
-    "insensitivity",
-    "interpolate",
-    "interpolate_program",
-    "largest_feed",
-    "largest_feeds",
-    "layer_borders",
-    "line_sections",
-    "linear_model",
-    "list_programs",
-    "look_ahead_on_load",
-    "machine_frame",
-    "matrix_exponential",
-    "measure_roughness",
-    "minimal_branches",
-    "minimal_shapers",
-    "minimal_two_mode",
-    "modal_response",
-    "mzv",
-    "mzv_second_zero",
-    "negative_zv",
-    "path_sections",
-    "plan_speed",
-    "plan_tolerances",
-    "plant_response",
-    "poles_to_modes",
-    "rank_modes",
-    "rapid_samples",
-    "rapid_time_s",
-    "read_parts",
-    "read_program",
-    "repeated_zv",
-    "schedule_feed",
-    "sensitivity_curve",
-    "shape_path",
-    "simulate_blocks",
-    "simulate_circle",
-    "simulate_path",
-    "simulate_planned",
-    "simulate_samples",
-    "simulated_duration_s",
-    "stabilisation_poles",
-    "sweep",
-    "thin_curves",
-    "time_optimal_trajectory",
-    "time_program",
-    "travel_blocks",
-    "travel_path",
-    "wall_error_um",
-    "wall_errors_um",
-    "wilson_theta",
-    "with_feeds",
-    "worst_residual",
-    "write_blocks",
-    "write_feeds",
-    "zv",
-    "zv_on_grid",
-]
-
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
     """
-
 class ProgramError(ShapegcodeError):
     """
     The CNC program cannot be read; `line` and `column` count from 1, 0 if not known; `alarm`: FANUC's number, 0 if it has none; `file`: the text it speaks of, if another.
     """
-
     alarm: typing.ClassVar[int] = 0
     column: typing.ClassVar[int] = 0
-    file: typing.ClassVar[str] = ""
+    file: typing.ClassVar[str] = ''
     line: typing.ClassVar[int] = 0
-
 class DesignError(ShapegcodeError):
     """
     The shaper asked for does not exist, or not on this grid.
     """
-
 class ArgumentError(ShapegcodeError, ValueError):
     """
     A value is outside its stated range.
     """
-
 class NumericError(ShapegcodeError):
     """
     A solver failed; the message carries its flag.
     """
-
 class Mode:
     """
     One vibration mode as it moves one axis, base-excited by the command of that axis or of others. Immutable.
-
+    
     Args:
         frequency_hz: Undamped natural frequency in Hz, above 0.
         damping_ratio: Damping ratio (no unit), 0 <= zeta < 1.
         participation: Share of this mode's relative deflection in the response (no unit), finite.
         excited_by: Shares of the accelerations of X, Y and Z that excite it (no unit), finite; all zero: that of the axis
             which it moves, whole.
-
+    
     Raises:
         ArgumentError: A value is outside its range.
     """
-    def __eq__(self, arg0: Mode) -> bool: ...
-    def __getstate__(self) -> tuple[float, float, float, typing.Annotated[list[float], "FixedSize(3)"]]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        frequency_hz: typing.SupportsFloat | typing.SupportsIndex,
-        damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        participation: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        excited_by: typing.Annotated[
-            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
-        ] = [0.0, 0.0, 0.0],
-    ) -> None:
+    def __eq__(self, arg0: Mode) -> bool:
+        ...
+    def __getstate__(self) -> tuple[float, float, float, typing.Annotated[list[float], "FixedSize(3)"]]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, frequency_hz: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, participation: typing.SupportsFloat | typing.SupportsIndex = 1.0, excited_by: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] = [0.0, 0.0, 0.0]) -> None:
         """
         Make a mode; ArgumentError if a value is outside the range that the class states.
         """
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     @property
     def damping_ratio(self) -> float:
         """
@@ -300,66 +84,60 @@ class Mode:
         """
         Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (paper 002, eq. 7).
         """
-
 class Shaper:
     """
     Input shaper: amplitudes at ascending times that add up to one. Immutable.
-
+    
     Args:
         times_s: Times of the taps in s, shape (n_taps,), n_taps >= 1, strictly ascending from exactly 0.
         amplitudes: Amplitudes of the taps (no unit), shape (n_taps,), sum 1 within 1e-9; may be negative.
-
+    
     Raises:
         ArgumentError: Unequal lengths, no tap, a value that is not finite, times that do not ascend from 0, or a sum
             other than 1.
-
+    
     Source: paper 002, eq. 4 and 9.
     """
-
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: Shaper) -> bool: ...
-    def __getstate__(self) -> tuple[list[float], list[float]]: ...
-    def __init__(
-        self,
-        times_s: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        amplitudes: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> None:
+    def __eq__(self, arg0: Shaper) -> bool:
+        ...
+    def __getstate__(self) -> tuple[list[float], list[float]]:
+        ...
+    def __init__(self, times_s: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], amplitudes: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         """
         Make a shaper; ArgumentError if the taps are not what the class asks for.
         """
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
-    def residual(
-        self,
-        frequency_hz: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] = 0.0,
-    ) -> typing.Any:
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def residual(self, frequency_hz: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] = 0.0) -> typing.Any:
         """
         Residual vibration over frequency: `residual_ratio` of modes of these frequencies.
-
+        
         Args:
             frequency_hz: Natural frequency in Hz, above 0; a number or an array of any shape.
             damping_ratio: Damping ratio (no unit), 0 <= zeta < 1; a number, or an array that broadcasts with the frequencies.
-
+        
         Returns:
             The ratio (no unit): a number for numbers, else an array of the broadcast shape.
-
+        
         Raises:
             ArgumentError: A value is outside its range.
         """
     def residual_ratio(self, mode: Mode) -> float:
         """
         Residual vibration of a mode after the last tap, relative to the unshaped one.
-
+        
         V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation plays no part. Its
         rounding floor is about 1e-16*(1 + omega*t_N)*abs_sum.
-
+        
         Args:
             mode: The mode whose vibration is judged; need not be one that the shaper was designed for.
-
+        
         Returns:
             The ratio V (no unit), 0 where the shaper cancels the mode.
-
+        
         Source: paper 002, eq. 8.
         """
     @property
@@ -397,7 +175,6 @@ class Shaper:
         """
         Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2.
         """
-
 class ExtraInsensitive:
     """
     An extra-insensitive shaper, and where its residual vanishes and peaks.
@@ -417,7 +194,6 @@ class ExtraInsensitive:
         """
         Natural frequencies without residual in Hz, ascending, one more than humps.
         """
-
 class WorstResidual:
     """
     The largest residual over a band of frequencies.
@@ -437,7 +213,6 @@ class WorstResidual:
         """
         No frequency of the band leaves more (no unit); within 1e-6 of residual_ratio, or 1e-12.
         """
-
 class FrequencyBand:
     """
     A band of frequencies.
@@ -452,7 +227,6 @@ class FrequencyBand:
         """
         Lower end in Hz.
         """
-
 class MinimalShapers:
     """
     The minimal shapers of some modes, and what is known about others.
@@ -507,7 +281,6 @@ class MinimalShapers:
         """
         Boxes too small to halve on that could not be decided: solutions there are not isolated.
         """
-
 class MinimalBranches:
     """
     The minimal shapers of two modes over the ratio of their frequencies, joined to curves.
@@ -526,19 +299,15 @@ class MinimalBranches:
     def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Times of the taps in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only view.
-
+        
         [..., 2] is the duration.
         """
-
 class Fir:
     """
     Weights on the sample grid that add up to one: an acceleration filter (moving average) or an input shaper. One filter type for both.
     """
     @staticmethod
-    def exponential(
-        time_constant_samples: typing.SupportsFloat | typing.SupportsIndex,
-        rest: typing.SupportsFloat | typing.SupportsIndex = 1e-06,
-    ) -> Fir:
+    def exponential(time_constant_samples: typing.SupportsFloat | typing.SupportsIndex, rest: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> Fir:
         """
         Geometric weights exp(-k / time_constant), cut off where less than the share `rest` of them is left and scaled to a sum of 1; costs the same for any length. Raises ArgumentError on a time constant that is not > 0 or a share outside 0 ... 1.
         """
@@ -547,18 +316,13 @@ class Fir:
         """
         Equal weights over `length` samples; costs the same for any length. Raises ArgumentError below 1.
         """
-    def __init__(
-        self,
-        delays: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        taps: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> None:
+    def __init__(self, delays: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], taps: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         """
         Taps at whole-sample delays, ascending, adding up to 1. Raises ArgumentError otherwise.
         """
-    def __repr__(self) -> str: ...
-    def apply(
-        self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def __repr__(self) -> str:
+        ...
+    def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Filter samples of shape (n,) or (n, n_axes); the result has duration_samples more rows. The input is held at its first value before and at its last value after. Bit-identical to FirStream. Raises ArgumentError on another shape.
         """
@@ -587,7 +351,6 @@ class Fir:
         """
         Second central moment in samples squared: the contour cost.
         """
-
 class FirStream:
     """
     Real-time form of Fir: one sample of every axis per step.
@@ -600,24 +363,21 @@ class FirStream:
         """
         Rest at `position`, shape (n_axes,).
         """
-    def step(
-        self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def step(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Filtered sample, shape (n_axes,).
         """
-
 class VaryingFir:
     """
     A set of filters on one grid between which the input moves.
-
+    
     Each increment of the input is replaced by the whole impulse train of the filter that is valid where it begins (scatter
     form), so that every increment keeps the zeros of its own filter, however often the filters change. Place k is filter k
     of the set; place k + w shares an increment between filters k and k + 1.
-
+    
     Args:
         set: The filters (Fir), at least one.
-
+    
     Raises:
         ArgumentError: An empty set.
     """
@@ -625,11 +385,7 @@ class VaryingFir:
         """
         Make a set; ArgumentError if it is empty.
         """
-    def apply(
-        self,
-        samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        place: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> numpy.ndarray:
+    def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], place: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> numpy.ndarray:
         """
         Filter samples (n, n_axes); `place` (n,) for the increment that leads to each sample. The result has duration_samples more rows. Bit-identical to VaryingFirStream. Raises ArgumentError on another shape or a value that is not finite.
         """
@@ -657,7 +413,6 @@ class VaryingFir:
         """
         Largest second central moment in samples squared: the contour cost.
         """
-
 class VaryingFirStream:
     """
     Real-time form of VaryingFir: one sample per step.
@@ -670,36 +425,26 @@ class VaryingFirStream:
         """
         Rest at `position`, shape (n_axes,).
         """
-    def step(
-        self,
-        position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        place: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> list[float]:
+    def step(self, position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], place: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
         """
         Filtered sample, n_axes values.
         """
-
 class FollowingFir:
     """
     A set of filters followed along an axis.
-
+    
     Filter k of the set is valid where the axis is at position k; in between the increments are shared, beyond the ends the
     last filter holds. Each increment goes by its own middle in the input.
-
+    
     Args:
         fir: The set.
         axis: 0, 1, 2 for X, Y, Z.
         position_mm: Strictly ascending, one per filter, mm.
-
+    
     Raises:
         ArgumentError: No such axis, another number of positions, or positions that do not ascend.
     """
-    def __init__(
-        self,
-        fir: VaryingFir,
-        axis: typing.SupportsInt | typing.SupportsIndex,
-        position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> None:
+    def __init__(self, fir: VaryingFir, axis: typing.SupportsInt | typing.SupportsIndex, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         """
         Place the filters of a set; ArgumentError if the positions do not fit.
         """
@@ -730,73 +475,71 @@ class FollowingFir:
         """
         Positions of the filters, mm.
         """
-
 class SegmentKind:
     """
     Kind of a canonical move.
-
+    
     Members:
-
+    
       rapid
-
+    
       line
-
+    
       arc
     """
-
     __members__: typing.ClassVar[dict[str, SegmentKind]]
     arc: typing.ClassVar[SegmentKind]
     line: typing.ClassVar[SegmentKind]
     rapid: typing.ClassVar[SegmentKind]
     @typing.overload
-    def __eq__(self, other: SegmentKind) -> bool: ...
+    def __eq__(self, other: SegmentKind) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: SegmentKind) -> bool: ...
+    def __ne__(self, other: SegmentKind) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class Segment:
     """
     One canonical move in mm.
     """
     @staticmethod
-    def arc(
-        start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        sweep_rad: typing.SupportsFloat | typing.SupportsIndex,
-        feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex,
-        normal: typing.SupportsInt | typing.SupportsIndex = 2,
-    ) -> Segment:
+    def arc(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], sweep_rad: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, normal: typing.SupportsInt | typing.SupportsIndex = 2) -> Segment:
         """
         An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen along it. Raises ArgumentError on a zero radius or sweep.
         """
     @staticmethod
-    def line(
-        start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> Segment:
+    def line(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex) -> Segment:
         """
         A straight move.
         """
-    def point_at(
-        self, s_mm: typing.SupportsFloat | typing.SupportsIndex
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+    def point_at(self, s_mm: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Position at a distance from the start, shape (3,), mm.
         """
@@ -850,7 +593,6 @@ class Segment:
         """
         Signed sweep of an arc, rad.
         """
-
 class Path:
     """
     A connected run of segments.
@@ -863,7 +605,8 @@ class Path:
         """
         Raises ArgumentError if a segment does not start where its predecessor ends.
         """
-    def __len__(self) -> int: ...
+    def __len__(self) -> int:
+        ...
     def moves_as(self, other: Path) -> bool:
         """
         Whether the motion is the same: geometry, feeds and stops, whatever lines they come from.
@@ -932,207 +675,233 @@ class Path:
         """
         Start, shape (3,), mm.
         """
-
 class AccelerationLaw:
     """
     Law of a change of speed.
-
+    
     Members:
-
+    
       constant_time
-
+    
       jerk_limited
     """
-
     __members__: typing.ClassVar[dict[str, AccelerationLaw]]
     constant_time: typing.ClassVar[AccelerationLaw]
     jerk_limited: typing.ClassVar[AccelerationLaw]
     @typing.overload
-    def __eq__(self, other: AccelerationLaw) -> bool: ...
+    def __eq__(self, other: AccelerationLaw) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: AccelerationLaw) -> bool: ...
+    def __ne__(self, other: AccelerationLaw) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class MotionLimits:
     """
     What look-ahead keeps; infinity switches a limit off.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def arc_feed_ratio(self) -> float:
         """
         Feed on arcs relative to the programmed one.
         """
     @arc_feed_ratio.setter
-    def arc_feed_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def arc_feed_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def block_time_s(self) -> float:
         """
         No block is run off faster, s.
         """
     @block_time_s.setter
-    def block_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def block_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def centripetal_acceleration_mm_per_s2(self) -> float:
         """
         Across the path on arcs.
         """
     @centripetal_acceleration_mm_per_s2.setter
-    def centripetal_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def centripetal_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def contour_acceleration_mm_per_s2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Of a change of direction, per axis, on arcs and along polylines, shape (3,).
         """
     @contour_acceleration_mm_per_s2.setter
-    def contour_acceleration_mm_per_s2(
-        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
-    ) -> None: ...
+    def contour_acceleration_mm_per_s2(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def corner_speed_difference_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Speed step per axis at a corner, shape (3,).
         """
     @corner_speed_difference_mm_per_s.setter
-    def corner_speed_difference_mm_per_s(
-        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
-    ) -> None: ...
+    def corner_speed_difference_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def corner_stop_angle_rad(self) -> float:
         """
         A corner that turns by as much or more is a stop.
         """
     @corner_stop_angle_rad.setter
-    def corner_stop_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def corner_stop_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed_excess_ratio(self) -> float:
         """
         Share by which a neighbour may be faster without that.
         """
     @feed_excess_ratio.setter
-    def feed_excess_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def feed_excess_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed_override(self) -> float:
         """
         Scales the programmed feeds.
         """
     @feed_override.setter
-    def feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed_spread_s(self) -> float:
         """
         Time by which a lower programmed feed is reached before its segment and kept behind it, s.
         """
     @feed_spread_s.setter
-    def feed_spread_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def feed_spread_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def jerk_time_s(self) -> float:
         """
         Smoothing of the acceleration, s; 0 = none.
         """
     @jerk_time_s.setter
-    def jerk_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def jerk_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def junction_deviation_mm(self) -> float:
         """
         A corner is passed as an arc that cuts it by so much.
         """
     @junction_deviation_mm.setter
-    def junction_deviation_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def junction_deviation_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def law(self) -> AccelerationLaw:
         """
         Law of a change of speed.
         """
     @law.setter
-    def law(self, arg0: AccelerationLaw) -> None: ...
+    def law(self, arg0: AccelerationLaw) -> None:
+        ...
     @property
     def max_acceleration_mm_per_s2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Per axis, shape (3,).
         """
     @max_acceleration_mm_per_s2.setter
-    def max_acceleration_mm_per_s2(
-        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
-    ) -> None: ...
+    def max_acceleration_mm_per_s2(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def max_feed_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Per axis, shape (3,).
         """
     @max_feed_mm_per_s.setter
-    def max_feed_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    def max_feed_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def max_jerk_mm_per_s3(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Per axis, shape (3,).
         """
     @max_jerk_mm_per_s3.setter
-    def max_jerk_mm_per_s3(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    def max_jerk_mm_per_s3(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def polyline_acceleration_mm_per_s2(self) -> float:
         """
         Across the path along polylines.
         """
     @polyline_acceleration_mm_per_s2.setter
-    def polyline_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def polyline_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def time_constant_s(self) -> float:
         """
         Ramp from rest to the programmed feed, s.
         """
     @time_constant_s.setter
-    def time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
-
+    def time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class FilterTolerance:
     """
     Within what a filter behind the interpolation must stay at corners and on arcs; without spread no limit.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def contour_tolerance_mm(self) -> float:
         """
         Deviation allowed to the filter, mm; infinity: any.
         """
     @contour_tolerance_mm.setter
-    def contour_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def contour_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def corner_share(self) -> float:
         """
         Share of the tolerance for one corner: several may fall into one filter.
         """
     @corner_share.setter
-    def corner_share(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def corner_share(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def mean_deviation_s(self) -> float:
         """
         Its mean absolute deviation, s.
         """
     @mean_deviation_s.setter
-    def mean_deviation_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def mean_deviation_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def variance_s2(self) -> float:
         """
         Second central moment of the filter, s^2.
         """
     @variance_s2.setter
-    def variance_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
-
+    def variance_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class SpeedProfile:
     """
     Distance along a path as a function of time.
@@ -1152,14 +921,11 @@ class SpeedProfile:
         """
         (n, 5): start s, duration s, distance mm, speed mm/s, acceleration mm/s^2.
         """
-
 class Interpolator:
     """
     Set-points of a path, one per interpolation period (real-time form).
     """
-    def __init__(
-        self, path: Path, profile: SpeedProfile, period_s: typing.SupportsFloat | typing.SupportsIndex
-    ) -> None:
+    def __init__(self, path: Path, profile: SpeedProfile, period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         Raises ArgumentError on a period <= 0.
         """
@@ -1172,30 +938,28 @@ class Interpolator:
         """
         Set-points from start to end.
         """
-
 class PushResult:
     """
     Answer of a MotionController to a segment that was pushed.
-
+    
     Members:
-
+    
       accepted : It waits for its turn.
-
+    
       queue_full : Nothing was taken: push it again later.
-
+    
       not_connected : It does not start where the one before ended, or an arc misses its end (1e-6 mm).
-
+    
       no_length : It moves no axis.
-
+    
       no_feed : A feed that is not above zero, or not finite.
-
+    
       not_finite : A position that is not finite.
-
+    
       wrong_axes : Not as many following axes as the control has.
-
+    
       aborted : Nothing is taken between abort() and restart().
     """
-
     __members__: typing.ClassVar[dict[str, PushResult]]
     aborted: typing.ClassVar[PushResult]
     accepted: typing.ClassVar[PushResult]
@@ -1206,45 +970,57 @@ class PushResult:
     queue_full: typing.ClassVar[PushResult]
     wrong_axes: typing.ClassVar[PushResult]
     @typing.overload
-    def __eq__(self, other: PushResult) -> bool: ...
+    def __eq__(self, other: PushResult) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: PushResult) -> bool: ...
+    def __ne__(self, other: PushResult) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class Activity:
     """
     What a MotionController does in a period.
-
+    
     Members:
-
+    
       idle : At rest, nothing left to do.
-
+    
       moving : Along the path, or the shaper is still giving out what it holds.
-
+    
       stopping : Decelerating for hold() or abort().
-
+    
       held : At rest after hold().
-
+    
       starved : Coming to rest: the segments ran out before one that stops. At rest it is idle.
-
+    
       aborted : At rest after abort(); the path is gone.
     """
-
     __members__: typing.ClassVar[dict[str, Activity]]
     aborted: typing.ClassVar[Activity]
     held: typing.ClassVar[Activity]
@@ -1253,46 +1029,54 @@ class Activity:
     starved: typing.ClassVar[Activity]
     stopping: typing.ClassVar[Activity]
     @typing.overload
-    def __eq__(self, other: Activity) -> bool: ...
+    def __eq__(self, other: Activity) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: Activity) -> bool: ...
+    def __ne__(self, other: Activity) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class FollowingLimits:
     """
     Limits of an axis that follows the path. Immutable.
-
+    
     Args:
         max_feed: Highest speed in its own unit (mm or degrees) per s.
         max_acceleration: Likewise per s^2.
         max_jerk: Likewise per s^3.
     """
-    def __init__(
-        self,
-        *,
-        max_feed: typing.SupportsFloat | typing.SupportsIndex = ...,
-        max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ...,
-        max_jerk: typing.SupportsFloat | typing.SupportsIndex = ...,
-    ) -> None:
+    def __init__(self, *, max_feed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., max_jerk: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
         """
         Checked by the control that takes them.
         """
-    def __repr__(self) -> str: ...
+    def __repr__(self) -> str:
+        ...
     @property
     def max_acceleration(self) -> float:
         """
@@ -1308,12 +1092,12 @@ class FollowingLimits:
         """
         Unit per s^3.
         """
-
 class ControllerState:
     """
     A snapshot of a MotionController. Immutable.
     """
-    def __repr__(self) -> str: ...
+    def __repr__(self) -> str:
+        ...
     @property
     def activity(self) -> Activity:
         """
@@ -1364,16 +1148,15 @@ class ControllerState:
         """
         Set-points given so far.
         """
-
 class MotionController:
     """
     A path that grows while it is run: what a control does between blocks and drives.
-
+    
     Look-ahead over a window of segments, a jerk-limited profile, one set-point per period through contour correction,
     smoothing and shaper. Speeds, accelerations and jerks that are finite are kept by the set-points. One thread may push,
     one may step, any may call the rest but restart(); step() and run() release the global lock. It is the C++ class of the
     same name, which is the real-time form.
-
+    
     Args:
         period_s: Time between set-points in s.
         limits: What look-ahead keeps, with the rules for corners. None: nothing but what the next three say, under the
@@ -1389,38 +1172,14 @@ class MotionController:
         contour_correction: Take back, to the second order, what smoothing and shaper cut off arcs.
         window: Segments that the look-ahead sees, 8 at least.
         queue: Segments that may wait in all; rounded up to a power of two, and holds the window.
-
+    
     Raises:
         ArgumentError: A value outside its range.
         DesignError: A Shaper whose times are not on the grid of the period.
-
+    
     Source: this project; look-ahead as in plan_speed.
     """
-    def __init__(
-        self,
-        *,
-        period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-        limits: MotionLimits | None = None,
-        max_feed_mm_per_s: typing.SupportsFloat
-        | typing.SupportsIndex
-        | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
-        | None = None,
-        max_acceleration_mm_per_s2: typing.SupportsFloat
-        | typing.SupportsIndex
-        | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
-        | None = None,
-        max_jerk_mm_per_s3: typing.SupportsFloat
-        | typing.SupportsIndex
-        | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
-        | None = None,
-        following: collections.abc.Sequence[FollowingLimits] = (),
-        contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = ...,
-        smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.01,
-        shaper: Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode] | FollowingFir | None = None,
-        contour_correction: bool = False,
-        window: typing.SupportsInt | typing.SupportsIndex = 128,
-        queue: typing.SupportsInt | typing.SupportsIndex = 1024,
-    ) -> None:
+    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limits: MotionLimits | None = None, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, following: collections.abc.Sequence[FollowingLimits] = (), contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = ..., smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.01, shaper: Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode] | FollowingFir | None = None, contour_correction: bool = False, window: typing.SupportsInt | typing.SupportsIndex = 128, queue: typing.SupportsInt | typing.SupportsIndex = 1024) -> None:
         """
         ArgumentError if it is not what the class asks for.
         """
@@ -1436,37 +1195,22 @@ class MotionController:
         """
         Come to rest along the path.
         """
-    def push(
-        self,
-        segment: Segment,
-        following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None,
-    ) -> PushResult:
+    def push(self, segment: Segment, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None) -> PushResult:
         """
         Hand over the next segment; never waits.
-
+        
         Args:
             segment: It starts where the one before ended, the first at rest.
             following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the path length. None: they
                 stay.
-
+        
         Returns:
             PushResult; nothing was taken unless it is `accepted`.
         """
-    def push_arc(
-        self,
-        end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        sweep_rad: typing.SupportsFloat | typing.SupportsIndex,
-        feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex,
-        normal: typing.SupportsInt | typing.SupportsIndex = 2,
-        following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None,
-        *,
-        line: typing.SupportsInt | typing.SupportsIndex = 0,
-        stop_at_end: bool = False,
-    ) -> PushResult:
+    def push_arc(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], sweep_rad: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, normal: typing.SupportsInt | typing.SupportsIndex = 2, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
         """
         The same along an arc or helix, as Segment.arc makes it.
-
+        
         Args:
             end_mm: Shape (3,), mm.
             centre_mm: Shape (3,), mm; its value along `normal` has no say.
@@ -1476,47 +1220,39 @@ class MotionController:
             following: As in push().
             line: What the state shows while it is run.
             stop_at_end: Exact stop.
-
+        
         Returns:
             PushResult; nothing was taken unless it is `accepted`.
-
+        
         Raises:
             ArgumentError: No radius, no sweep, or a number that is not finite.
         """
-    def push_line(
-        self,
-        end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex,
-        following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None,
-        *,
-        line: typing.SupportsInt | typing.SupportsIndex = 0,
-        stop_at_end: bool = False,
-    ) -> PushResult:
+    def push_line(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
         """
         A straight move from the end of the segment before, at first from rest.
-
+        
         Args:
             end_mm: Shape (3,), mm.
             feed_mm_per_s: Along the path.
             following: As in push().
             line: What the state shows while it is run.
             stop_at_end: Exact stop; on the last segment of a program it says that none is missing.
-
+        
         Returns:
             PushResult; nothing was taken unless it is `accepted`.
         """
     def push_path(self, path: Path, first: typing.SupportsInt | typing.SupportsIndex = 0) -> tuple[int, PushResult]:
         """
         The segments of a path, as many as are taken; the following axes stay.
-
+        
         Args:
             path: Its first segment starts where the segment before ended.
             first: Segment to begin with.
-
+        
         Returns:
             (index of the segment to go on with, PushResult of the last one that was tried): (len(path), accepted) when all of
             them were taken.
-
+        
         Raises:
             ArgumentError: `first` below 0.
         """
@@ -1528,31 +1264,29 @@ class MotionController:
         """
         Go on after hold().
         """
-    def run(
-        self, max_periods: typing.SupportsInt | typing.SupportsIndex = 1000000
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def run(self, max_periods: typing.SupportsInt | typing.SupportsIndex = 1000000) -> numpy.typing.NDArray[numpy.float64]:
         """
         Steps until it rests: idle, held or aborted.
-
+        
         Args:
             max_periods: It stops there, at the latest.
-
+        
         Returns:
             (n, n_axes), mm or the unit of a following axis.
-
+        
         Raises:
             ArgumentError: Periods below 0.
         """
     def step(self, periods: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
         """
         The next set-points, one for each period.
-
+        
         Args:
             periods: How many, >= 0.
-
+        
         Returns:
             (periods, n_axes), mm or the unit of a following axis; `state.activity` says what the last one was.
-
+        
         Raises:
             ArgumentError: Periods below 0.
         """
@@ -1596,75 +1330,84 @@ class MotionController:
         """
         A snapshot: ControllerState.
         """
-
 class ModalState:
     """
     Modal state of the controller, as G numbers.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def compensation(self) -> int:
         """
         Group 07: 40, 41, 42.
         """
     @compensation.setter
-    def compensation(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def compensation(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def coordinate_number(self) -> int:
         """
         P of G54.1.
         """
     @coordinate_number.setter
-    def coordinate_number(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def coordinate_number(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def coordinate_system(self) -> int:
         """
         Group 14: 54 ... 59; 541 for G54.1.
         """
     @coordinate_system.setter
-    def coordinate_system(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def coordinate_system(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def cycle(self) -> int:
         """
         Group 09: 73 ... 89, 80 = none.
         """
     @cycle.setter
-    def cycle(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def cycle(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def cycle_return(self) -> int:
         """
         Group 10: 98, 99.
         """
     @cycle_return.setter
-    def cycle_return(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def cycle_return(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def distance(self) -> int:
         """
         Group 03: 90, 91.
         """
     @distance.setter
-    def distance(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def distance(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def exact_stop(self) -> int:
         """
         Group 15: 61 ... 64.
         """
     @exact_stop.setter
-    def exact_stop(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def exact_stop(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed(self) -> float:
         """
         F as programmed; 0 before the first.
         """
     @feed.setter
-    def feed(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def feed(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed_mode(self) -> int:
         """
         Group 05: 93, 94, 95.
         """
     @feed_mode.setter
-    def feed_mode(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def feed_mode(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def known(self) -> typing.Annotated[list[bool], "FixedSize(3)"]:
         """
@@ -1676,28 +1419,32 @@ class ModalState:
         H.
         """
     @length_number.setter
-    def length_number(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def length_number(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def length_offset(self) -> int:
         """
         Group 08: 43, 44, 49.
         """
     @length_offset.setter
-    def length_offset(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def length_offset(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def motion(self) -> int:
         """
         Group 01: 0, 1, 2, 3.
         """
     @motion.setter
-    def motion(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def motion(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def plane(self) -> int:
         """
         Group 02: 17, 18, 19.
         """
     @plane.setter
-    def plane(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def plane(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def position_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
@@ -1709,7 +1456,8 @@ class ModalState:
         S; 0 before the first.
         """
     @spindle_rev_per_min.setter
-    def spindle_rev_per_min(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def spindle_rev_per_min(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def uncertain(self) -> bool:
         """
@@ -1721,430 +1469,450 @@ class ModalState:
         Group 06: 20, 21.
         """
     @units.setter
-    def units(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-
+    def units(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
 class StepKind:
     """
     What a step of a program is.
-
+    
     Members:
-
+    
       region
-
+    
       move
-
+    
       function
     """
-
     __members__: typing.ClassVar[dict[str, StepKind]]
     function: typing.ClassVar[StepKind]
     move: typing.ClassVar[StepKind]
     region: typing.ClassVar[StepKind]
     @typing.overload
-    def __eq__(self, other: StepKind) -> bool: ...
+    def __eq__(self, other: StepKind) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: StepKind) -> bool: ...
+    def __ne__(self, other: StepKind) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class ToolOffset:
     """
     Offsets of one tool, mm; None: not known.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def length_mm(self) -> float | None:
         """
         Geometry of H.
         """
     @length_mm.setter
-    def length_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
+    def length_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
     @property
     def length_wear_mm(self) -> float | None:
         """
         Wear of H.
         """
     @length_wear_mm.setter
-    def length_wear_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
+    def length_wear_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
     @property
     def radius_mm(self) -> float | None:
         """
         Geometry of D.
         """
     @radius_mm.setter
-    def radius_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
+    def radius_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
     @property
     def radius_wear_mm(self) -> float | None:
         """
         Wear of D.
         """
     @radius_wear_mm.setter
-    def radius_wear_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
-
+    def radius_wear_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
 class CodeBindings:
     """
     Codes that the machine builder bound to programs.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def g_macros(self) -> dict[int, int]:
         """
         G code in tenths to program, called like G65.
         """
     @g_macros.setter
-    def g_macros(
-        self,
-        arg0: collections.abc.Mapping[
-            typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex
-        ],
-    ) -> None: ...
+    def g_macros(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
     @property
     def m_macros(self) -> dict[int, int]:
         """
         M code to program, called like G65.
         """
     @m_macros.setter
-    def m_macros(
-        self,
-        arg0: collections.abc.Mapping[
-            typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex
-        ],
-    ) -> None: ...
+    def m_macros(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
     @property
     def m_subprograms(self) -> dict[int, int]:
         """
         M code to program, called like M98.
         """
     @m_subprograms.setter
-    def m_subprograms(
-        self,
-        arg0: collections.abc.Mapping[
-            typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex
-        ],
-    ) -> None: ...
+    def m_subprograms(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
     @property
     def tool_program(self) -> int:
         """
         T calls it with T in #149; -1: none.
         """
     @tool_program.setter
-    def tool_program(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-
+    def tool_program(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
 class WorkLimits:
     """
     What a program may ask at most, counted while it is read.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def bytes(self) -> int:
         """
         Of texts that are read.
         """
     @bytes.setter
-    def bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def expansion_bytes(self) -> int:
         """
         Of the plain text beyond those of the texts.
         """
     @expansion_bytes.setter
-    def expansion_bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def expansion_bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def expansion_moves(self) -> int:
         """
         Moves beyond one for each line of the texts.
         """
     @expansion_moves.setter
-    def expansion_moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def expansion_moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Highest speed of each axis while cutting, mm/s.
         """
     @feed_mm_per_s.setter
-    def feed_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    def feed_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def m_function_s(self) -> float:
         """
         Time of any other M code, s.
         """
     @m_function_s.setter
-    def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def moves(self) -> int:
         """
         Moves, dwells, and blocks with machine functions.
         """
     @moves.setter
-    def moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def rapid_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Of each axis in a rapid, mm/s.
         """
     @rapid_mm_per_s.setter
-    def rapid_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    def rapid_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def seconds(self) -> float:
         """
         Least time, s.
         """
     @seconds.setter
-    def seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def steps(self) -> int:
         """
         Lines executed, each beyond its first time.
         """
     @steps.setter
-    def steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def tool_change_s(self) -> float:
         """
         Time of an M06, s.
         """
     @tool_change_s.setter
-    def tool_change_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
-
+    def tool_change_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class ReaderOptions:
     """
     The controller's settings that change how a text is read.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def absolute_arc_centres(self) -> bool:
         """
         I J K are positions (not FANUC).
         """
     @absolute_arc_centres.setter
-    def absolute_arc_centres(self, arg0: bool) -> None: ...
+    def absolute_arc_centres(self, arg0: bool) -> None:
+        ...
     @property
     def arc_tolerance_mm(self) -> float:
         """
         Largest difference of an arc's radii, mm (parameter 3410).
         """
     @arc_tolerance_mm.setter
-    def arc_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def arc_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def arc_without_centre_is_line(self) -> bool:
         """
         G02, G03 without R, I, J, K are lines (parameter 3403#5 = 0); False: alarm 0022.
         """
     @arc_without_centre_is_line.setter
-    def arc_without_centre_is_line(self, arg0: bool) -> None: ...
+    def arc_without_centre_is_line(self, arg0: bool) -> None:
+        ...
     @property
     def bindings(self) -> CodeBindings:
         """
         Codes bound to programs.
         """
     @bindings.setter
-    def bindings(self, arg0: CodeBindings) -> None: ...
+    def bindings(self, arg0: CodeBindings) -> None:
+        ...
     @property
     def block_skip(self) -> typing.Annotated[list[bool | None], "FixedSize(9)"]:
         """
         Switch of / ... /9: on, off, or None: not known.
         """
     @block_skip.setter
-    def block_skip(self, arg0: typing.Annotated[collections.abc.Sequence[bool | None], "FixedSize(9)"]) -> None: ...
+    def block_skip(self, arg0: typing.Annotated[collections.abc.Sequence[bool | None], "FixedSize(9)"]) -> None:
+        ...
     @property
     def calculator_decimal_point(self) -> bool:
         """
         True: X10 is 10 mm; False: 10 least increments (parameter 3401#0).
         """
     @calculator_decimal_point.setter
-    def calculator_decimal_point(self, arg0: bool) -> None: ...
+    def calculator_decimal_point(self, arg0: bool) -> None:
+        ...
     @property
     def collect_alarms(self) -> bool:
         """
         Go on behind an alarm and keep all in ProgramText.alarms.
         """
     @collect_alarms.setter
-    def collect_alarms(self, arg0: bool) -> None: ...
+    def collect_alarms(self, arg0: bool) -> None:
+        ...
     @property
     def compensation_start_up(self) -> str:
         """
         Start-up of cutter compensation, A or B (parameter 5003).
         """
     @compensation_start_up.setter
-    def compensation_start_up(self, arg1: str) -> None: ...
+    def compensation_start_up(self, arg1: str) -> None:
+        ...
     @property
     def expand_compensation(self) -> bool:
         """
         G41/G42 become plain moves; False: kept as they stand.
         """
     @expand_compensation.setter
-    def expand_compensation(self, arg0: bool) -> None: ...
+    def expand_compensation(self, arg0: bool) -> None:
+        ...
     @property
     def extra_work_offsets_mm(self) -> dict[int, typing.Annotated[list[float], "FixedSize(3)"]]:
         """
         G54.1 P number to offsets, mm.
         """
     @extra_work_offsets_mm.setter
-    def extra_work_offsets_mm(
-        self,
-        arg0: collections.abc.Mapping[
-            typing.SupportsInt | typing.SupportsIndex,
-            typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"],
-        ],
-    ) -> None: ...
+    def extra_work_offsets_mm(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]) -> None:
+        ...
     @property
     def least_increment_inch(self) -> float:
         """
         Inch least increment, inch.
         """
     @least_increment_inch.setter
-    def least_increment_inch(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def least_increment_inch(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def least_increment_mm(self) -> float:
         """
         Metric least increment, mm.
         """
     @least_increment_mm.setter
-    def least_increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def least_increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def limits(self) -> WorkLimits:
         """
         What a program may ask at most.
         """
     @limits.setter
-    def limits(self, arg0: WorkLimits) -> None: ...
+    def limits(self, arg0: WorkLimits) -> None:
+        ...
     @property
     def load_program(self) -> bool:
         """
         Called with an O number that the file does not hold; gives (name, bytes) or None.
         """
     @load_program.setter
-    def load_program(self, arg1: typing.Any) -> None: ...
+    def load_program(self, arg1: typing.Any) -> None:
+        ...
     @property
     def max_line_length(self) -> int:
         """
         Characters.
         """
     @max_line_length.setter
-    def max_line_length(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def max_line_length(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def offset_memory(self) -> str:
         """
         Offset memory A, B or C.
         """
     @offset_memory.setter
-    def offset_memory(self, arg1: str) -> None: ...
+    def offset_memory(self, arg1: str) -> None:
+        ...
     @property
     def opaque_programs(self) -> typing.Annotated[list[int], "FixedSize(2)"]:
         """
         First and last program number whose calls are kept if the program is not found.
         """
     @opaque_programs.setter
-    def opaque_programs(
-        self,
-        arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"],
-    ) -> None: ...
+    def opaque_programs(self, arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"]) -> None:
+        ...
     @property
     def peck_clearance_mm(self) -> float:
         """
         To which a peck of G73 and G83 returns, mm (parameters 5114, 5115).
         """
     @peck_clearance_mm.setter
-    def peck_clearance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def peck_clearance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def power_on(self) -> ModalState:
         """
         Modal state before the first block.
         """
     @power_on.setter
-    def power_on(self, arg0: ModalState) -> None: ...
+    def power_on(self, arg0: ModalState) -> None:
+        ...
     @property
     def probe_lines(self) -> list[int]:
         """
         Ascending lines of the source behind which the state is kept.
         """
     @probe_lines.setter
-    def probe_lines(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None: ...
+    def probe_lines(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
     @property
     def program(self) -> int:
         """
         O number to run of a file with several; -1: the first.
         """
     @program.setter
-    def program(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def program(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def program_index(self) -> int:
         """
         The same by its index in `list_programs`, whatever its name, and alone; -1: by number.
         """
     @program_index.setter
-    def program_index(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def program_index(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def retained_variables(self) -> dict[int, float]:
         """
         #500 ... #999.
         """
     @retained_variables.setter
-    def retained_variables(
-        self,
-        arg0: collections.abc.Mapping[
-            typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex
-        ],
-    ) -> None: ...
+    def retained_variables(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
     @property
     def scale_unit(self) -> float:
         """
         Of the factors of G51 without a point.
         """
     @scale_unit.setter
-    def scale_unit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def scale_unit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def subprogram_nesting(self) -> int:
         """
         Deepest nesting of M98.
         """
     @subprogram_nesting.setter
-    def subprogram_nesting(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def subprogram_nesting(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def tool_offsets(self) -> dict[int, ToolOffset]:
         """
         Number to ToolOffset.
         """
     @tool_offsets.setter
-    def tool_offsets(
-        self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, ToolOffset]
-    ) -> None: ...
+    def tool_offsets(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, ToolOffset]) -> None:
+        ...
     @property
     def unknown_after_tool_change(self) -> typing.Annotated[list[bool], "FixedSize(3)"]:
         """
         Axes whose position is not known after M06.
         """
     @unknown_after_tool_change.setter
-    def unknown_after_tool_change(
-        self, arg0: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"]
-    ) -> None: ...
+    def unknown_after_tool_change(self, arg0: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"]) -> None:
+        ...
     @property
     def work_offsets_mm(self) -> list[typing.Annotated[list[float], "FixedSize(3)"]]:
         """
         G54 ... G59, mm; empty: not known.
         """
     @work_offsets_mm.setter
-    def work_offsets_mm(
-        self,
-        arg0: collections.abc.Sequence[
-            typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]
-        ],
-    ) -> None: ...
-
+    def work_offsets_mm(self, arg0: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]) -> None:
+        ...
 class RegionNote:
     """
     An N word or a comment inside a region.
@@ -2174,21 +1942,11 @@ class RegionNote:
         """
         Index of the segment before which it stood.
         """
-
 class Region:
     """
     A run of cutting moves between two stops.
     """
-    def __init__(
-        self,
-        *,
-        path: Path,
-        entry: ModalState,
-        exit: ModalState,
-        line: typing.SupportsInt | typing.SupportsIndex,
-        text_begin: typing.SupportsInt | typing.SupportsIndex,
-        text_end: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None:
+    def __init__(self, *, path: Path, entry: ModalState, exit: ModalState, line: typing.SupportsInt | typing.SupportsIndex, text_begin: typing.SupportsInt | typing.SupportsIndex, text_end: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         One line of a text as a region that ends with an exact stop: what takes the place of a rapid. `path`: its move; `entry`, `exit`: modal state before and behind it; `text_begin`, `text_end`: its bytes.
         """
@@ -2262,16 +2020,11 @@ class Region:
         """
         Whether these shaped blocks stand in place of a rapid.
         """
-
 class ProgramText:
     """
     A program read: its text to the letter and its regions.
     """
-    def cutting_path(
-        self,
-        first_line: typing.SupportsInt | typing.SupportsIndex,
-        last_line: typing.SupportsInt | typing.SupportsIndex,
-    ) -> Path:
+    def cutting_path(self, first_line: typing.SupportsInt | typing.SupportsIndex, last_line: typing.SupportsInt | typing.SupportsIndex) -> Path:
         """
         The cutting moves of the regions within a range of lines of the source, as one path.
         """
@@ -2287,9 +2040,7 @@ class ProgramText:
         """
         Put bytes over as many. Raises ArgumentError beyond the text's end.
         """
-    def slice(
-        self, begin: typing.SupportsInt | typing.SupportsIndex, end: typing.SupportsInt | typing.SupportsIndex
-    ) -> bytes:
+    def slice(self, begin: typing.SupportsInt | typing.SupportsIndex, end: typing.SupportsInt | typing.SupportsIndex) -> bytes:
         """
         Bytes of the text between two offsets.
         """
@@ -2417,7 +2168,6 @@ class ProgramText:
         """
         (line, column, alarm, message, file) each; alarm 0: none; file empty: the program's own.
         """
-
 class ProgramEntry:
     """
     A program of a file that may hold several.
@@ -2452,81 +2202,59 @@ class ProgramEntry:
         """
         Byte offset behind its last line.
         """
-
 class LinearPlant:
     """
     A linear plant x' = A x + B u, y = C x + D u, propagated exactly from sample to sample.
-
+    
     The input is linear between samples (first-order hold), as a servo's set-points are; the state goes over a period by the
     matrix exponential, so stiff, undamped and integrating plants are as exact as any other. Units: whatever fits together,
     time in s.
-
+    
     Args:
         a: System matrix, (n, n).
         b: Input matrix, (n, m).
         c: Output matrix, (p, n).
         d: Feed-through, (p, m).
         period_s: Time between samples in s, above 0.
-
+    
     Raises:
         ArgumentError: Shapes that do not fit, an empty one, a value that is not finite, or a period not above 0.
         NumericError: The plant outgrows all numbers within a period.
     """
-    def __init__(
-        self,
-        a: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        c: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        d: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        period_s: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None:
+    def __init__(self, a: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], c: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], d: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         Make a plant, at rest with state and input 0.
         """
-    def reset(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    ) -> None:
+    def reset(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
         """
         State (n,) at the instant at which the input is `input` (m,); ArgumentError on another shape.
         """
-    def reset_at_rest(
-        self,
-        input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        near: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None,
-    ) -> None:
+    def reset_at_rest(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], near: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None) -> None:
         """
         Steady state under a constant input.
-
+        
         Args:
             input: Input, (m,).
             near: Where integrators leave a choice, the state of rest nearest to this one, (n,), is taken; none: to zero.
-
+        
         Raises:
             ArgumentError: No state rests under this input (an integrator fills), or another shape.
         """
-    def respond(
-        self,
-        inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None,
-    ) -> numpy.ndarray:
+    def respond(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None) -> numpy.ndarray:
         """
         Outputs for a whole record of inputs; what step() gives, to the last bit.
-
+        
         Args:
             inputs: One row per sample, (n_samples, m), at least one row.
             state: State at the first row, (n,); none: at rest under the first row.
-
+        
         Returns:
             Output at each row, (n_samples, p).
-
+        
         Raises:
             ArgumentError: Another shape, a value that is not finite, or no state of rest.
         """
-    def step(
-        self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    def step(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         One period later, with `input` (m,) at its end: the output (p,) there. In C++ real-time safe.
         """
@@ -2545,29 +2273,22 @@ class LinearPlant:
         """
         State at the last sample, (n,).
         """
-
 class ModeTable:
     """
     How a mode depends on where an axis stands. Immutable.
-
+    
     Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
-
+    
     Args:
         axis: Whose position counts: 0, 1, 2 for X, Y, Z.
         position_mm: Strictly ascending positions in mm, shape (n,).
         frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
         damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
-
+    
     Raises:
         ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.
     """
-    def __init__(
-        self,
-        axis: typing.SupportsInt | typing.SupportsIndex = 0,
-        position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [],
-        frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [],
-        damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [],
-    ) -> None:
+    def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
         """
         Make a table; ArgumentError if it is not what the class asks for.
         """
@@ -2595,49 +2316,60 @@ class ModeTable:
         """
         Positions in mm.
         """
-
 class FrictionModel:
     """
     How a sliding pair resists.
-
+    
     Members:
-
+    
       viscous : In proportion to the speed alone.
-
+    
       stribeck : Coulomb, static and Stribeck, smooth through zero speed.
-
+    
       lugre : The same with bristles: presliding, stick, frictional lag.
     """
-
     __members__: typing.ClassVar[dict[str, FrictionModel]]
     lugre: typing.ClassVar[FrictionModel]
     stribeck: typing.ClassVar[FrictionModel]
     viscous: typing.ClassVar[FrictionModel]
     @typing.overload
-    def __eq__(self, other: FrictionModel) -> bool: ...
+    def __eq__(self, other: FrictionModel) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: FrictionModel) -> bool: ...
+    def __ne__(self, other: FrictionModel) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class FrictionParameters:
     """
     Friction of one sliding pair. Immutable.
-
+    
     Args:
         model: See FrictionModel.
         viscous_n_s_per_m: Viscous friction in N s/m, >= 0.
@@ -2647,22 +2379,11 @@ class FrictionParameters:
         smoothing_velocity_m_per_s: Stribeck: sign(v) is tanh(v / this), m/s, > 0.
         bristle_stiffness_n_per_m: LuGre: force over displacement before sliding in N/m, > 0.
         bristle_damping_n_s_per_m: LuGre: damping of the bristles in N s/m, >= 0.
-
+    
     Raises:
         ArgumentError: A value outside its range.
     """
-    def __init__(
-        self,
-        model: FrictionModel = ...,
-        *,
-        viscous_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        coulomb_n: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        static_n: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        stribeck_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        smoothing_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        bristle_stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        bristle_damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    ) -> None:
+    def __init__(self, model: FrictionModel = ..., *, viscous_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, coulomb_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, static_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, stribeck_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, smoothing_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, bristle_stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, bristle_damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
         ArgumentError if it is not what the class asks for.
         """
@@ -2706,47 +2427,58 @@ class FrictionParameters:
         """
         N s/m.
         """
-
 class PositionFeedback:
     """
     What the position loop compares with the set-point.
-
+    
     Members:
-
+    
       motor : Encoder on the motor (semi-closed loop).
-
+    
       table : Linear scale on the table (fully closed loop).
     """
-
     __members__: typing.ClassVar[dict[str, PositionFeedback]]
     motor: typing.ClassVar[PositionFeedback]
     table: typing.ClassVar[PositionFeedback]
     @typing.overload
-    def __eq__(self, other: PositionFeedback) -> bool: ...
+    def __eq__(self, other: PositionFeedback) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: PositionFeedback) -> bool: ...
+    def __ne__(self, other: PositionFeedback) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class FeedDriveParameters:
     """
     Feed drive of one axis, referred to the travel of
     the table. Immutable.
-
+    
     Args:
         motor_mass_kg: Inertia of motor, coupling and screw in kg, > 0.
         table_mass_kg: Table with what it carries in kg, > 0.
@@ -2763,29 +2495,11 @@ class FeedDriveParameters:
         table_friction: Friction of the guideways.
         motor_friction: Friction of bearings, seals and nut.
         modes: Modes of the structure, excited by the motion of the table.
-
+    
     Raises:
         ArgumentError: A value outside its range.
     """
-    def __init__(
-        self,
-        *,
-        motor_mass_kg: typing.SupportsFloat | typing.SupportsIndex,
-        table_mass_kg: typing.SupportsFloat | typing.SupportsIndex,
-        stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex,
-        damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex,
-        position_gain_per_s: typing.SupportsFloat | typing.SupportsIndex,
-        velocity_gain_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex,
-        velocity_integral_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        velocity_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        acceleration_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        position_feedback: PositionFeedback = ...,
-        backlash_m: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        force_limit_n: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        table_friction: FrictionParameters = ...,
-        motor_friction: FrictionParameters = ...,
-        modes: collections.abc.Sequence[Mode] = [],
-    ) -> None:
+    def __init__(self, *, motor_mass_kg: typing.SupportsFloat | typing.SupportsIndex, table_mass_kg: typing.SupportsFloat | typing.SupportsIndex, stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex, damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, position_gain_per_s: typing.SupportsFloat | typing.SupportsIndex, velocity_gain_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, velocity_integral_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, velocity_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, acceleration_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_feedback: PositionFeedback = ..., backlash_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, table_friction: FrictionParameters = ..., motor_friction: FrictionParameters = ..., modes: collections.abc.Sequence[Mode] = []) -> None:
         """
         ArgumentError if it is not what the class asks for.
         """
@@ -2864,30 +2578,24 @@ class FeedDriveParameters:
         """
         s; 0: none.
         """
-
 class FeedDrive:
     """
     Feed drive of one axis, integrated by CVODE.
-
+    
     Set-points come once per period and are joined by straight lines.
-
+    
     Args:
         parameters: The drive.
         period_s: Time between set-points in s.
         rtol: Relative tolerance of following error, deflections and speeds.
         atol_mm: Absolute tolerance of lengths in mm; that of speeds is 100 atol_mm per second.
-
+    
     Raises:
         ArgumentError: A value outside its range.
     """
-    def __copy__(self) -> FeedDrive: ...
-    def __init__(
-        self,
-        parameters: FeedDriveParameters,
-        period_s: typing.SupportsFloat | typing.SupportsIndex,
-        rtol: typing.SupportsFloat | typing.SupportsIndex = 1e-06,
-        atol_mm: typing.SupportsFloat | typing.SupportsIndex = 1e-06,
-    ) -> None:
+    def __copy__(self) -> FeedDrive:
+        ...
+    def __init__(self, parameters: FeedDriveParameters, period_s: typing.SupportsFloat | typing.SupportsIndex, rtol: typing.SupportsFloat | typing.SupportsIndex = 1e-06, atol_mm: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> None:
         """
         ArgumentError on a value outside its range.
         """
@@ -2898,14 +2606,14 @@ class FeedDrive:
     def respond(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
         """
         Runs on over many set-points.
-
+        
         Args:
             setpoints_mm: Shape (n,), mm.
-
+        
         Returns:
             (n, 6): response, table and motor in mm, friction on the table, force of the motor and of the spring in N, each
             at the instant of its set-point.
-
+        
         Raises:
             ArgumentError: Another shape or a value that is not finite.
             NumericError: The integrator failed; with CVODE's flag and the time.
@@ -2949,25 +2657,19 @@ class FeedDrive:
         """
         Since reset(), s.
         """
-
 class FeedDriveRealTime:
     """
     The same with fixed steps and without error control: the real-time form.
-
+    
     Args:
         parameters: The drive.
         period_s: Time between set-points in s.
         substeps: Steps in a period, 1 ... 1000.
-
+    
     Raises:
         ArgumentError: A value outside its range.
     """
-    def __init__(
-        self,
-        parameters: FeedDriveParameters,
-        period_s: typing.SupportsFloat | typing.SupportsIndex,
-        substeps: typing.SupportsInt | typing.SupportsIndex = 4,
-    ) -> None:
+    def __init__(self, parameters: FeedDriveParameters, period_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 4) -> None:
         """
         ArgumentError on a value outside its range.
         """
@@ -2983,11 +2685,10 @@ class FeedDriveRealTime:
         """
         Next set-point (mm); the response at that instant in mm.
         """
-
 class Arma:
     """
     ARMA(2n, 2n-1) model: response = B(z)/A(z) force, A = 1 - phi_1/z - ... - phi_2n/z^2n.
-
+    
     For a free decay the force is a unit impulse at the first sample. Source: paper 003, eq. 1-4.
     """
     @property
@@ -3025,7 +2726,6 @@ class Arma:
         """
         theta_k = -b_k/b_0, one column less than the numerator; nan where b_0 is 0.
         """
-
 class ModalFit:
     """
     Modes fitted to taps by fit_modes, with their covariance.
@@ -3115,7 +2815,6 @@ class ModalFit:
         """
         Sum of the squared residuals, in the response's unit squared.
         """
-
 class DecayFit:
     """
     Modes fitted to free decays by fit_decay, with their covariance.
@@ -3200,7 +2899,6 @@ class DecayFit:
         """
         Sum of the squared residuals, in the response's unit squared.
         """
-
 class ModeRanking:
     """
     Candidates in the order in which they explain what others leave.
@@ -3220,7 +2918,6 @@ class ModeRanking:
         """
         Squares of the responses, offsets taken out.
         """
-
 class EquivalentMass:
     """
     Mass whose simulated response has the measured RMS.
@@ -3250,167 +2947,190 @@ class EquivalentMass:
         """
         RMS of the simulated one, in the same unit.
         """
-
 class ContourTarget:
     """
     What shall follow the programmed path.
-
+    
     Members:
-
+    
       none : Nothing: the path is shaped as it is.
-
+    
       command : The shaped command.
-
+    
       response : The plant's response to it: the part.
     """
-
     __members__: typing.ClassVar[dict[str, ContourTarget]]
     command: typing.ClassVar[ContourTarget]
     none: typing.ClassVar[ContourTarget]
     response: typing.ClassVar[ContourTarget]
     @typing.overload
-    def __eq__(self, other: ContourTarget) -> bool: ...
+    def __eq__(self, other: ContourTarget) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: ContourTarget) -> bool: ...
+    def __ne__(self, other: ContourTarget) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class ShapingOptions:
     """
     How a region is turned into a shaped command on the block grid.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def axis_shapers(self) -> list[Fir]:
         """
         A shaper for each of X, Y and Z, of one mean delay, in place of the common one; empty: none.
         """
     @axis_shapers.setter
-    def axis_shapers(self, arg0: collections.abc.Sequence[Fir]) -> None: ...
+    def axis_shapers(self, arg0: collections.abc.Sequence[Fir]) -> None:
+        ...
     @property
     def block_period_s(self) -> float:
         """
         s.
         """
     @block_period_s.setter
-    def block_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def block_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def contour_smoothness(self) -> float:
         """
         Weight of the correction's second differences.
         """
     @contour_smoothness.setter
-    def contour_smoothness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def contour_smoothness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed_excess_ratio(self) -> float:
         """
         Share by which the shaped command may run faster along the path than programmed.
         """
     @feed_excess_ratio.setter
-    def feed_excess_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def feed_excess_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def following(self) -> FollowingFir | None:
         """
         Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.
         """
     @following.setter
-    def following(self, arg0: FollowingFir | None) -> None: ...
+    def following(self, arg0: FollowingFir | None) -> None:
+        ...
     @property
     def further_stops(self) -> list[int]:
         """
         Ascending indices of segments before which the command comes to rest too.
         """
     @further_stops.setter
-    def further_stops(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None: ...
+    def further_stops(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
     @property
     def interpolation_period_s(self) -> float:
         """
         s.
         """
     @interpolation_period_s.setter
-    def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def least_feed_mm_per_s(self) -> float:
         """
         What the controller can run: no run is slowed below it, mm/s.
         """
     @least_feed_mm_per_s.setter
-    def least_feed_mm_per_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def least_feed_mm_per_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def limits(self) -> MotionLimits:
         """
         Limits of the look-ahead.
         """
     @limits.setter
-    def limits(self, arg0: MotionLimits) -> None: ...
+    def limits(self, arg0: MotionLimits) -> None:
+        ...
     @property
     def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
         """
         How the modes vary with the position of the axis that is followed, for the response as target.
         """
     @mode_tables.setter
-    def mode_tables(
-        self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]
-    ) -> None: ...
+    def mode_tables(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]) -> None:
+        ...
     @property
     def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
         """
         Modes of X, Y and Z, for the response as target.
         """
     @modes.setter
-    def modes(
-        self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]
-    ) -> None: ...
+    def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
+        ...
     @property
     def plunge_axis_angle_rad(self) -> float:
         """
         How far a side of a corner may lean from Z and still count as plunge, rad.
         """
     @plunge_axis_angle_rad.setter
-    def plunge_axis_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def plunge_axis_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def plunge_corner_angle_rad(self) -> float:
         """
         Least change of direction of such a corner, rad.
         """
     @plunge_corner_angle_rad.setter
-    def plunge_corner_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def plunge_corner_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def rest_at_stop_s(self) -> float:
         """
         Pause at a forced stop, s.
         """
     @rest_at_stop_s.setter
-    def rest_at_stop_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def rest_at_stop_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def target(self) -> ContourTarget:
         """
         What is brought back to the path; with a target, `tolerance` is its own.
         """
     @target.setter
-    def target(self, arg0: ContourTarget) -> None: ...
+    def target(self, arg0: ContourTarget) -> None:
+        ...
     @property
     def tolerance(self) -> FilterTolerance:
         """
         Of the shaper with what follows it.
         """
     @tolerance.setter
-    def tolerance(self, arg0: FilterTolerance) -> None: ...
-
+    def tolerance(self, arg0: FilterTolerance) -> None:
+        ...
 class ShapedCommand:
     """
     A shaped command on the block grid.
@@ -3445,41 +3165,34 @@ class ShapedCommand:
         """
         Per marked segment the period of the region in which its begin is reached.
         """
-
 class RegionShaper:
     """
     A region's shaped command in parts, so that memory does not grow with the region.
-
+    
     Args:
         path: The programmed path.
         shaper: Taps in whole block periods, common to all axes.
         marked_segments: Ascending indices whose begin in time is wanted.
         options: How the region is shaped.
-
+    
     Raises:
         ArgumentError: The block period is no multiple of the interpolation period, or a limit is not above 0.
     """
-    def __init__(
-        self,
-        path: Path,
-        shaper: Fir,
-        marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        options: ShapingOptions,
-    ) -> None:
+    def __init__(self, path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> None:
         """
         See the class.
         """
     def begin_anew(self) -> bool:
         """
         Give the region out from its begin again, with the feed that the search finds.
-
+        
         Returns:
             False, and nothing is done, if no part was given out early.
         """
     def begin_early(self) -> None:
         """
         To be called before the first part: do not wait for the search for the feed.
-
+        
         Where the region is one run, its parts are given out while they are measured, as if the first plan kept the tolerance.
         Where that turns out to be wrong, next() gives None and is_withdrawn holds: all that was given out is void.
         """
@@ -3512,51 +3225,36 @@ class RegionShaper:
         """
         Stops at corners that no speed passes within the tolerance.
         """
-
 class ContourSolver:
     """
     Correction of a command before shaping that brings the shaped command back to the path.
-
+    
     Minimises |e + f*c|^2 + w |second differences of c|^2 for one axis.
-
+    
     Args:
         kernel: f, taps at delays 0, 1, ... samples.
         smoothness: w, above 0.
-
+    
     Raises:
         ArgumentError: An empty or not finite kernel, or a smoothness that is not above 0.
-
+    
     Source: this project.
     """
-    def __init__(
-        self,
-        kernel: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        smoothness: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None:
+    def __init__(self, kernel: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], smoothness: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         See the class.
         """
-    def solve(
-        self,
-        error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        carried: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] = ...,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def solve(self, error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], carried: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] = ...) -> numpy.typing.NDArray[numpy.float64]:
         """
         Corrections (m,) for errors (m + len(kernel) - 1,); `carried`: the len(kernel) + 1 corrections before.
         """
-
 class FitOptions:
     """
     Grid on which blocks are fitted.
     """
-    def __init__(self) -> None: ...
-    def end_with_arc(
-        self,
-        clockwise: bool,
-        normal: typing.SupportsInt | typing.SupportsIndex,
-        radius_mm: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None:
+    def __init__(self) -> None:
+        ...
+    def end_with_arc(self, clockwise: bool, normal: typing.SupportsInt | typing.SupportsIndex, radius_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         The last block must be an arc, so that the modal motion code behind it is G02 or G03.
         """
@@ -3566,92 +3264,102 @@ class FitOptions:
         Shorter pieces are lines, mm.
         """
     @arc_min_chord_mm.setter
-    def arc_min_chord_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def arc_min_chord_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def block_period_s(self) -> float:
         """
         s.
         """
     @block_period_s.setter
-    def block_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def block_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def equal_above_increments(self) -> float:
         """
         Distance per interpolation period up to which blocks may be longer than that, increments.
         """
     @equal_above_increments.setter
-    def equal_above_increments(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def equal_above_increments(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def equal_periods(self) -> int:
         """
         Likewise blocks so far from both ends of a steady section, block periods; 0: none.
         """
     @equal_periods.setter
-    def equal_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def equal_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed_unit_mm_per_s(self) -> float:
         """
         One step of the last F digit, mm/s.
         """
     @feed_unit_mm_per_s.setter
-    def feed_unit_mm_per_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def feed_unit_mm_per_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def increment_mm(self) -> float:
         """
         Least increment of the words, mm.
         """
     @increment_mm.setter
-    def increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def interpolation_period_s(self) -> float:
         """
         s.
         """
     @interpolation_period_s.setter
-    def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def lent_periods(self) -> int:
         """
         Periods that the blocks before did not last.
         """
     @lent_periods.setter
-    def lent_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def lent_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def merge_tolerance_increments(self) -> float:
         """
         Deviation of merged blocks per axis, least increments.
         """
     @merge_tolerance_increments.setter
-    def merge_tolerance_increments(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def merge_tolerance_increments(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def minimum_feed(self) -> int:
         """
         In feed units.
         """
     @minimum_feed.setter
-    def minimum_feed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def minimum_feed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
         """
         Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the nearest increment.
         """
     @modes.setter
-    def modes(
-        self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]
-    ) -> None: ...
+    def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
+        ...
     @property
     def most_periods(self) -> int:
         """
         Longest block, block periods. 1: all last the same time, for a feed override that is turned.
         """
     @most_periods.setter
-    def most_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-
+    def most_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
 class FittedBlocks:
     """
     Blocks ready to be written.
     """
-    def __len__(self) -> int: ...
+    def __len__(self) -> int:
+        ...
     @property
     def ends(self) -> numpy.typing.NDArray[numpy.int64]:
         """
@@ -3672,109 +3380,121 @@ class FittedBlocks:
         """
         Whole block periods that each lasts, (n,).
         """
-
 class BlockMark:
     """
     An N word or comment to be written before the block that begins there.
     """
-    def __init__(
-        self,
-        period: typing.SupportsInt | typing.SupportsIndex,
-        n_number: typing.SupportsInt | typing.SupportsIndex = -1,
-        comment: bytes = b"",
-        n_digits: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
-
+    def __init__(self, period: typing.SupportsInt | typing.SupportsIndex, n_number: typing.SupportsInt | typing.SupportsIndex = -1, comment: bytes = b'', n_digits: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
 class WriterOptions:
     """
     How fitted blocks are written.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def exact_stop_at_end(self) -> bool:
         """
         G09 on the last block.
         """
     @exact_stop_at_end.setter
-    def exact_stop_at_end(self, arg0: bool) -> None: ...
+    def exact_stop_at_end(self, arg0: bool) -> None:
+        ...
     @property
     def feed_decimals(self) -> int:
         """
         Digits behind the point.
         """
     @feed_decimals.setter
-    def feed_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def feed_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def incremental(self) -> bool:
         """
         G91 words.
         """
     @incremental.setter
-    def incremental(self, arg0: bool) -> None: ...
+    def incremental(self, arg0: bool) -> None:
+        ...
     @property
     def line_end(self) -> str:
         """
         Line end.
         """
     @line_end.setter
-    def line_end(self, arg0: str) -> None: ...
+    def line_end(self, arg0: str) -> None:
+        ...
     @property
     def motion(self) -> int:
         """
         Motion code active before the first block.
         """
     @motion.setter
-    def motion(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def motion(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def plane(self) -> int:
         """
         Plane active before the first block.
         """
     @plane.setter
-    def plane(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def plane(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def position_decimals(self) -> int:
         """
         Digits behind the point.
         """
     @position_decimals.setter
-    def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-
+    def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
 class BlockEnd:
     """
     When a block's successor starts.
-
+    
     Members:
-
+    
       ceil
-
+    
       carry
     """
-
     __members__: typing.ClassVar[dict[str, BlockEnd]]
     carry: typing.ClassVar[BlockEnd]
     ceil: typing.ClassVar[BlockEnd]
     @typing.overload
-    def __eq__(self, other: BlockEnd) -> bool: ...
+    def __eq__(self, other: BlockEnd) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: BlockEnd) -> bool: ...
+    def __ne__(self, other: BlockEnd) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class DeviationStats:
     """
     Statistics of a signed deviation.
@@ -3809,7 +3529,6 @@ class DeviationStats:
         """
         mm^2.
         """
-
 class ContourTracker:
     """
     Geometry of a path for the distance of a moving point to it.
@@ -3818,164 +3537,180 @@ class ContourTracker:
         """
         Raises ArgumentError on a path without segments.
         """
-
 class SimulationOptions:
     """
     What a run of set-points is measured with.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def arrived_mm(self) -> float:
         """
         Drives: the residual is the vibration of the table against its motor once that is so near, mm; 0: the whole error from the stop on.
         """
     @arrived_mm.setter
-    def arrived_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def arrived_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def axis_filters(self) -> list[Fir]:
         """
         Filters after the set-points, in order.
         """
     @axis_filters.setter
-    def axis_filters(self, arg0: collections.abc.Sequence[Fir]) -> None: ...
+    def axis_filters(self, arg0: collections.abc.Sequence[Fir]) -> None:
+        ...
     @property
     def drives(self) -> list[FeedDriveParameters]:
         """
         Feed drives of X, Y and Z in place of the modes; none: modes alone.
         """
     @drives.setter
-    def drives(self, arg0: collections.abc.Sequence[FeedDriveParameters]) -> None: ...
+    def drives(self, arg0: collections.abc.Sequence[FeedDriveParameters]) -> None:
+        ...
     @property
     def feed_slack_mm(self) -> float:
         """
         Distance within that time that rounding may add, mm.
         """
     @feed_slack_mm.setter
-    def feed_slack_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def feed_slack_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed_window_s(self) -> float:
         """
         Time over which the speed is held against the programmed feed, beside four and sixteen times it, s; 0: not measured.
         """
     @feed_window_s.setter
-    def feed_window_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def feed_window_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def last_seconds(self) -> float:
         """
         Blocks only: simulate the last so many seconds; 0: all.
         """
     @last_seconds.setter
-    def last_seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def last_seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def measure_command(self) -> bool:
         """
         False: the deviation of the response alone, no orbit errors.
         """
     @measure_command.setter
-    def measure_command(self, arg0: bool) -> None: ...
+    def measure_command(self, arg0: bool) -> None:
+        ...
     @property
     def measure_contour(self) -> bool:
         """
         Deviations and orbit errors.
         """
     @measure_contour.setter
-    def measure_contour(self, arg0: bool) -> None: ...
+    def measure_contour(self, arg0: bool) -> None:
+        ...
     @property
     def measure_response(self) -> bool:
         """
         False: the command alone; no figures of the response.
         """
     @measure_response.setter
-    def measure_response(self, arg0: bool) -> None: ...
+    def measure_response(self, arg0: bool) -> None:
+        ...
     @property
     def measure_response_orbit(self) -> bool:
         """
         Orbit errors of the response too, where the contour is measured.
         """
     @measure_response_orbit.setter
-    def measure_response_orbit(self, arg0: bool) -> None: ...
+    def measure_response_orbit(self, arg0: bool) -> None:
+        ...
     @property
     def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
         """
         How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.
         """
     @mode_tables.setter
-    def mode_tables(
-        self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]
-    ) -> None: ...
+    def mode_tables(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]) -> None:
+        ...
     @property
     def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
         """
         Modes of X, Y and Z.
         """
     @modes.setter
-    def modes(
-        self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]
-    ) -> None: ...
+    def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
+        ...
     @property
     def other_overrides(self) -> list[float]:
         """
         Blocks only: the largest deviations at these feed overrides too.
         """
     @other_overrides.setter
-    def other_overrides(self, arg0: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None: ...
+    def other_overrides(self, arg0: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
     @property
     def period_s(self) -> float:
         """
         Interpolation period, s.
         """
     @period_s.setter
-    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def record_samples(self) -> int:
         """
         Samples kept for pictures; 0: none.
         """
     @record_samples.setter
-    def record_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def record_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def settling_band_mm(self) -> float:
         """
         Of the settling time, mm; 0: none.
         """
     @settling_band_mm.setter
-    def settling_band_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def settling_band_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def settling_limit_s(self) -> float:
         """
         How long behind the stop it is looked for; with drives the residual too, s.
         """
     @settling_limit_s.setter
-    def settling_limit_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def settling_limit_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def starved_blocks(self) -> list[int]:
         """
         Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?
         """
     @starved_blocks.setter
-    def starved_blocks(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None: ...
+    def starved_blocks(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
     @property
     def starved_memory_s(self) -> float:
         """
         How much of the run behind such a wait is looked at, s; 0: all.
         """
     @starved_memory_s.setter
-    def starved_memory_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def starved_memory_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def starved_s(self) -> float:
         """
         How long the set-points then wait, s.
         """
     @starved_s.setter
-    def starved_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def starved_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def tracker(self) -> ContourTracker:
         """
         Tracker of the path, whose geometry several runs share; None: each run makes its own.
         """
     @tracker.setter
-    def tracker(self, arg1: ContourTracker) -> None: ...
-
+    def tracker(self, arg1: ContourTracker) -> None:
+        ...
 class FeedExcess:
     """
     Where a motion is fastest against the programmed feed at the same position.
@@ -4000,7 +3735,6 @@ class FeedExcess:
         """
         Speed there, mm/s.
         """
-
 class StarvedFigures:
     """
     What a wait for the next block does to a run.
@@ -4025,7 +3759,6 @@ class StarvedFigures:
         """
         Deviation of the response from the path.
         """
-
 class OverrideFigures:
     """
     The largest deviations of a run at another feed override.
@@ -4045,7 +3778,6 @@ class OverrideFigures:
         """
         Of the response from the path, mm.
         """
-
 class SimulationFigures:
     """
     Figures of one run from rest to rest.
@@ -4125,45 +3857,56 @@ class SimulationFigures:
         """
         One per SimulationOptions.starved_blocks.
         """
-
 class SectionKind:
     """
     What a section of a path is.
-
+    
     Members:
-
+    
       line : Lines of one direction.
-
+    
       arc : Arcs about one centre.
-
+    
       curve : Anything else.
     """
-
     __members__: typing.ClassVar[dict[str, SectionKind]]
     arc: typing.ClassVar[SectionKind]
     curve: typing.ClassVar[SectionKind]
     line: typing.ClassVar[SectionKind]
     @typing.overload
-    def __eq__(self, other: SectionKind) -> bool: ...
+    def __eq__(self, other: SectionKind) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: SectionKind) -> bool: ...
+    def __ne__(self, other: SectionKind) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class PathSection:
     """
     A section of a path that is measured by itself.
@@ -4213,7 +3956,6 @@ class PathSection:
         """
         The path stops at its end.
         """
-
 class CircleFit:
     """
     The circle of least squares of radial distance through points.
@@ -4238,7 +3980,6 @@ class CircleFit:
         """
         Root mean square of the radial distances, mm.
         """
-
 class Roughness:
     """
     Figures of a profile after ISO 4287.
@@ -4268,7 +4009,6 @@ class Roughness:
         """
         Arithmetic mean height of the waviness, mm.
         """
-
 class RestVibration:
     """
     What a plant does while its command stands still.
@@ -4293,7 +4033,6 @@ class RestVibration:
         """
         Until |response - command| stays within the band, (3,), s; NaN where that was not seen.
         """
-
 class WallFigures:
     """
     One wall of a section, or the width between both.
@@ -4323,7 +4062,6 @@ class WallFigures:
         """
         Positions at which it could be measured.
         """
-
 class ArcFigures:
     """
     A circle through what was moved or cut on an arc.
@@ -4338,7 +4076,6 @@ class ArcFigures:
         """
         Mean distance from the programmed centre, mm.
         """
-
 class SideFigures:
     """
     Largest distance from the path on each side of it.
@@ -4363,7 +4100,6 @@ class SideFigures:
         """
         mm.
         """
-
 class SectionFigures:
     """
     What was measured in one section.
@@ -4478,7 +4214,6 @@ class SectionFigures:
         """
         Left less right wall, with the tool's diameter.
         """
-
 class TrackFigures:
     """
     Figures of all samples measured.
@@ -4518,62 +4253,68 @@ class TrackFigures:
         """
         In the order of the path.
         """
-
 class MetrologyOptions:
     """
     With what a run is measured.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def band_mm(self) -> float:
         """
         Settled is what stays within it, mm.
         """
     @band_mm.setter
-    def band_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def band_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def cutoff_mm(self) -> float:
         """
         Cut-off lambda c, mm; 0: by the section's length.
         """
     @cutoff_mm.setter
-    def cutoff_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def cutoff_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def lambda_s_mm(self) -> float:
         """
         Short-wave cut-off, mm; 0: none.
         """
     @lambda_s_mm.setter
-    def lambda_s_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def lambda_s_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def least_rest_s(self) -> float:
         """
         A shorter standstill is no stop, s.
         """
     @least_rest_s.setter
-    def least_rest_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def least_rest_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def period_s(self) -> float:
         """
         Between two samples, s.
         """
     @period_s.setter
-    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def station_spacing_mm(self) -> float:
         """
         Largest, mm.
         """
     @station_spacing_mm.setter
-    def station_spacing_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def station_spacing_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def tool_radius_mm(self) -> float:
         """
         Of the disc that is swept, mm.
         """
     @tool_radius_mm.setter
-    def tool_radius_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
-
+    def tool_radius_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class SectionMetrology:
     """
     Measures what a run of samples does to the sections of a path.
@@ -4582,11 +4323,7 @@ class SectionMetrology:
         """
         Raises ArgumentError on a path without length, sections of another path, or an option outside its range.
         """
-    def feed(
-        self,
-        command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        response_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> None:
+    def feed(self, command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
         The next samples of both, (n, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
         """
@@ -4594,9 +4331,7 @@ class SectionMetrology:
         """
         Everything measured so far. Raises NumericError if a circle fit does not converge.
         """
-    def wall_profile(
-        self, section: typing.SupportsInt | typing.SupportsIndex
-    ) -> tuple[float, float, numpy.ndarray, numpy.ndarray, numpy.ndarray, numpy.ndarray]:
+    def wall_profile(self, section: typing.SupportsInt | typing.SupportsIndex) -> tuple[float, float, numpy.ndarray, numpy.ndarray, numpy.ndarray, numpy.ndarray]:
         """
         Distance of the first station from the path's start and spacing, mm; deviation of left and right wall, (n,), mm, positive to the left, NaN where there is no wall; the path's points and left normals seen from above, (n, 2).
         """
@@ -4605,7 +4340,6 @@ class SectionMetrology:
         """
         Largest distance of two stations, mm.
         """
-
 class PathFollower:
     """
     By how much, and in which direction, a table leaves the path that its command follows.
@@ -4614,457 +4348,523 @@ class PathFollower:
         """
         Raises ArgumentError on a path without segments.
         """
-    def step(
-        self,
-        command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        response_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    def step(self, command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         The next samples of both, (k, 3), mm: from foot on the path to response, (k, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
         """
-
 class MotionKind:
     """
     Where the controller accelerates a cutting move.
-
+    
     Members:
-
+    
       look_ahead
-
+    
       after_interpolation
     """
-
     __members__: typing.ClassVar[dict[str, MotionKind]]
     after_interpolation: typing.ClassVar[MotionKind]
     look_ahead: typing.ClassVar[MotionKind]
     @typing.overload
-    def __eq__(self, other: MotionKind) -> bool: ...
+    def __eq__(self, other: MotionKind) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: MotionKind) -> bool: ...
+    def __ne__(self, other: MotionKind) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class FilterShape:
     """
     Shape of the acceleration after interpolation.
-
+    
     Members:
-
+    
       linear
-
+    
       exponential
     """
-
     __members__: typing.ClassVar[dict[str, FilterShape]]
     exponential: typing.ClassVar[FilterShape]
     linear: typing.ClassVar[FilterShape]
     @typing.overload
-    def __eq__(self, other: FilterShape) -> bool: ...
+    def __eq__(self, other: FilterShape) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: FilterShape) -> bool: ...
+    def __ne__(self, other: FilterShape) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class RapidPath:
     """
     Path of a rapid (1401#1).
-
+    
     Members:
-
+    
       linear
-
+    
       non_linear
     """
-
     __members__: typing.ClassVar[dict[str, RapidPath]]
     linear: typing.ClassVar[RapidPath]
     non_linear: typing.ClassVar[RapidPath]
     @typing.overload
-    def __eq__(self, other: RapidPath) -> bool: ...
+    def __eq__(self, other: RapidPath) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: RapidPath) -> bool: ...
+    def __ne__(self, other: RapidPath) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class InPosition:
     """
     Where the wait for in-position comes from.
-
+    
     Members:
-
+    
       measured
-
+    
       servo_lag
     """
-
     __members__: typing.ClassVar[dict[str, InPosition]]
     measured: typing.ClassVar[InPosition]
     servo_lag: typing.ClassVar[InPosition]
     @typing.overload
-    def __eq__(self, other: InPosition) -> bool: ...
+    def __eq__(self, other: InPosition) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: InPosition) -> bool: ...
+    def __ne__(self, other: InPosition) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class ShapedRegions:
     """
     Which cuts of a program run as shaped blocks.
-
+    
     Members:
-
+    
       marked : Regions that the program says it of.
-
+    
       all
-
+    
       none
     """
-
     __members__: typing.ClassVar[dict[str, ShapedRegions]]
     all: typing.ClassVar[ShapedRegions]
     marked: typing.ClassVar[ShapedRegions]
     none: typing.ClassVar[ShapedRegions]
     @typing.overload
-    def __eq__(self, other: ShapedRegions) -> bool: ...
+    def __eq__(self, other: ShapedRegions) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: ShapedRegions) -> bool: ...
+    def __ne__(self, other: ShapedRegions) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class FanucModel:
     """
     What decides how long a program takes, and what acceleration does to the path.
     """
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        ...
     @property
     def bell_time_s(self) -> float:
         """
         After interpolation, linear: second moving average, s; 0: none.
         """
     @bell_time_s.setter
-    def bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def block_end(self) -> BlockEnd:
         """
         When a block's successor starts.
         """
     @block_end.setter
-    def block_end(self, arg0: BlockEnd) -> None: ...
+    def block_end(self, arg0: BlockEnd) -> None:
+        ...
     @property
     def exponential_rest(self) -> float:
         """
         Share of the exponential's weights that is cut off at its end.
         """
     @exponential_rest.setter
-    def exponential_rest(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def exponential_rest(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def feed_forward_ratio(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Per axis, 0 ... 1, shape (3,) (2092).
         """
     @feed_forward_ratio.setter
-    def feed_forward_ratio(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    def feed_forward_ratio(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def feed_override(self) -> float:
         """
         Scales every programmed feed.
         """
     @feed_override.setter
-    def feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def filter_shape(self) -> FilterShape:
         """
         After interpolation: linear or exponential.
         """
     @filter_shape.setter
-    def filter_shape(self, arg0: FilterShape) -> None: ...
+    def filter_shape(self, arg0: FilterShape) -> None:
+        ...
     @property
     def in_position(self) -> InPosition:
         """
         Measured or from the servo lag.
         """
     @in_position.setter
-    def in_position(self, arg0: InPosition) -> None: ...
+    def in_position(self, arg0: InPosition) -> None:
+        ...
     @property
     def in_position_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Measured wait, per axis, s, shape (3,).
         """
     @in_position_s.setter
-    def in_position_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    def in_position_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def in_position_width_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Per axis, mm, shape (3,) (1826).
         """
     @in_position_width_mm.setter
-    def in_position_width_mm(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    def in_position_width_mm(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def last_tool_in_spindle(self) -> bool:
         """
         At the start, from the run before: an M06 that calls it changes nothing.
         """
     @last_tool_in_spindle.setter
-    def last_tool_in_spindle(self, arg0: bool) -> None: ...
+    def last_tool_in_spindle(self, arg0: bool) -> None:
+        ...
     @property
     def limits(self) -> MotionLimits:
         """
         Look-ahead; the axes' feed limits hold always.
         """
     @limits.setter
-    def limits(self, arg0: MotionLimits) -> None: ...
+    def limits(self, arg0: MotionLimits) -> None:
+        ...
     @property
     def look_ahead_filter_time_constant_s(self) -> float:
         """
         Moving average behind look-ahead, s (1769); 0: none.
         """
     @look_ahead_filter_time_constant_s.setter
-    def look_ahead_filter_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def look_ahead_filter_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def m_code_s(self) -> dict[int, float]:
         """
         M codes with a time of their own: code -> s.
         """
     @m_code_s.setter
-    def m_code_s(
-        self,
-        arg0: collections.abc.Mapping[
-            typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex
-        ],
-    ) -> None: ...
+    def m_code_s(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
     @property
     def m_function_s(self) -> float:
         """
         Every M code without a time of its own, s.
         """
     @m_function_s.setter
-    def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def motion(self) -> MotionKind:
         """
         Where a cutting move is accelerated.
         """
     @motion.setter
-    def motion(self, arg0: MotionKind) -> None: ...
+    def motion(self, arg0: MotionKind) -> None:
+        ...
     @property
     def period_s(self) -> float:
         """
         Interpolation period, s.
         """
     @period_s.setter
-    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def position_gain_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Per axis, 1/s, shape (3,) (1825).
         """
     @position_gain_per_s.setter
-    def position_gain_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    def position_gain_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def program_start_s(self) -> float:
         """
         From the start key to the first block, s.
         """
     @program_start_s.setter
-    def program_start_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def program_start_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def rapid_bell_time_s(self) -> float:
         """
         s (1621); 0: none.
         """
     @rapid_bell_time_s.setter
-    def rapid_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def rapid_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def rapid_override(self) -> float:
         """
         Scales the rapid rates; the acceleration of a rapid stays.
         """
     @rapid_override.setter
-    def rapid_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def rapid_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def rapid_path(self) -> RapidPath:
         """
         Straight or every axis for itself.
         """
     @rapid_path.setter
-    def rapid_path(self, arg0: RapidPath) -> None: ...
+    def rapid_path(self, arg0: RapidPath) -> None:
+        ...
     @property
     def rapid_rate_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Per axis, shape (3,) (1420).
         """
     @rapid_rate_mm_per_s.setter
-    def rapid_rate_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    def rapid_rate_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def rapid_time_constant_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         From rest to the rate, per axis, s, shape (3,) (1620).
         """
     @rapid_time_constant_s.setter
-    def rapid_time_constant_s(
-        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
-    ) -> None: ...
+    def rapid_time_constant_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
     @property
     def shaped_bell_time_s(self) -> float:
         """
         Behind shaped blocks, linear: second moving average, s; 0: none.
         """
     @shaped_bell_time_s.setter
-    def shaped_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def shaped_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def shaped_block_end(self) -> BlockEnd:
         """
         When a shaped block's successor starts; ceil is the slower rule.
         """
     @shaped_block_end.setter
-    def shaped_block_end(self, arg0: BlockEnd) -> None: ...
+    def shaped_block_end(self, arg0: BlockEnd) -> None:
+        ...
     @property
     def shaped_filter_shape(self) -> FilterShape:
         """
         Behind shaped blocks.
         """
     @shaped_filter_shape.setter
-    def shaped_filter_shape(self, arg0: FilterShape) -> None: ...
+    def shaped_filter_shape(self, arg0: FilterShape) -> None:
+        ...
     @property
     def shaped_regions(self) -> ShapedRegions:
         """
         What runs as shaped blocks.
         """
     @shaped_regions.setter
-    def shaped_regions(self, arg0: ShapedRegions) -> None: ...
+    def shaped_regions(self, arg0: ShapedRegions) -> None:
+        ...
     @property
     def shaped_time_constant_s(self) -> float:
         """
         Behind shaped blocks, s; 0: no filter.
         """
     @shaped_time_constant_s.setter
-    def shaped_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def shaped_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def spindle_start_s(self) -> list[tuple[float, float]]:
         """
         (speed in 1/min, s) in which the spindle comes from rest to it.
         """
     @spindle_start_s.setter
-    def spindle_start_s(
-        self,
-        arg1: collections.abc.Sequence[
-            tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]
-        ],
-    ) -> None: ...
+    def spindle_start_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
     @property
     def spindle_stop_s(self) -> list[tuple[float, float]]:
         """
         (speed in 1/min, s) in which the spindle comes from it to rest.
         """
     @spindle_stop_s.setter
-    def spindle_stop_s(
-        self,
-        arg1: collections.abc.Sequence[
-            tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]
-        ],
-    ) -> None: ...
+    def spindle_stop_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
     @property
     def time_constant_s(self) -> float:
         """
         After interpolation, s (1622).
         """
     @time_constant_s.setter
-    def time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def tool_change_s(self) -> float:
         """
         M06, s.
         """
     @tool_change_s.setter
-    def tool_change_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def tool_change_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def unknown_move_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Per axis: a rapid whose start or end the program does not give, s, shape (3,).
         """
     @unknown_move_s.setter
-    def unknown_move_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
-
+    def unknown_move_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
 class ServoLag:
     """
     Position loop of each axis as a first-order lag with feed-forward: x' = K (r - x) + a r'.
     """
-    def __init__(
-        self,
-        position_gain_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        feed_forward_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        period_s: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None:
+    def __init__(self, position_gain_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_forward_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         At rest at zero. Raises ArgumentError on a period or gain <= 0 or a ratio outside 0 ... 1.
         """
@@ -5072,9 +4872,7 @@ class ServoLag:
         """
         Rest at `position`, shape (3,).
         """
-    def step(
-        self, setpoint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+    def step(self, setpoint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Position of the axes at the set-point's instant, shape (3,).
         """
@@ -5083,7 +4881,6 @@ class ServoLag:
         """
         Set-point minus position, shape (3,), mm.
         """
-
 class CircleFigures:
     """
     What acceleration and servo lag make of a circle.
@@ -5098,24 +4895,22 @@ class CircleFigures:
         """
         Programmed radius minus radius of the axes behind the servo loop, mm.
         """
-
 class BlockKind:
     """
     What a row of the block table is; the table holds the number.
-
+    
     Members:
-
+    
       cutting
-
+    
       rapid
-
+    
       dwell
-
+    
       tool_change
-
+    
       function
     """
-
     __members__: typing.ClassVar[dict[str, BlockKind]]
     cutting: typing.ClassVar[BlockKind]
     dwell: typing.ClassVar[BlockKind]
@@ -5123,26 +4918,39 @@ class BlockKind:
     rapid: typing.ClassVar[BlockKind]
     tool_change: typing.ClassVar[BlockKind]
     @typing.overload
-    def __eq__(self, other: BlockKind) -> bool: ...
+    def __eq__(self, other: BlockKind) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: BlockKind) -> bool: ...
+    def __ne__(self, other: BlockKind) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class ToolTime:
     """
     All uses of one tool.
@@ -5197,7 +5005,6 @@ class ToolTime:
         """
         Sum of the parts below, s.
         """
-
 class CycleTime:
     """
     How long a program takes, and where.
@@ -5272,7 +5079,6 @@ class CycleTime:
         """
         Sum of the parts below, s.
         """
-
 class InterpolatedTime:
     """
     Time of a program by giving every set-point.
@@ -5322,12 +5128,12 @@ class InterpolatedTime:
         """
         Sum of the parts below, s.
         """
-
 class SimulationChunk:
     """
     A section of a simulated motion, one row per period.
     """
-    def __len__(self) -> int: ...
+    def __len__(self) -> int:
+        ...
     @property
     def command_mm(self) -> numpy.ndarray:
         """
@@ -5373,42 +5179,22 @@ class SimulationChunk:
         """
         Of the command over the period that ends with the row, without the jumps of coordinates, (k, 3), mm/s.
         """
-
 class SimulationStream:
     """
     A motion simulated through filters and plant and handed out in pieces.
     """
     @staticmethod
-    def of_blocks(
-        blocks: Path,
-        block_end: BlockEnd,
-        override_ratio: typing.SupportsFloat | typing.SupportsIndex,
-        options: SimulationOptions,
-        rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    ) -> SimulationStream:
+    def of_blocks(blocks: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: SimulationOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
         Blocks at their feed.
         """
     @staticmethod
-    def of_path(
-        path: Path,
-        profile: SpeedProfile,
-        options: SimulationOptions,
-        rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    ) -> SimulationStream:
+    def of_path(path: Path, profile: SpeedProfile, options: SimulationOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
         A path under a speed profile; behind its end the set-points rest for rest_s.
         """
     @staticmethod
-    def of_program(
-        program: ProgramText,
-        model: FanucModel,
-        options: SimulationOptions,
-        region_offsets_mm: collections.abc.Sequence[
-            typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
-        ] = [],
-        rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    ) -> SimulationStream:
+    def of_program(program: ProgramText, model: FanucModel, options: SimulationOptions, region_offsets_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]] = [], rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
         A whole program on one time axis. region_offsets_mm: from the positions of each region to the machine's, for modes that vary with them. Raises ArgumentError on a model that no controller can have.
         """
@@ -5416,53 +5202,58 @@ class SimulationStream:
         """
         The next rows, at most so many; none behind the end.
         """
-
 class SpindleSense:
     """
     Sense in which the spindle turns, seen towards the work piece.
-
+    
     Members:
-
+    
       clockwise : M03.
-
+    
       counter_clockwise : M04.
     """
-
     __members__: typing.ClassVar[dict[str, SpindleSense]]
     clockwise: typing.ClassVar[SpindleSense]
     counter_clockwise: typing.ClassVar[SpindleSense]
     @typing.overload
-    def __eq__(self, other: SpindleSense) -> bool: ...
+    def __eq__(self, other: SpindleSense) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: SpindleSense) -> bool: ...
+    def __ne__(self, other: SpindleSense) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class EndMill:
     """
     A cylindrical end mill with a flat end.
     """
-    def __init__(
-        self,
-        diameter_mm: typing.SupportsFloat | typing.SupportsIndex,
-        flutes: typing.SupportsInt | typing.SupportsIndex,
-        helix_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        runout_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [],
-    ) -> None:
+    def __init__(self, diameter_mm: typing.SupportsFloat | typing.SupportsIndex, flutes: typing.SupportsInt | typing.SupportsIndex, helix_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, runout_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
         """
         Helix of a right-hand cutter, rad; runout: how far each flute stands out beyond the mean radius, mm, in the order in which they cut. Raises ArgumentError on a value that no tool can have.
         """
@@ -5491,12 +5282,12 @@ class EndMill:
         """
         One per flute, or none, mm.
         """
-
 class EngagementTrack:
     """
     What the tool meets along a path, sample by sample. Azimuths in rad from the direction of feed, positive to its left; with a clockwise spindle a tooth passes from +pi/2 (up milling) to -pi/2 (down milling).
     """
-    def __len__(self) -> int: ...
+    def __len__(self) -> int:
+        ...
     def arcs_of(self, sample: typing.SupportsInt | typing.SupportsIndex) -> numpy.ndarray:
         """
         The rows of `arcs` that belong to a sample, (k, 4).
@@ -5556,22 +5347,16 @@ class EngagementTrack:
         """
         Of the tool's axis, (n,), mm.
         """
-
 class Material:
     """
     A work piece of horizontal layers, each with its boundary as a field of distances on a grid.
     """
-    def __init__(
-        self,
-        rings_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
-        borders_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        resolution_mm: typing.SupportsFloat | typing.SupportsIndex,
-        memory_limit_bytes: typing.SupportsInt | typing.SupportsIndex = 2147483648,
-    ) -> None:
+    def __init__(self, rings_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], borders_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], resolution_mm: typing.SupportsFloat | typing.SupportsIndex, memory_limit_bytes: typing.SupportsInt | typing.SupportsIndex = 2147483648) -> None:
         """
         Outlines of the stock, each (n, 2), mm, holes included (even-odd rule); heights between the layers from bottom to top, mm (see layer_borders); distance of the grid's nodes, mm (a hundredth of the tool's diameter is a good choice). Raises ArgumentError on an outline or heights that enclose nothing, or a grid that needs more memory than the limit.
         """
-    def __len__(self) -> int: ...
+    def __len__(self) -> int:
+        ...
     def compact(self) -> None:
         """
         Gives back the memory of what is uniform by now.
@@ -5580,31 +5365,15 @@ class Material:
         """
         The material as it is now; the two are independent from here on.
         """
-    def distance_mm(
-        self,
-        layer: typing.SupportsInt | typing.SupportsIndex,
-        x_mm: typing.SupportsFloat | typing.SupportsIndex,
-        y_mm: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> float:
+    def distance_mm(self, layer: typing.SupportsInt | typing.SupportsIndex, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Distance from the boundary of a layer, positive in material, limited to two nodes of the grid, mm.
         """
-    def heights_mm(
-        self,
-        low_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"],
-        high_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"],
-        rows: typing.SupportsInt | typing.SupportsIndex,
-        columns: typing.SupportsInt | typing.SupportsIndex,
-    ) -> numpy.ndarray:
+    def heights_mm(self, low_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], high_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], rows: typing.SupportsInt | typing.SupportsIndex, columns: typing.SupportsInt | typing.SupportsIndex) -> numpy.ndarray:
         """
         Top of the material over a rectangle, (rows, columns), mm, from its low corner on; NaN where there is none. Raises ArgumentError on less than one row or column.
         """
-    def is_material(
-        self,
-        x_mm: typing.SupportsFloat | typing.SupportsIndex,
-        y_mm: typing.SupportsFloat | typing.SupportsIndex,
-        z_mm: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> bool:
+    def is_material(self, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex, z_mm: typing.SupportsFloat | typing.SupportsIndex) -> bool:
         """
         Whether there is material at a point.
         """
@@ -5612,14 +5381,7 @@ class Material:
         """
         From now on only whole layers are taken away: those whose bottom the tip reaches. What is left is never less than what is really there, also under a ramp.
         """
-    def volume_in_cylinder_mm3(
-        self,
-        x_mm: typing.SupportsFloat | typing.SupportsIndex,
-        y_mm: typing.SupportsFloat | typing.SupportsIndex,
-        radius_mm: typing.SupportsFloat | typing.SupportsIndex,
-        bottom_mm: typing.SupportsFloat | typing.SupportsIndex,
-        top_mm: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> float:
+    def volume_in_cylinder_mm3(self, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex, radius_mm: typing.SupportsFloat | typing.SupportsIndex, bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Material in an upright cylinder, mm3: what a tool would stand in.
         """
@@ -5663,48 +5425,59 @@ class Material:
         """
         What is left, mm3.
         """
-
 class CornerSection:
     """
     Sections S1 to S4 of paper 001.
-
+    
     Members:
-
+    
       s1 : Straight, the tool enters at the straight rough wall.
-
+    
       s2 : Straight, the tool enters in the rough corner.
-
+    
       s3 : On the arc of the finished corner.
-
+    
       s4 : On the straight behind it.
     """
-
     __members__: typing.ClassVar[dict[str, CornerSection]]
     s1: typing.ClassVar[CornerSection]
     s2: typing.ClassVar[CornerSection]
     s3: typing.ClassVar[CornerSection]
     s4: typing.ClassVar[CornerSection]
     @typing.overload
-    def __eq__(self, other: CornerSection) -> bool: ...
+    def __eq__(self, other: CornerSection) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: CornerSection) -> bool: ...
+    def __ne__(self, other: CornerSection) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class CornerEngagement:
     """
     What the tool meets at one position of a corner.
@@ -5749,22 +5522,11 @@ class CornerEngagement:
         """
         Of the tool's axis, mm.
         """
-
 class CornerCut:
     """
     The corner of a pocket that is finished after roughing (paper 001).
     """
-    def __init__(
-        self,
-        tool_radius_mm: typing.SupportsFloat | typing.SupportsIndex,
-        rough_radius_mm: typing.SupportsFloat | typing.SupportsIndex,
-        finish_radius_mm: typing.SupportsFloat | typing.SupportsIndex,
-        allowance_mm: typing.SupportsFloat | typing.SupportsIndex,
-        turn_rad: typing.SupportsFloat | typing.SupportsIndex = 1.5707963267948966,
-        before_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0,
-        after_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0,
-        mirrored: bool = False,
-    ) -> None:
+    def __init__(self, tool_radius_mm: typing.SupportsFloat | typing.SupportsIndex, rough_radius_mm: typing.SupportsFloat | typing.SupportsIndex, finish_radius_mm: typing.SupportsFloat | typing.SupportsIndex, allowance_mm: typing.SupportsFloat | typing.SupportsIndex, turn_rad: typing.SupportsFloat | typing.SupportsIndex = 1.5707963267948966, before_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0, after_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0, mirrored: bool = False) -> None:
         """
         The tool comes along +X with the wall to its right, turns left by `turn_rad` and follows the second wall; the finished walls meet at the origin. `mirrored`: wall to the left. Equal tool and finish radius: the path has a sharp vertex. Raises ArgumentError on radii below the tool's or an allowance above it.
         """
@@ -5772,11 +5534,7 @@ class CornerCut:
         """
         Engagement at a distance along the path, in closed form.
         """
-    def path(
-        self,
-        feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex,
-        z_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    ) -> Path:
+    def path(self, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, z_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Path:
         """
         The tool's path: line, arc if the radii differ, line.
         """
@@ -5784,11 +5542,7 @@ class CornerCut:
         """
         The material before finishing as a ring (n, 2), mm, to `beyond_mm` outside of the walls.
         """
-    def track(
-        self,
-        axial_depth_mm: typing.SupportsFloat | typing.SupportsIndex,
-        step_mm: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> EngagementTrack:
+    def track(self, axial_depth_mm: typing.SupportsFloat | typing.SupportsIndex, step_mm: typing.SupportsFloat | typing.SupportsIndex) -> EngagementTrack:
         """
         The closed form as a track with samples at most `step_mm` apart; at a sharp vertex two share one position.
         """
@@ -5837,59 +5591,61 @@ class CornerCut:
         """
         Through which the path turns, rad.
         """
-
 class ChipThickness:
     """
     Which chip thickness the specific cutting force belongs to.
-
+    
     Members:
-
+    
       mean : Of the whole engagement, as paper 001 fits its coefficients.
-
+    
       local : Of each element of a flute.
     """
-
     __members__: typing.ClassVar[dict[str, ChipThickness]]
     local: typing.ClassVar[ChipThickness]
     mean: typing.ClassVar[ChipThickness]
     @typing.overload
-    def __eq__(self, other: ChipThickness) -> bool: ...
+    def __eq__(self, other: ChipThickness) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: ChipThickness) -> bool: ...
+    def __ne__(self, other: ChipThickness) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class CuttingCoefficients:
     """
     Power laws of the cutting force (paper 001 eq. 2, 3, 8, 9), with edge forces.
-
+    
     Per mm of a flute's height, t being the chip thickness in mm: tangential k1 t + K_te, radial k2 k1 t + K_re in N/mm,
     with k1 = specific_n_per_mm2 * t**specific_exponent, k2 = ratio * t**ratio_exponent.
     """
-    def __init__(
-        self,
-        specific_n_per_mm2: typing.SupportsFloat | typing.SupportsIndex,
-        specific_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        ratio_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        tangential_edge_n_per_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        radial_edge_n_per_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        thickness: ChipThickness = ChipThickness.mean,
-    ) -> None:
+    def __init__(self, specific_n_per_mm2: typing.SupportsFloat | typing.SupportsIndex, specific_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.0, ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, ratio_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.0, tangential_edge_n_per_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, radial_edge_n_per_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, thickness: ChipThickness = ChipThickness.mean) -> None:
         """
         Raises ArgumentError on a value that is not finite, a force below 0, or an exponent (tangential, or sum of both) of -1 or less.
         """
@@ -5928,27 +5684,15 @@ class CuttingCoefficients:
         """
         Mean or local.
         """
-
 class ToolBeam:
     """
     An end mill as a beam clamped at its overhang: shank, and a fluted part that is as stiff as a round bar of an effective diameter. Heights count from the tip.
     """
-    def __init__(
-        self,
-        overhang_mm: typing.SupportsFloat | typing.SupportsIndex,
-        fluted_length_mm: typing.SupportsFloat | typing.SupportsIndex,
-        effective_diameter_mm: typing.SupportsFloat | typing.SupportsIndex,
-        shank_diameter_mm: typing.SupportsFloat | typing.SupportsIndex,
-        young_modulus_gpa: typing.SupportsFloat | typing.SupportsIndex,
-        holder_n_per_um: typing.SupportsFloat | typing.SupportsIndex = ...,
-        spindle_n_per_um: typing.SupportsFloat | typing.SupportsIndex = ...,
-    ) -> None:
+    def __init__(self, overhang_mm: typing.SupportsFloat | typing.SupportsIndex, fluted_length_mm: typing.SupportsFloat | typing.SupportsIndex, effective_diameter_mm: typing.SupportsFloat | typing.SupportsIndex, shank_diameter_mm: typing.SupportsFloat | typing.SupportsIndex, young_modulus_gpa: typing.SupportsFloat | typing.SupportsIndex, holder_n_per_um: typing.SupportsFloat | typing.SupportsIndex = ..., spindle_n_per_um: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
         """
         Lengths and diameters in mm, modulus in GPa, springs between the clamped end and the frame in N/um (inf: rigid). Raises ArgumentError on a value that is not positive.
         """
-    def compliance_um_per_n(
-        self, at_mm: typing.SupportsFloat | typing.SupportsIndex, load_mm: typing.SupportsFloat | typing.SupportsIndex
-    ) -> float:
+    def compliance_um_per_n(self, at_mm: typing.SupportsFloat | typing.SupportsIndex, load_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Deflection at one height under 1 N across the axis at another, um/N (both count from the tip).
         """
@@ -5987,7 +5731,6 @@ class ToolBeam:
         """
         GPa.
         """
-
 class ForceFigures:
     """
     Figures over one revolution; forces on the tool, x along the feed and y to its left.
@@ -6032,7 +5775,6 @@ class ForceFigures:
         """
         N m.
         """
-
 class ForceCurve:
     """
     Forces on the tool over one revolution, in the frame of the tool.
@@ -6057,90 +5799,51 @@ class ForceCurve:
         """
         Angle of the spindle in its own sense, (n_angles,); at 0 the first flute's tip looks along the feed.
         """
-
 class MillingForce:
     """
     Forces of an end mill at one engagement; make one and keep it.
-
+    
     The chip at azimuth p is feed per tooth * cos p thick (paper 001 eq. 1); with runout that of flute i is the least of
     m * feed per tooth * cos p + r_i - r_(i-m), m >= 1, and not below 0. A counter-clockwise spindle mirrors everything,
     helix included. `arcs`: (n_arcs, 4): from and to in rad from the direction of feed, positive to its left, bottom and top
     in mm above the tip. `feed_mm_per_min`: along the path. Not for several threads at a time.
-
+    
     Raises:
         ArgumentError: A speed that is not positive; in all members also an arc beyond -pi/2 ... pi/2 or below the tip, or a
             feed that is negative or not finite.
     """
-    def __init__(
-        self,
-        tool: EndMill,
-        coefficients: CuttingCoefficients,
-        spindle_rev_per_min: typing.SupportsFloat | typing.SupportsIndex,
-        sense: SpindleSense = SpindleSense.clockwise,
-    ) -> None:
+    def __init__(self, tool: EndMill, coefficients: CuttingCoefficients, spindle_rev_per_min: typing.SupportsFloat | typing.SupportsIndex, sense: SpindleSense = SpindleSense.clockwise) -> None:
         """
         Spindle speed in 1/min. Raises ArgumentError unless it is positive.
         """
-    def curve(
-        self,
-        arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex,
-        angles: typing.SupportsInt | typing.SupportsIndex = 360,
-    ) -> ForceCurve:
+    def curve(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, angles: typing.SupportsInt | typing.SupportsIndex = 360) -> ForceCurve:
         """
         Forces at equal steps of the spindle. Raises ArgumentError on angles < 1.
         """
-    def deflection_um(
-        self,
-        arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex,
-        turned_rad: typing.SupportsFloat | typing.SupportsIndex,
-        height_mm: typing.SupportsFloat | typing.SupportsIndex,
-        beam: ToolBeam,
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+    def deflection_um(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, turned_rad: typing.SupportsFloat | typing.SupportsIndex, height_mm: typing.SupportsFloat | typing.SupportsIndex, beam: ToolBeam) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
         """
         Deflection at a height above the tip and an angle of the spindle (as in ForceCurve), (2,), um, frame of the tool.
         """
-    def figures(
-        self,
-        arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> ForceFigures:
+    def figures(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex) -> ForceFigures:
         """
         Figures over one revolution: means exact, peaks and mean of the magnitude to 0.1 %; zeros where nothing is cut.
         """
-    def figures_of(
-        self,
-        track: EngagementTrack,
-        feed_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        beam: ToolBeam | None = None,
-    ) -> dict:
+    def figures_of(self, track: EngagementTrack, feed_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beam: ToolBeam | None = None) -> dict:
         """
         Figures of a whole track, a feed along the path for each sample.
-
+        
         Returns:
             Arrays (n_samples,) by name: mean_x_n, mean_y_n (frame of the tool), mean_resultant_n, peak_resultant_n,
             peak_torque_nm, mean_torque_nm, mean_power_w, peak_chip_mm, peak_deflection_um (of the tip; 0 without a beam).
-
+        
         Raises:
             ArgumentError: Another number of feeds, or as the class.
         """
-    def force_centre_mm(
-        self,
-        arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex,
-        turned_rad: typing.SupportsFloat | typing.SupportsIndex,
-        overhang_mm: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+    def force_centre_mm(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, turned_rad: typing.SupportsFloat | typing.SupportsIndex, overhang_mm: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
         """
         Centre of the force along x and along y (paper 001 eq. 6), distance from the clamped end, (2,), mm; NaN where that force is 0.
         """
-    def peak_deflection_um(
-        self,
-        arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex,
-        beam: ToolBeam,
-    ) -> float:
+    def peak_deflection_um(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, beam: ToolBeam) -> float:
         """
         Largest deflection of the tip over one revolution, um, quasi-static. Raises ArgumentError also where the engagement lies above the overhang.
         """
@@ -6164,26 +5867,24 @@ class MillingForce:
         """
         The cutter.
         """
-
 class FeedLimit:
     """
     What bounds a feed.
-
+    
     Members:
-
+    
       none : The highest feed asked for is within all limits.
-
+    
       resultant : Resultant force, mean or peak.
-
+    
       deflection : Peak deflection of the tip.
-
+    
       torque : Peak torque.
-
+    
       power : Mean power.
-
+    
       chip_load : Feed per tooth or thickest chip.
     """
-
     __members__: typing.ClassVar[dict[str, FeedLimit]]
     chip_load: typing.ClassVar[FeedLimit]
     deflection: typing.ClassVar[FeedLimit]
@@ -6192,42 +5893,44 @@ class FeedLimit:
     resultant: typing.ClassVar[FeedLimit]
     torque: typing.ClassVar[FeedLimit]
     @typing.overload
-    def __eq__(self, other: FeedLimit) -> bool: ...
+    def __eq__(self, other: FeedLimit) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: FeedLimit) -> bool: ...
+    def __ne__(self, other: FeedLimit) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class FeedLimits:
     """
     What bounds a feed over one revolution; inf: no limit.
     """
-    def __init__(
-        self,
-        *,
-        mean_resultant_n: typing.SupportsFloat | typing.SupportsIndex = ...,
-        peak_resultant_n: typing.SupportsFloat | typing.SupportsIndex = ...,
-        peak_deflection_um: typing.SupportsFloat | typing.SupportsIndex = ...,
-        peak_torque_nm: typing.SupportsFloat | typing.SupportsIndex = ...,
-        mean_power_w: typing.SupportsFloat | typing.SupportsIndex = ...,
-        feed_per_tooth_mm: typing.SupportsFloat | typing.SupportsIndex = ...,
-        peak_chip_mm: typing.SupportsFloat | typing.SupportsIndex = ...,
-        beam: ToolBeam | None = None,
-    ) -> None:
+    def __init__(self, *, mean_resultant_n: typing.SupportsFloat | typing.SupportsIndex = ..., peak_resultant_n: typing.SupportsFloat | typing.SupportsIndex = ..., peak_deflection_um: typing.SupportsFloat | typing.SupportsIndex = ..., peak_torque_nm: typing.SupportsFloat | typing.SupportsIndex = ..., mean_power_w: typing.SupportsFloat | typing.SupportsIndex = ..., feed_per_tooth_mm: typing.SupportsFloat | typing.SupportsIndex = ..., peak_chip_mm: typing.SupportsFloat | typing.SupportsIndex = ..., beam: ToolBeam | None = None) -> None:
         """
         Raises ArgumentError on a limit that is not positive, or a limit of deflection without a beam.
         """
@@ -6271,7 +5974,6 @@ class FeedLimits:
         """
         N m.
         """
-
 class LimitedFeed:
     """
     A feed and what bounds it.
@@ -6291,52 +5993,59 @@ class LimitedFeed:
         """
         False: even the lowest feed, which this is, is beyond the limit.
         """
-
 class WallSide:
     """
     The wall that a tool finishes beside its path, seen along the feed.
-
+    
     Members:
-
+    
       right : Down milling with a clockwise spindle.
-
+    
       left : Up milling with a clockwise spindle.
     """
-
     __members__: typing.ClassVar[dict[str, WallSide]]
     left: typing.ClassVar[WallSide]
     right: typing.ClassVar[WallSide]
     @typing.overload
-    def __eq__(self, other: WallSide) -> bool: ...
+    def __eq__(self, other: WallSide) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: WallSide) -> bool: ...
+    def __ne__(self, other: WallSide) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class FeedStretch:
     """
     A section of one feed.
     """
-    def __init__(
-        self,
-        begin_mm: typing.SupportsFloat | typing.SupportsIndex,
-        end_mm: typing.SupportsFloat | typing.SupportsIndex,
-        feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None: ...
+    def __init__(self, begin_mm: typing.SupportsFloat | typing.SupportsIndex, end_mm: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def begin_mm(self) -> float:
         """
@@ -6352,24 +6061,14 @@ class FeedStretch:
         """
         mm/min.
         """
-
 class FeedWriterOptions:
     """
     How new feeds are written into a region's blocks.
     """
-    def __init__(
-        self,
-        increment_mm: typing.SupportsFloat | typing.SupportsIndex,
-        unit_mm: typing.SupportsFloat | typing.SupportsIndex,
-        position_decimals: typing.SupportsInt | typing.SupportsIndex,
-        absolute_centres: bool,
-        modal_feed: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        restore_feed: bool = True,
-    ) -> None:
+    def __init__(self, increment_mm: typing.SupportsFloat | typing.SupportsIndex, unit_mm: typing.SupportsFloat | typing.SupportsIndex, position_decimals: typing.SupportsInt | typing.SupportsIndex, absolute_centres: bool, modal_feed: typing.SupportsFloat | typing.SupportsIndex = 0.0, restore_feed: bool = True) -> None:
         """
         Least increment, mm; unit of position words and of the length in F, mm; decimals of a position; whether I J K are positions; F that holds before the region (0: as in the original), and whether that of the original is left behind.
         """
-
 class RefedRegion:
     """
     A region's text with other feeds.
@@ -6394,7 +6093,6 @@ class RefedRegion:
         """
         Whole lines.
         """
-
 class Travel:
     """
     How a path is really travelled, per section between two stations.
@@ -6414,54 +6112,52 @@ class Travel:
         """
         Time on each section, (n,), s.
         """
-
 class ComparedKind:
     """
     What is compared of two programs, and what a difference is of.
-
+    
     Members:
-
+    
       cuts
-
+    
       rapids
-
+    
       tools
-
+    
       spindle
-
+    
       coolant
-
+    
       offsets
-
+    
       cycles
-
+    
       calls
-
+    
       functions
-
+    
       dwells
-
+    
       stops
-
+    
       modal
-
+    
       feeds
-
+    
       blocks
-
+    
       path
-
+    
       order
-
+    
       shaped_rapids
-
+    
       emission
-
+    
       units
-
+    
       end
     """
-
     __members__: typing.ClassVar[dict[str, ComparedKind]]
     blocks: typing.ClassVar[ComparedKind]
     calls: typing.ClassVar[ComparedKind]
@@ -6484,26 +6180,39 @@ class ComparedKind:
     tools: typing.ClassVar[ComparedKind]
     units: typing.ClassVar[ComparedKind]
     @typing.overload
-    def __eq__(self, other: ComparedKind) -> bool: ...
+    def __eq__(self, other: ComparedKind) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, other: typing.Any) -> bool: ...
-    def __getstate__(self) -> int: ...
-    def __hash__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __int__(self) -> int: ...
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
     @typing.overload
-    def __ne__(self, other: ComparedKind) -> bool: ...
+    def __ne__(self, other: ComparedKind) -> bool:
+        ...
     @typing.overload
-    def __ne__(self, other: typing.Any) -> bool: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def __str__(self) -> str: ...
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def value(self) -> int: ...
-
+    def value(self) -> int:
+        ...
 class ProgramComparison:
     """
     What differs between two programs.
@@ -6523,168 +6232,110 @@ class ProgramComparison:
         """
         Largest distance of the paths of a cut that both have, seen from either, mm.
         """
-
 def acceleration_filters(model: FanucModel) -> list[Fir]:
     """
     Filters behind interpolation in order, none, one or two.
     """
-
-def arma_decay(
-    responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
-    n_modes: typing.SupportsInt | typing.SupportsIndex,
-    plain: bool = False,
-) -> Arma:
+def arma_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex, plain: bool = False) -> Arma:
     """
     ARMA model of one or several free decays: common poles, each record's own initial state.
-
+    
     Args:
         responses: Response per decay, each of shape (n,), in any unit.
         n_modes: Number of modes, 1 to 50.
         plain: One round of unfiltered least squares instead of the iterated one.
-
+    
     Returns:
         The model, as from arma_driven with a unit impulse at the first sample for the force.
-
+    
     Raises:
         ArgumentError: As arma_driven.
         NumericError: No finite coefficients.
-
+    
     Source: K. Steiglitz, L. McBride 1965; paper 003, eq. 1.
     """
-
-def arma_driven(
-    forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
-    responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
-    n_modes: typing.SupportsInt | typing.SupportsIndex,
-    plain: bool = False,
-) -> Arma:
+def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex, plain: bool = False) -> Arma:
     """
     ARMA model of one or several taps of the same point, by iterated least squares.
-
+    
     Args:
         forces: Force per tap in N, each of shape (n,), at rest at the first sample.
         responses: Response per tap at the same instants, each of shape (n,); poles and numerator are common.
         n_modes: Number of modes, 1 to 50; the model has 2*n_modes poles and 2*n_modes+1 numerator terms.
         plain: One round of unfiltered least squares, which noise bends, instead of the iterated one.
-
+    
     Returns:
         The model whose phi converged, or the best of all rounds with converged False.
-
+    
     Raises:
         ArgumentError: No record, unequal lengths, a value that is not finite, a force that is zero throughout, a number
             of modes outside its range, or fewer samples than 8*n_modes+8.
         NumericError: No finite coefficients.
-
+    
     Source: K. Steiglitz, L. McBride 1965; paper 003, eq. 1.
     """
-
-def block_overlap_time_s(
-    lengths_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    feeds_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    model: FanucModel,
-) -> float:
+def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], model: FanucModel) -> float:
     """
     Time of a run of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
     """
-
-def busiest_per_s(
-    durations_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    amounts: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None,
-    stretch_s: typing.SupportsFloat | typing.SupportsIndex,
-) -> float:
+def busiest_per_s(durations_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], amounts: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, stretch_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     Largest amount per second in any time window of a duration; each block's amount is spread evenly over it.
-
+    
     `durations_s`: of the blocks, s, (n,); `amounts`: what each of them needs, such as its characters, (n,); None: one of each; `stretch_s`: the window, s; all blocks together if they last less.
     """
-
-def compare_programs(
-    original: ProgramText, emitted: ProgramText, reader: ReaderOptions, emission_lines: collections.abc.Sequence[str]
-) -> ProgramComparison:
+def compare_programs(original: ProgramText, emitted: ProgramText, reader: ReaderOptions, emission_lines: collections.abc.Sequence[str]) -> ProgramComparison:
     """
     Compare two programs that were read with these options; `emission_lines`: capitals without blanks, lines that do not end a cut.
     """
-
-def contour_kernel(
-    shaper: Fir,
-    modes: collections.abc.Sequence[Mode],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    target: ContourTarget,
-) -> list[float]:
+def contour_kernel(shaper: Fir, modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex, target: ContourTarget) -> list[float]:
     """
     Kernel from a command before shaping to what shall follow the path; `shaper`: taps in samples of `period_s`.
     """
-
 def convolve(first: Shaper, second: Shaper) -> Shaper:
     """
     The two shapers in series: cancels what either cancels, lasts as long as both together.
-
+    
     Args:
         first: A shaper.
         second: Another one; the order does not matter.
-
+    
     Returns:
         The series shaper; taps whose times agree within 1e-12 of its duration are merged.
-
+    
     Source: paper 002, eq. 3.
     """
-
 def convolved_zv(modes: collections.abc.Sequence[Mode]) -> Shaper:
     """
     Convolved ZV, the conventional multi-mode shaper: 2^n non-negative taps.
-
+    
     Args:
         modes: The n >= 1 modes to cancel.
-
+    
     Returns:
         The shaper; its duration is the sum of the half damped periods.
-
+    
     Raises:
         ArgumentError: No mode.
-
+    
     Source: paper 002, section 2.
     """
-
-def count_slowed_blocks(
-    blocks: Path,
-    corner_speed_difference_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-    max_feed_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-) -> int:
+def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], max_feed_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> int:
     """
     Blocks that a controller with look-ahead would run slower than programmed.
     """
-
-def csv_rows(
-    word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8],
-    words: collections.abc.Sequence[str],
-    table: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"],
-) -> bytes:
+def csv_rows(word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], words: collections.abc.Sequence[str], table: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"]) -> bytes:
     """
     Rows of a CSV file: the row's word, (k,), and the numbers of its row in the table, (k, c), each as the shortest text that reads back as the same number. Raises ArgumentError on unequal lengths or a word that does not exist.
     """
-
 def divisible_segments(program: ProgramText, region: Region, options: FeedWriterOptions) -> list[bool]:
     """
     Which segments of a region's path may be divided into several blocks.
     """
-
-def equivalent_mass_bisection(
-    force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    omega_rad_s: typing.SupportsFloat | typing.SupportsIndex,
-    damping_ratio: typing.SupportsFloat | typing.SupportsIndex,
-    low_kg: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-    high_kg: typing.SupportsFloat | typing.SupportsIndex = 1000.0,
-    tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01,
-    most_halvings: typing.SupportsInt | typing.SupportsIndex = 100,
-    quantity: str = "acceleration",
-    theta: typing.SupportsFloat | typing.SupportsIndex = 1.4,
-    impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-) -> EquivalentMass:
+def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, low_kg: typing.SupportsFloat | typing.SupportsIndex = 0.001, high_kg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01, most_halvings: typing.SupportsInt | typing.SupportsIndex = 100, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> EquivalentMass:
     """
     Equivalent mass by bisection: paper 003's steps 1 to 7, the check of the closed form.
-
+    
     Args:
         force_n: Measured force in N, shape (n,).
         response: Measured response in SI units, shape (n,).
@@ -6698,29 +6349,19 @@ def equivalent_mass_bisection(
         quantity: "acceleration", "velocity" or "displacement".
         theta: Of the Wilson theta method.
         impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
-
+    
     Returns:
         The mass, the number of halvings and both RMS.
-
+    
     Raises:
         ArgumentError: A value outside its range, or a force or response that is zero throughout.
-
+    
     Source: paper 003, section 2.2, steps 1-7.
     """
-
-def equivalent_mass_closed_form(
-    force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    omega_rad_s: typing.SupportsFloat | typing.SupportsIndex,
-    damping_ratio: typing.SupportsFloat | typing.SupportsIndex,
-    quantity: str = "acceleration",
-    theta: typing.SupportsFloat | typing.SupportsIndex = 1.4,
-    impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-) -> EquivalentMass:
+def equivalent_mass_closed_form(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> EquivalentMass:
     """
     Equivalent mass by one simulation: the response is proportional to 1/m.
-
+    
     Args:
         force_n: Measured force in N, shape (n,).
         response: Measured response in SI units, shape (n,).
@@ -6730,79 +6371,56 @@ def equivalent_mass_closed_form(
         quantity: "acceleration", "velocity" or "displacement".
         theta: Of the Wilson theta method.
         impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
-
+    
     Returns:
         The mass that makes the RMS of simulated and measured response equal.
-
+    
     Raises:
         ArgumentError: A value outside its range, or a force or response that is zero throughout.
-
+    
     Source: paper 003, section 2.2.
     """
-
-def extra_insensitive(
-    mode: Mode,
-    vibration_limit: typing.SupportsFloat | typing.SupportsIndex,
-    humps: typing.SupportsInt | typing.SupportsIndex = 1,
-) -> ExtraInsensitive:
+def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex, humps: typing.SupportsInt | typing.SupportsIndex = 1) -> ExtraInsensitive:
     """
     Extra-insensitive (EI) shaper with one, two or three humps, damped or not, solved from its definition.
-
+    
     Between its outermost zeros the residual rises to exactly the limit at each hump. The middle hump, or with two humps the
     middle zero, lies at the mode. Without damping it is the Dolph-Chebyshev window over half periods.
-
+    
     Args:
         mode: The mode around which little is to be left.
         vibration_limit: Residual ratio at the humps (no unit), above 0 and below 1.
         humps: Number of humps, 1 to 3.
-
+    
     Returns:
         The shaper and its zeros and humps.
-
+    
     Raises:
         ArgumentError: A value is outside its range.
         DesignError: No such shaper with non-negative taps was reached (high damping).
-
+    
     Source: Singhose, Seering and Singer 1994; Singhose, Porter, Tuttle and Singer 1997; the solution: this project.
     """
-
 def fastest_block_ends(blocks: Path) -> list[int]:
     """
     Per axis the block, but for the last, at whose end it is fastest; ascending, each once.
     """
-
 def feeds_per_minute(program: ProgramText, region: Region) -> bool:
     """
     Whether F is a feed per minute in every block of a region, in one unit of length.
     """
-
-def fit_blocks(
-    command: ShapedCommand,
-    breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-    options: FitOptions,
-) -> FittedBlocks:
+def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
     """
     Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.
     """
-
 def fit_circle(points_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> CircleFit:
     """
     Geometric least-squares circle through points (n, 2), mm. Raises ArgumentError on fewer than three points or points on a line, NumericError if it does not converge.
     """
-
-def fit_decay(
-    responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    *,
-    with_offset: bool = True,
-    coloured_residuals: bool = False,
-    most_iterations: typing.SupportsInt | typing.SupportsIndex = 60,
-) -> DecayFit:
+def fit_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, with_offset: bool = True, coloured_residuals: bool = False, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> DecayFit:
     """
     Least-squares fit of decaying cosines to one or several free decays; omega and zeta are common.
-
+    
     Args:
         responses: Response per record, each of shape (n,), in any unit.
         period_s: Time between samples in s, above 0.
@@ -6811,39 +6429,23 @@ def fit_decay(
         with_offset: Fit a constant offset per record.
         coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
         most_iterations: Steps after which the search gives up, with converged False.
-
+    
     Returns:
         The fit; look at converged and reason before use.
-
+    
     Raises:
         ArgumentError: As fit_modes.
-
+    
     Source: G. Golub, V. Pereyra 2003.
     """
-
-def fit_modes(
-    forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
-    responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    *,
-    quantity: str = "acceleration",
-    with_offset: bool = True,
-    with_mass_line: bool = False,
-    with_compliance: bool = False,
-    coloured_residuals: bool = False,
-    hold: str = "linear",
-    force_noise_n: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    most_iterations: typing.SupportsInt | typing.SupportsIndex = 60,
-) -> ModalFit:
+def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, quantity: str = 'acceleration', with_offset: bool = True, with_mass_line: bool = False, with_compliance: bool = False, coloured_residuals: bool = False, hold: str = 'linear', force_noise_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> ModalFit:
     """
     Output-error (for white noise: maximum likelihood) fit of modes to one or several taps of the same point.
-
+    
     The response is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2) applied to the force, from rest at the
     first sample. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
     derivatives; everything linear is eliminated.
-
+    
     Args:
         forces: Force per tap in N, each of shape (n,).
         responses: Response per tap at the same instants in SI units, each of shape (n,).
@@ -6860,332 +6462,221 @@ def fit_modes(
         force_noise_n: Standard deviation of white noise on the force in N. In pulses of up to 128 samples the true force is
             estimated along with the modes; else its effect is added to the covariance to first order.
         most_iterations: Steps after which the search gives up, with converged False.
-
+    
     Returns:
         The fit; look at converged and reason before use.
-
+    
     Raises:
         ArgumentError: Records as in arma_driven, a start or option outside its range, or too few samples.
-
+    
     Source: L. Ljung, System Identification, ch. 7; G. Golub, V. Pereyra 2003.
     """
-
 def for_shaped_blocks(model: FanucModel) -> FanucModel:
     """
     The same controller while shaped blocks run: block by block at their feed, without look-ahead.
     """
-
-def gaussian_low_pass(
-    profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    spacing_mm: typing.SupportsFloat | typing.SupportsIndex,
-    cutoff_mm: typing.SupportsFloat | typing.SupportsIndex,
-) -> numpy.ndarray:
+def gaussian_low_pass(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], spacing_mm: typing.SupportsFloat | typing.SupportsIndex, cutoff_mm: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
     """
     Gaussian filter of ISO 16610-21: what is longer than the cut-off, (n,), mm.
     """
-
-def grid_polynomial(
-    modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex
-) -> Shaper:
+def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex) -> Shaper:
     """
     Shortest shaper with taps at multiples of a period that cancels every mode exactly there.
-
+    
     The polynomial with the roots z = exp(s*period) and their conjugates: two periods per mode, one for a mode whose z is
     real, none for one that aliases onto an earlier one. Amplitudes may be negative and large: look at abs_sum before use.
-
+    
     Args:
         modes: The modes to cancel, at least one; one above the grid's Nyquist frequency is fine.
         period_s: Period of the grid in s, above 0.
-
+    
     Returns:
         The shaper; residual_ratio of every mode is at most 1e-10, some 1e-16*abs_sum as a rule.
-
+    
     Raises:
         ArgumentError: No mode, or a period that is not positive.
         DesignError: A z closer to +1 than 0.01, or so large an abs_sum that rounding leaves more than 1e-10.
-
+    
     Source: this project.
     """
-
-def in_position_wait_behind_s(
-    error_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-    moved: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"],
-    model: FanucModel,
-) -> float:
+def in_position_wait_behind_s(error_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], moved: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"], model: FanucModel) -> float:
     """
     The same behind any command, s. `error_mm`: what the servo loop lags at its end, (3,); `moved`: the axes that moved, (3,). Raises ArgumentError on a model that no controller can have.
     """
-
-def in_position_wait_s(
-    travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel
-) -> float:
+def in_position_wait_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> float:
     """
     Wait for in-position behind a rapid, s. Raises ArgumentError on a model that no controller can have.
     """
-
-def insensitive_band(
-    shaper: Shaper, mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex
-) -> FrequencyBand:
+def insensitive_band(shaper: Shaper, mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex) -> FrequencyBand:
     """
     The band of natural frequencies around a mode in which the residual stays within a limit.
-
+    
     Args:
         shaper: The shaper.
         mode: Nominal frequency and damping ratio.
         vibration_limit: Residual ratio (no unit), above 0 and below 1.
-
+    
     Returns:
         The band; of no width if the limit is exceeded at the mode itself, up to ten times its frequency at most.
-
+    
     Raises:
         ArgumentError: The limit is outside its range.
-
+    
     Source: this project.
     """
-
 def insensitivity(shaper: Shaper, mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     Insensitivity: width of `insensitive_band` over the mode's frequency.
-
+    
     Args:
         shaper: The shaper.
         mode: Nominal frequency and damping ratio.
         vibration_limit: Residual ratio (no unit), above 0 and below 1.
-
+    
     Returns:
         The relative width (no unit): .064 for ZV and .399 for EI at 5 % without damping.
-
+    
     Raises:
         ArgumentError: The limit is outside its range.
-
+    
     Source: Singer and Seering 1990.
     """
-
-def interpolate(
-    path: Path, profile: SpeedProfile, period_s: typing.SupportsFloat | typing.SupportsIndex
-) -> numpy.ndarray:
+def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
     """
     All set-points of a path, (n_samples, 3), mm, read-only. Raises ArgumentError on a period <= 0.
     """
-
 def interpolate_program(program: ProgramText, model: FanucModel) -> InterpolatedTime:
     """
     The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
     """
-
-def largest_feed(
-    force: MillingForce,
-    arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    limits: FeedLimits,
-    lowest: typing.SupportsFloat | typing.SupportsIndex,
-    highest: typing.SupportsFloat | typing.SupportsIndex,
-) -> LimitedFeed:
+def largest_feed(force: MillingForce, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], limits: FeedLimits, lowest: typing.SupportsFloat | typing.SupportsIndex, highest: typing.SupportsFloat | typing.SupportsIndex) -> LimitedFeed:
     """
     Highest feed between `lowest` and `highest` (mm/min) within all limits: never above, and within 0.1 % of the one that binds. Raises ArgumentError unless 0 < lowest <= highest.
     """
-
-def largest_feeds(
-    force: MillingForce,
-    track: EngagementTrack,
-    limits: FeedLimits,
-    lowest: typing.SupportsFloat | typing.SupportsIndex,
-    highest: typing.SupportsFloat | typing.SupportsIndex,
-) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.bool]]:
+def largest_feeds(force: MillingForce, track: EngagementTrack, limits: FeedLimits, lowest: typing.SupportsFloat | typing.SupportsIndex, highest: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.bool]]:
     """
     The same for every sample of a track, along the path: (feed_mm_per_min, limit as FeedLimit number, within), each (n_samples,). The highest where nothing is met or the tool only plunges.
     """
-
-def layer_borders(
-    paths: collections.abc.Sequence[Path],
-    bottom_mm: typing.SupportsFloat | typing.SupportsIndex,
-    top_mm: typing.SupportsFloat | typing.SupportsIndex,
-    ramp_step_mm: typing.SupportsFloat | typing.SupportsIndex,
-) -> list[float]:
+def layer_borders(paths: collections.abc.Sequence[Path], bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex, ramp_step_mm: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
     """
     Heights between layers for these paths in a stock from bottom to top, mm: where the tool moves on a level, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
     """
-
-def line_sections(
-    path: Path,
-    ranges: collections.abc.Sequence[
-        tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]
-    ],
-) -> list[PathSection]:
+def line_sections(path: Path, ranges: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> list[PathSection]:
     """
     The parts of a path that come from source lines, pairs of first and last. Raises ArgumentError if a range runs backwards or two overlap.
     """
-
-def linear_model(
-    parameters: FeedDriveParameters,
-) -> tuple[
-    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
-    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
-    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
-    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
-]:
+def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
     """
     The drive as x' = A x + B w, y = C x + D w with inputs linear between the set-points.
-
+    
     Args:
         parameters: Without friction other than viscous, backlash and force limit.
-
+    
     Returns:
         A, B, C, D. Input 0 is the set-point; input 1, only with acceleration feed-forward, the speed of the set-points,
         whose sample is the difference to the one before over the period. The output is the response. Lengths in any one
         unit, time in s.
-
+    
     Raises:
         ArgumentError: The drive is not linear.
     """
-
 def list_programs(text: bytes) -> list[ProgramEntry]:
     """
     The programs of a text (bytes) in the order in which they stand. Raises ProgramError where it cannot be read.
     """
-
-def look_ahead_on_load(
-    stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    load_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    before_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    behind_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> numpy.ndarray:
+def look_ahead_on_load(stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], before_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], behind_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
     """
     The feeds (n,), mm/min, lowered around each station whose load allows less (`load_mm_per_min`, (n,)), because the travel lags behind a change: `before_s` and `behind_s` (n,) times the feed that the load allows.
     """
-
-def machine_frame(
-    tool_frame: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"],
-    direction_rad: typing.SupportsFloat | typing.SupportsIndex,
-) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+def machine_frame(tool_frame: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], direction_rad: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
     """
     A force (2,) in the frame of the tool, in the frame of the machine (paper 001 eq. 4, 5); direction of feed from +X towards +Y.
     """
-
-def matrix_exponential(
-    matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+def matrix_exponential(matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Matrix exponential, balanced, by scaling and squaring.
-
+    
     Raises:
         ArgumentError: Not square or not finite.
         NumericError: The result exceeds all numbers.
     """
-
-def measure_roughness(
-    profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    spacing_mm: typing.SupportsFloat | typing.SupportsIndex,
-    cutoff_mm: typing.SupportsFloat | typing.SupportsIndex,
-    lambda_s_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-) -> Roughness:
+def measure_roughness(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], spacing_mm: typing.SupportsFloat | typing.SupportsIndex, cutoff_mm: typing.SupportsFloat | typing.SupportsIndex, lambda_s_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Roughness:
     """
     Ra, Rz and Wa of an evenly spaced profile (n,), mm, one cut-off at either end left out. Raises ArgumentError if less than one sampling length remains.
     """
-
-def minimal_branches(
-    first: Mode,
-    second_damping: typing.SupportsFloat | typing.SupportsIndex,
-    ratios: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    max_duration_s: typing.SupportsFloat | typing.SupportsIndex,
-    *,
-    max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0,
-) -> MinimalBranches:
+def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.SupportsIndex, ratios: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> MinimalBranches:
     """
     All minimal two-mode shapers over the ratio of the frequencies, joined to curves (paper 002, fig. 2 and 3).
-
+    
     At each ratio the list is that of `minimal_two_mode`; curves are followed by continuation, also through gaps, where the
     sum of magnitudes or the duration exceeds its limit. Where two curves touch, their tails may be exchanged.
-
+    
     Args:
         first: The mode whose frequency stays.
         second_damping: Damping ratio of the other mode (no unit).
         ratios: Frequencies of the other mode over that of the first, ascending, above 0, shape (n_ratios,).
         max_duration_s: Largest duration in s, at most 100 periods of the faster mode at any ratio.
         max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
-
+    
     Returns:
         The curves, ordered by the ratio at which they begin, then by duration.
-
+    
     Raises:
         ArgumentError: No ratio, ratios that do not ascend, or a value outside its range.
-
+    
     Source: paper 002; the continuation is this project's.
     """
-
-def minimal_shapers(
-    modes: collections.abc.Sequence[Mode],
-    max_duration_s: typing.SupportsFloat | typing.SupportsIndex,
-    *,
-    max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0,
-    max_starts: typing.SupportsInt | typing.SupportsIndex = 100000,
-    max_boxes: typing.SupportsInt | typing.SupportsIndex = 400000,
-) -> MinimalShapers:
+def minimal_shapers(modes: collections.abc.Sequence[Mode], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_starts: typing.SupportsInt | typing.SupportsIndex = 100000, max_boxes: typing.SupportsInt | typing.SupportsIndex = 400000) -> MinimalShapers:
     """
     Minimal multi-mode shapers: n+1 taps that cancel n = 1 ... 6 modes, damped or not.
-
+    
     One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
     and by boxes of times, each of which is proven empty or shrunk onto a solution, in ascending duration: what the result
     says about completeness is `complete` and `complete_up_to_s`. Shapers with fewer taps that serve all modes are listed
     too; solutions that are not isolated (undamped modes at odd ratios, which one ZV serves) are not.
-
+    
     Args:
         modes: One to six modes, no two alike within 1e-6.
         max_duration_s: Largest duration in s, above 0, at most 100 periods of the fastest mode.
         max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
         max_starts: Most Newton starts; fewer are used once every solution was found three times over.
         max_boxes: Most boxes of times that the proof may look at (some 2 microseconds each for four modes); 0: no proof.
-
+    
     Returns:
         The shapers, residual_ratio of every mode at most 1e-12, and what was searched.
-
+    
     Raises:
         ArgumentError: No mode, more than six, two alike, or a value outside its range.
-
+    
     Source: paper 002, eq. 4-11; the searches are this project's.
     """
-
-def minimal_two_mode(
-    first: Mode,
-    second: Mode,
-    max_duration_s: typing.SupportsFloat | typing.SupportsIndex,
-    max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0,
-) -> list[Shaper]:
+def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsFloat | typing.SupportsIndex, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> list[Shaper]:
     """
     All minimal (three-impulse) shapers of two modes, ascending in duration, then in the second time.
-
+    
     Complete: boxes of the plane of the two free times are discarded only where a bound on derivatives proves that they
     hold no solution, and Newton starts from all that are left. Where one ZV serves both modes (undamped, odd ratio) it is
     listed with its two taps; where amplitudes at given times are not unique, those with the smallest sum of squares are.
-
+    
     Args:
         first: One mode, damped or not.
         second: The other one, either may be the faster.
         max_duration_s: Largest duration in s, above 0, at most 100 periods of the faster mode.
         max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1; 1 is not enough for rounding, use
             has_negative to pick the non-negative ones.
-
+    
     Returns:
         The shapers, residual_ratio of both modes below 1e-13; empty if there is none in the range.
-
+    
     Raises:
         ArgumentError: The modes' poles agree within 1e-6, or a value is outside its range.
-
+    
     Source: paper 002, eq. 12-17; the search is this project's.
     """
-
-def modal_response(
-    force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    inverse_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    quantity: str = "acceleration",
-    hold: str = "linear",
-) -> numpy.typing.NDArray[numpy.float64]:
+def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], quantity: str = 'acceleration', hold: str = 'linear') -> numpy.typing.NDArray[numpy.float64]:
     """
     Response of modes to a force, exact, from rest: the model of fit_modes.
-
+    
     Args:
         force_n: Force in N, shape (n,).
         period_s: Time between samples in s, above 0.
@@ -7194,154 +6685,124 @@ def modal_response(
         inverse_mass: Residues 1/m in 1/kg, shape (n_modes,).
         quantity: "acceleration", "velocity" or "displacement".
         hold: How the force runs between samples, as in fit_modes.
-
+    
     Returns:
         Response in SI units, shape (n,).
-
+    
     Raises:
         ArgumentError: Unequal lengths or a value outside its range.
-
+    
     Source: this project.
     """
-
 def mzv(mode: Mode) -> Shaper:
     """
     Modified ZV: three non-negative taps, 3/8 of the damped period apart.
-
+    
     Cancels the mode and the pole of the same decay at 5/3 of its damped frequency; half as long again as ZV, and without
     damping .62 of ZV's slope at the mode.
-
+    
     Args:
         mode: The mode to cancel.
-
+    
     Returns:
         The shaper.
-
+    
     Source: the open printer firmware Klipper, "mzv".
     """
-
 def mzv_second_zero(mode: Mode) -> Mode:
     """
     The second pole that `mzv` cancels, as a mode: the same decay rate, 5/3 of the damped frequency.
-
+    
     Args:
         mode: The mode of the MZV shaper.
-
+    
     Returns:
         The other mode.
-
+    
     Source: this project.
     """
-
 def negative_zv(mode: Mode) -> Shaper:
     """
     Negative ZV of unity magnitude: amplitudes exactly 1, -1, 1; undamped at 0, 1/6 and 1/3 of the period.
-
+    
     Args:
         mode: The mode to cancel; its damping is met exactly, not by a fitted formula.
-
+    
     Returns:
         The shaper; its sum of magnitudes is 3.
-
+    
     Raises:
         DesignError: The damping is too high for such a shaper.
-
+    
     Source: Singhose, Singer and Seering 1994; the damped solution: this project.
     """
-
 def path_sections(path: Path, short_mm: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> list[PathSection]:
     """
     The whole path as runs of lines of one direction and of arcs about one centre; neighbours shorter than `short_mm` become one curve.
     """
-
 def plan_speed(path: Path, limits: MotionLimits, tolerance: FilterTolerance = ...) -> SpeedProfile:
     """
     Tangential speed profile over a whole path from rest to rest, with a filter behind it that must stay within its tolerance. Raises ArgumentError on a limit that is not > 0.
     """
-
-def plan_tolerances(
-    path: Path,
-    shaper: Fir,
-    options: ShapingOptions,
-    tolerances_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-) -> list[tuple[float, float]]:
+def plan_tolerances(path: Path, shaper: Fir, options: ShapingOptions, tolerances_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[tuple[float, float]]:
     """
     The time that a region takes at several contour tolerances, without giving it out.
-
+    
     Args:
         path: The programmed path.
         shaper: Taps in whole block periods, common to all axes.
         options: How the region is shaped; its own contour tolerance does not count.
         tolerances_mm: Descending is fastest, as each search starts from the speeds of the one before; infinity: no slowing.
-
+    
     Returns:
         For each tolerance the duration of the shaped command, s, and the largest deviation of what shall follow the path, mm.
-
+    
     Raises:
         ArgumentError: As RegionShaper.
     """
-
-def plant_response(
-    command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    modes: collections.abc.Sequence[collections.abc.Sequence[Mode]],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.float64]:
+def plant_response(command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], modes: collections.abc.Sequence[collections.abc.Sequence[Mode]], period_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     """
     Response of base-excited modes to a whole record of set-points, exact for set-points linear in between.
-
+    
     What the real-time plant of the core gives sample by sample, to the last bit, at the speed of a batch. At rest at the
     first row.
-
+    
     Args:
         command_mm: Set-points in mm, shape (n_samples, n_axes), one per period.
         modes: The modes of each axis; none: the axis follows its command.
         period_s: Time between samples in s, above 0.
-
+    
     Returns:
         Positions of the table in mm at the same instants, (n_samples, n_axes), in the memory order of the command.
-
+    
     Raises:
         ArgumentError: Not as many lists of modes as axes, a command that is not finite, an invalid mode or period.
     """
-
-def poles_to_modes(
-    poles: collections.abc.Sequence[complex | typing.SupportsComplex | typing.SupportsFloat | typing.SupportsIndex],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+def poles_to_modes(poles: collections.abc.Sequence[complex | typing.SupportsComplex | typing.SupportsFloat | typing.SupportsIndex], period_s: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     Natural frequencies and damping ratios of discrete poles: complex pairs that are stable, ascending.
-
+    
     omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda|.
-
+    
     Args:
         poles: Poles lambda, complex.
         period_s: Time between samples in s, above 0.
-
+    
     Returns:
         (omega_rad_s, damping_ratio), two arrays of equal length, empty if no pole is a mode.
-
+    
     Raises:
         ArgumentError: The period is not positive.
-
+    
     Source: paper 003, eq. 5-6.
     """
-
-def rank_modes(
-    responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    most: typing.SupportsInt | typing.SupportsIndex,
-    forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None,
-    quantity: str = "acceleration",
-    kept: typing.SupportsInt | typing.SupportsIndex = 0,
-) -> ModeRanking:
+def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], most: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None, quantity: str = 'acceleration', kept: typing.SupportsInt | typing.SupportsIndex = 0) -> ModeRanking:
     """
     Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
-
+    
     At each step the candidate is chosen that, together with those before it, leaves the least squares; residues (of
     decays: amplitudes and phases per record) are fitted, frequencies and damping ratios are not.
-
+    
     Args:
         responses: Response per record, each of shape (n,).
         period_s: Time between samples in s, above 0.
@@ -7352,236 +6813,142 @@ def rank_modes(
         quantity: "acceleration", "velocity" or "displacement"; only with forces.
         kept: The first so many candidates are chosen before all others, in their order; handed over as fitted, they leave
             only what is new to the rest.
-
+    
     Returns:
         The ranking; shorter than asked for where no candidate explains anything more.
-
+    
     Raises:
         ArgumentError: As fit_modes.
-
+    
     Source: this project (orthogonal least squares; S. Chen, S. Billings, W. Luo 1989).
     """
-
-def rapid_samples(
-    start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-    end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-    model: FanucModel,
-) -> numpy.ndarray:
+def rapid_samples(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> numpy.ndarray:
     """
     Set-points of a rapid, one per period, (n, 3), mm, read-only. Raises ArgumentError on an unusable model.
     """
-
-def rapid_time_s(
-    travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel
-) -> float:
+def rapid_time_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> float:
     """
     Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: signed travel of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.
     """
-
 def read_parts(parts: list, options: ReaderOptions) -> ProgramText:
     """
     The same of a text in parts (a list of bytes); the list is empty behind it, so that the text stands in memory once.
     """
-
 def read_program(text: bytes, options: ReaderOptions = ...) -> ProgramText:
     """
     Read a program text (bytes). Raises ProgramError with line and column.
     """
-
 def repeated_zv(mode: Mode, zeros: typing.SupportsInt | typing.SupportsIndex) -> Shaper:
     """
     The ZV shaper in series with itself: 1 is ZV, 2 ZVD, 3 ZVDD.
-
+    
     Args:
         mode: The mode to cancel.
         zeros: Zeros at the mode, 1 to 20: the residual and its first zeros-1 derivatives vanish there.
-
+    
     Returns:
         A shaper of zeros+1 non-negative taps, half a damped period apart.
-
+    
     Raises:
         ArgumentError: `zeros` is outside its range.
-
+    
     Source: Singer and Seering 1990.
     """
-
-def schedule_feed(
-    block_ends_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    kept_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    divisible: collections.abc.Sequence[bool],
-    stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    least_length_mm: typing.SupportsFloat | typing.SupportsIndex = 0.6,
-    most_change_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = ...,
-    resolution_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = 0.1,
-) -> list[FeedStretch]:
+def schedule_feed(block_ends_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], kept_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], divisible: collections.abc.Sequence[bool], stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], least_length_mm: typing.SupportsFloat | typing.SupportsIndex = 0.6, most_change_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = ..., resolution_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> list[FeedStretch]:
     """
     Feeds of a path in the shortest time that the stations allow: sections not shorter than the least length, each at the lowest feed of its stations. Per block its end (n,), the feed that it keeps (0: it may change) and whether it may be divided; feeds (m,) hold up to their station. Raises ArgumentError on values that do not ascend or are not above 0.
     """
-
-def sensitivity_curve(
-    shaper: Shaper,
-    damping_ratio: typing.SupportsFloat | typing.SupportsIndex,
-    frequencies_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-) -> list[float]:
+def sensitivity_curve(shaper: Shaper, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, frequencies_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[float]:
     """
     Residual ratio over the natural frequency.
-
+    
     Args:
         shaper: The shaper.
         damping_ratio: Damping ratio of the modes (no unit), at least 0 and below 1.
         frequencies_hz: Natural frequencies in Hz, above 0.
-
+    
     Returns:
         The residual ratio (no unit) at each frequency, in their order.
-
+    
     Raises:
         ArgumentError: A value is outside its range.
-
+    
     Source: paper 002, eq. 8.
     """
-
-def shape_path(
-    path: Path,
-    shaper: Fir,
-    marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-    options: ShapingOptions,
-) -> ShapedCommand:
+def shape_path(path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> ShapedCommand:
     """
     Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block periods. Raises ArgumentError if the block period is no multiple of the interpolation period.
     """
-
-def simulate_blocks(
-    blocks: Path,
-    path: Path,
-    block_end: BlockEnd,
-    override_ratio: typing.SupportsFloat | typing.SupportsIndex,
-    options: SimulationOptions,
-) -> SimulationFigures:
+def simulate_blocks(blocks: Path, path: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: SimulationOptions) -> SimulationFigures:
     """
     Simulate blocks at their feed (a controller without look-ahead), measured against the programmed path.
     """
-
-def simulate_circle(
-    radius_mm: typing.SupportsFloat | typing.SupportsIndex,
-    feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex,
-    model: FanucModel,
-) -> CircleFigures:
+def simulate_circle(radius_mm: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, model: FanucModel) -> CircleFigures:
     """
     Run circles in XY at a constant feed and measure the mean radius over whole turns. Raises ArgumentError on a radius or feed <= 0.
     """
-
-def simulate_path(
-    path: Path, profile: SpeedProfile, options: SimulationOptions, programmed: Path = None
-) -> SimulationFigures:
+def simulate_path(path: Path, profile: SpeedProfile, options: SimulationOptions, programmed: Path = None) -> SimulationFigures:
     """
     Simulate a path under a speed profile (a controller with look-ahead) through filters and plant, measured against the programmed path (None: the path itself).
     """
-
-def simulate_planned(
-    path: Path, limits: MotionLimits, options: SimulationOptions, programmed: Path
-) -> SimulationFigures:
+def simulate_planned(path: Path, limits: MotionLimits, options: SimulationOptions, programmed: Path) -> SimulationFigures:
     """
     simulate_path under the profile of plan_speed, which is not kept as a whole where it need not be.
     """
-
-def simulate_samples(
-    positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: SimulationOptions
-) -> SimulationFigures:
+def simulate_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: SimulationOptions) -> SimulationFigures:
     """
     Simulate set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.
     """
-
-def simulated_duration_s(
-    blocks: Path,
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    block_end: BlockEnd,
-    override_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-) -> float:
+def simulated_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.SupportsIndex, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
     """
     Sum of block durations, s.
     """
-
-def stabilisation_poles(
-    responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
-    n_max: typing.SupportsInt | typing.SupportsIndex,
-    forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None,
-) -> list[numpy.typing.NDArray[numpy.complex128]]:
+def stabilisation_poles(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_max: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None) -> list[numpy.typing.NDArray[numpy.complex128]]:
     """
     Poles of models with 1 ... n_max modes, for a stabilisation chart and for starts. Quick.
-
+    
     All orders are read off one covariance matrix of the free decay (ESPRIT); of taps the decay is the correlation of
     response with force, which weighs all taps.
-
+    
     Args:
         responses: Response per record, each of shape (n,).
         n_max: Largest number of modes, 1 to 50.
         forces: Force per record in N at the same instants; None: the records are free decays.
-
+    
     Returns:
         n_max complex arrays; entry n-1 holds the 2n discrete poles of the model with n modes.
-
+    
     Raises:
         ArgumentError: As arma_driven; fewer samples than 8*n_max+8.
-
+    
     Source: R. Roy, T. Kailath 1989.
     """
-
-def sweep(
-    material: Material,
-    path: Path,
-    tool_diameter_mm: typing.SupportsFloat | typing.SupportsIndex,
-    *,
-    step_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    touch_mm: typing.SupportsFloat | typing.SupportsIndex = 0.002,
-    progress: collections.abc.Callable | None = None,
-) -> EngagementTrack:
+def sweep(material: Material, path: Path, tool_diameter_mm: typing.SupportsFloat | typing.SupportsIndex, *, step_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, touch_mm: typing.SupportsFloat | typing.SupportsIndex = 0.002, progress: collections.abc.Callable | None = None) -> EngagementTrack:
     """
     Moves a tool along a path through the material, takes away what it sweeps, and tells what it met. Samples stand at most `step_mm` apart (0: a fortieth of the diameter) and at the end of every segment; contacts less deep or wide than `touch_mm` are none. `progress` is called now and then with the distance travelled, mm. Whatever stands in the tool at the start counts as gone; a rapid is swept like any other move. Raises ArgumentError on values out of range, an arc outside of the XY plane, or if the material needs more memory than its limit.
     """
-
-def thin_curves(
-    times: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"],
-    tolerances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> numpy.typing.NDArray[numpy.int64]:
+def thin_curves(times: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"], tolerances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> numpy.typing.NDArray[numpy.int64]:
     """
     Fewer samples of curves over time, which look the same (Douglas and Peucker 1973, distance along the value).
-
+    
     Args:
         times: Of the rows, (n,), rising.
         values: Samples of the curves, (n, curves).
         tolerances: How far each curve may be from a straight line between two kept samples, (curves,), above 0.
-
+    
     Returns:
         Which rows remain, rising, the first and the last among them, (k,).
-
+    
     Raises:
         ArgumentError: Another shape, times that do not rise, a tolerance that is not above 0, or a value that is not finite.
     """
-
-def time_optimal_trajectory(
-    path: Path | typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    *,
-    max_feed_mm_per_s: typing.SupportsFloat
-    | typing.SupportsIndex
-    | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-    max_acceleration_mm_per_s2: typing.SupportsFloat
-    | typing.SupportsIndex
-    | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-    max_jerk_mm_per_s3: typing.SupportsFloat
-    | typing.SupportsIndex
-    | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-    contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = 0.05,
-    feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-) -> numpy.ndarray:
+def time_optimal_trajectory(path: Path | typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = 0.05, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | None = None, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> numpy.ndarray:
     """
     Set-points of a whole path from rest to rest, nearly as fast as the limits of every axis allow.
-
+    
     Junctions are rounded within the tolerance, jerk is limited, and the motion rests at segments with `stop_at_end`. Limits
     hold for the differences of the set-points (1.001); programmed feeds are kept. See docs/concepts/time_optimal.md.
-
+    
     Args:
         path: A path whose segments have a feed, or the points of a polyline, (n, 3), mm.
         max_feed_mm_per_s: Limit of every axis, mm/s: a number for all, or one for each, shape (3,).
@@ -7590,58 +6957,30 @@ def time_optimal_trajectory(
         contour_tolerance_mm: By which the path may be left where its direction or curvature jumps, mm; 0: rest there.
         feed_mm_per_s: Feed along the polyline through points, mm/s; None: as fast as the axes can be.
         period_s: Between two set-points, s.
-
+    
     Returns:
         Set-points, (n_samples, 3), mm, read-only: the start first, the end to the last bit last.
-
+    
     Raises:
         ArgumentError: A limit or a period that is not above zero and finite, a tolerance below zero, a segment without feed.
         NumericError: The limits cannot be kept.
     """
-
 def time_program(program: ProgramText, model: FanucModel, per_block: bool = False) -> CycleTime:
     """
     Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on a model that no controller can have.
     """
-
-def travel_blocks(
-    blocks: Path,
-    along: Path,
-    block_end: BlockEnd,
-    stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    filters: collections.abc.Sequence[Fir] = [],
-    window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-) -> Travel:
+def travel_blocks(blocks: Path, along: Path, block_end: BlockEnd, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
     """
     How blocks at their feed are travelled, followed along `along`; else as travel_path.
     """
-
-def travel_path(
-    path: Path,
-    profile: SpeedProfile,
-    along: Path,
-    stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    filters: collections.abc.Sequence[Fir] = [],
-    window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-) -> Travel:
+def travel_path(path: Path, profile: SpeedProfile, along: Path, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
     """
     How a path under a speed profile is travelled, followed along another one of which it is made, or along itself; `stations_mm` (n,) ascend to the length of that, `filters` stand behind the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.
     """
-
-def wall_error_um(
-    force: MillingForce,
-    beam: ToolBeam,
-    arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex,
-    side: WallSide,
-    height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02,
-) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+def wall_error_um(force: MillingForce, beam: ToolBeam, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """
     Form error of the wall across itself at heights above the tip (paper 001, section 2.3).
-
+    
     Args:
         force: The force model.
         beam: The tool as a beam.
@@ -7650,42 +6989,21 @@ def wall_error_um(
         side: Which wall.
         height_mm: (n,), mm above the tip.
         tolerance_rad: An arc that ends this close to +-pi/2 reaches the wall.
-
+    
     Returns:
         (n,), um: + material is left standing, - the wall is cut too deep; NaN where the engagement does not reach it.
-
+    
     Raises:
         ArgumentError: A height below the tip, or an engagement above the overhang.
     """
-
-def wall_errors_um(
-    force: MillingForce,
-    beam: ToolBeam,
-    track: EngagementTrack,
-    feed_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    side: WallSide,
-    height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02,
-) -> numpy.ndarray:
+def wall_errors_um(force: MillingForce, beam: ToolBeam, track: EngagementTrack, feed_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> numpy.ndarray:
     """
     The same along a track, a feed for each sample: (n_samples, n_heights), um, read-only. Raises ArgumentError as wall_error_um, and on another number of feeds.
     """
-
-def wilson_theta(
-    mass_kg: typing.SupportsFloat | typing.SupportsIndex,
-    damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex,
-    stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex,
-    force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    period_s: typing.SupportsFloat | typing.SupportsIndex,
-    theta: typing.SupportsFloat | typing.SupportsIndex = 1.4,
-    displacement_m: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-) -> tuple[
-    numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]
-]:
+def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex, force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, displacement_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     Step-by-step integration of m x'' + c x' + k x = force by the Wilson theta method.
-
+    
     Args:
         mass_kg: Mass, above 0.
         damping_n_s_per_m: Viscous damping, at least 0.
@@ -7695,100 +7013,78 @@ def wilson_theta(
         theta: Section of the step over which the acceleration is linear, at least 1; stable from 1.37 on.
         displacement_m: At the first sample.
         velocity_m_per_s: At the first sample.
-
+    
     Returns:
         (displacement in m, velocity in m/s, acceleration in m/s^2), each of shape (n,).
-
+    
     Raises:
         ArgumentError: A value outside its range.
-
+    
     Source: paper 003, section 2.2; K.-J. Bathe, Finite Element Procedures, 9.2.
     """
-
 def with_feeds(path: Path, stretches: collections.abc.Sequence[FeedStretch]) -> Path:
     """
     The path with other feeds: segments are divided where a section ends within one. Raises ArgumentError if the sections do not cover it.
     """
-
-def worst_residual(
-    shaper: Shaper,
-    mode: Mode,
-    lowest_hz: typing.SupportsFloat | typing.SupportsIndex,
-    highest_hz: typing.SupportsFloat | typing.SupportsIndex,
-) -> WorstResidual:
+def worst_residual(shaper: Shaper, mode: Mode, lowest_hz: typing.SupportsFloat | typing.SupportsIndex, highest_hz: typing.SupportsFloat | typing.SupportsIndex) -> WorstResidual:
     """
     Largest residual ratio over a band of natural frequencies, found and proven.
-
+    
     Args:
         shaper: The shaper.
         mode: Gives the damping ratio.
         lowest_hz: Lower end of the band in Hz, above 0.
         highest_hz: Upper end of the band in Hz, at least the lower one.
-
+    
     Returns:
         The largest residual, where it is, and the proven bound.
-
+    
     Raises:
         ArgumentError: A value is outside its range.
         DesignError: More than a million parts of the band are needed for the proof.
-
+    
     Source: this project.
     """
-
-def write_blocks(
-    blocks: FittedBlocks,
-    start: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"],
-    marks: collections.abc.Sequence[BlockMark],
-    options: WriterOptions,
-) -> tuple[bytes, int, int]:
+def write_blocks(blocks: FittedBlocks, start: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"], marks: collections.abc.Sequence[BlockMark], options: WriterOptions) -> tuple[bytes, int, int]:
     """
     (text as bytes, motion code, plane) of fitted blocks; `start` in increments.
     """
-
-def write_feeds(
-    program: ProgramText, region: Region, stretches: collections.abc.Sequence[FeedStretch], options: FeedWriterOptions
-) -> RefedRegion:
+def write_feeds(program: ProgramText, region: Region, stretches: collections.abc.Sequence[FeedStretch], options: FeedWriterOptions) -> RefedRegion:
     """
     The region's lines with the feeds of sections that cover its path; what else stands in them stays. Raises ArgumentError if they do not cover it, or end within a block that cannot be divided.
     """
-
-def zv(
-    mode: Mode | typing.SupportsFloat | typing.SupportsIndex,
-    damping_ratio: typing.SupportsFloat | typing.SupportsIndex | None = None,
-) -> Shaper:
+def zv(mode: Mode | typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Shaper:
     """
     Zero-vibration shaper of one mode: impulses at 0 and half the damped period.
-
+    
     Args:
         mode: The mode to cancel, or its undamped natural frequency in Hz: ``zv(46, 0.02)``.
         damping_ratio: With a frequency, the damping ratio (no unit), 0 <= zeta < 1; None: 0.
-
+    
     Returns:
         A shaper with 2 non-negative impulses.
-
+    
     Raises:
         ArgumentError: A value is outside its range, or a damping ratio beside a mode.
-
+    
     Source: paper 002, eq. 1-2 (Smith 1958).
     """
-
 def zv_on_grid(mode: Mode, period_s: typing.SupportsFloat | typing.SupportsIndex) -> Shaper:
     """
     ZV with impulses at multiples of a period only: the second one split between the two around it.
-
+    
     Args:
         mode: The mode to cancel.
         period_s: Of the grid in s, above 0, at most a quarter of the damped period.
-
+    
     Returns:
         A shaper with 3 non-negative impulses, 2 where half the damped period is a multiple; residual exactly zero at the
         mode.
-
+    
     Raises:
         ArgumentError: The period is not above 0.
         DesignError: The period is too long.
-
+    
     Source: this project.
     """
-
-__version__: str = "0.1.0"
+__version__: str = '0.1.0'

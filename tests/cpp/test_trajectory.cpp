@@ -127,7 +127,7 @@ TEST_CASE("without a tolerance the motion rests where the direction jumps") {
   CHECK(static_cast<double>(samples.positions_mm.rows() - 1) * period_s == doctest::Approx(least_s).epsilon(0.01));
 }
 
-TEST_CASE("a way back is turned round within the tolerance") {
+TEST_CASE("a reversal is turned round within the tolerance") {
   TrajectoryLimits limits;
   const Path path({make_line({0, 0, 0}, {10, 0, 0}, 100.0), make_line({10, 0, 0}, {0, 0, 0}, 100.0)});
   const Samples samples = time_optimal_trajectory(path, limits, period_s);

@@ -116,7 +116,7 @@ class RoundedPolyline:
     def derivatives(self, p: Vector) -> tuple[Vector, Vector, Vector]:
         order = np.argsort(p, kind="stable")
         x = p[order]
-        # The jumps passed altogether, then inside each bump what is left of its own.
+        # The jumps passed altogether, then inside each rounding its own so far.
         begins = np.searchsorted(x, self.corners - self.half_widths, side="right")
         ends = np.searchsorted(x, self.corners + self.half_widths, side="left")
         passed = np.zeros((len(x) + 1, len(self.direction)))

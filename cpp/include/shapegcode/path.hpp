@@ -59,6 +59,9 @@ struct Segment {
 /// Curvature 1/mm: 0 for a line, R/(R^2+p^2) for a helix with pitch p mm/rad.
 [[nodiscard]] double curvature(const Segment& segment) noexcept;
 
+/// Second derivative of the position by the distance: towards the centre of an arc, zero on a line.
+[[nodiscard]] Vector3 bend_at(const Segment& segment, double s_mm) noexcept;
+
 /// Nearest point of a segment to `p`.
 struct Nearest {
   double distance_mm = 0.0;

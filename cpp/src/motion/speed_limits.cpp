@@ -108,17 +108,6 @@ double curvature_speed(double curvature_per_mm, double centripetal, const Filter
   return speed;
 }
 
-// Second derivative of the path by the distance: towards the centre of an arc.
-Vector3 bend_at(const Segment& segment, double s_mm) noexcept {
-  if (segment.kind != SegmentKind::arc) {
-    return Vector3::Zero();
-  }
-  Vector3 inwards = segment.centre_mm - point_at(segment, s_mm);
-  inwards[segment.normal] = 0.0;
-  const double size = inwards.norm();
-  return size > 0.0 ? Vector3(inwards * (curvature(segment) / size)) : Vector3(Vector3::Zero());
-}
-
 }  // namespace
 
 void check_limits(const MotionLimits& limits, const FilterTolerance& filter) {

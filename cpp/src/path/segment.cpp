@@ -158,6 +158,16 @@ double curvature(const Segment& segment) noexcept {
   return radius / (radius * radius + pitch * pitch);
 }
 
+Vector3 bend_at(const Segment& segment, double s_mm) noexcept {
+  if (segment.kind != SegmentKind::arc) {
+    return Vector3::Zero();
+  }
+  Vector3 inwards = segment.centre_mm - point_at(segment, s_mm);
+  inwards[segment.normal] = 0.0;
+  const double size = inwards.norm();
+  return size > 0.0 ? Vector3(inwards * (curvature(segment) / size)) : Vector3(Vector3::Zero());
+}
+
 Nearest nearest_on(const Segment& segment, const Vector3& p) noexcept {
   return segment.kind == SegmentKind::arc ? nearest_on_arc(segment, p) : nearest_on_line(segment, p);
 }

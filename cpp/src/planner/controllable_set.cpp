@@ -30,7 +30,6 @@ class Polygon {
     b_[count_] = b;
     a_[count_++] = a;
   }
-  [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
 
   // Keeps what has on_b b + on_a a <= most.
   void cut(double on_b, double on_a, double most) noexcept {
@@ -170,7 +169,7 @@ void add_jerk(const Bend& path, double jerk, const Tangent& tangent, double x, R
 void ControllableSets::rows_of(const Station& station, const PlannedSegment& segment, const Stretch& stretch,
                                Rows& rows) const noexcept {
   const auto& [x, length, b_begin, b_end, cap] = stretch;
-  const AxisLimits limits = limits_.share(station.share);
+  const AxisLimits limits = limits_at(station);
   rows.count = 0;
   for (const double share : looked_at) {
     const double at = share * length;
@@ -202,31 +201,32 @@ void ControllableSets::rows_of(const Station& station, const PlannedSegment& seg
   }
 }
 
+namespace {
+
+// Narrows a range of c by a row; what the row leaves where it does not bound c.
+double narrow(const Row& row, PathState state, double none, Range& range) noexcept {
+  const double left = row.most - row.on_b * state.speed_squared - row.on_a * state.acceleration;
+  if (row.on_c > none) {
+    range.high = std::min(range.high, left / row.on_c);
+  } else if (row.on_c < -none) {
+    range.low = std::max(range.low, left / row.on_c);
+  } else {
+    return left;
+  }
+  return 0.0;
+}
+
+}  // namespace
+
 Range ControllableSets::leading_to(const ControllableSet& next, PathState state, double length) noexcept {
   Range range;
-  for (std::size_t i = 0; i < next.count; ++i) {
-    const Row row = edge_row(next, i, length);
-    const double left = row.most - row.on_b * state.speed_squared - row.on_a * state.acceleration;
-    if (row.on_c > 0.0) {
-      range.high = std::min(range.high, left / row.on_c);
-    } else if (row.on_c < 0.0) {
-      range.low = std::max(range.low, left / row.on_c);
-    }
-  }
+  for (std::size_t i = 0; i < next.count; ++i) narrow(edge_row(next, i, length), state, 0.0, range);
   return range;
 }
 
 Range ControllableSets::within(const Rows& rows, PathState state, Range range) noexcept {
   for (std::size_t i = 0; i < rows.count; ++i) {
-    const Row& row = rows.rows[i];
-    const double left = row.most - row.on_b * state.speed_squared - row.on_a * state.acceleration;
-    if (row.on_c > no_coefficient) {
-      range.high = std::min(range.high, left / row.on_c);
-    } else if (row.on_c < -no_coefficient) {
-      range.low = std::max(range.low, left / row.on_c);
-    } else if (left < 0.0) {
-      range.low = std::numeric_limits<double>::infinity();
-    }
+    if (narrow(rows.rows[i], state, no_coefficient, range) < 0.0) range.low = std::numeric_limits<double>::infinity();
   }
   return range;
 }
@@ -272,7 +272,7 @@ double near(double expected, double most) noexcept {
 
 ControllableSet ControllableSets::before(const Station& station, const PlannedSegment& segment, const Making& making,
                                          const ControllableSet& next) const noexcept {
-  const AxisLimits limits = limits_.share(station.share);
+  const AxisLimits limits = limits_at(station);
   const double cap = making.cap;
   const double length = station.length;
   const Derivatives path = derivatives_at(station, segment, 0.0);
@@ -319,23 +319,10 @@ ControllableSet ControllableSets::before(const Station& station, const PlannedSe
   return polygon.set();
 }
 
-// Whether all axes keep the limits in this state with this jerk.
-bool ControllableSets::keeps(const Derivatives& path, PathState state, double jerk, const AxisLimits& limits) noexcept {
-  const double v = std::sqrt(state.speed_squared);
-  for (std::size_t i = 0; i < axis_count; ++i) {
-    const double acceleration = path.first[i] * state.acceleration + path.second[i] * state.speed_squared;
-    const double axis_jerk =
-        path.first[i] * jerk + v * (3.0 * path.second[i] * state.acceleration + path.third[i] * state.speed_squared);
-    if (std::abs(acceleration) > stopping_share * limits.acceleration[i]) return false;
-    if (std::abs(axis_jerk) > stopping_share * limits.jerk[i]) return false;
-  }
-  return true;
-}
-
 // A stop by constant jerk, and what is slower: v = j t^2 / 2, a = -j t, length = j t^3 / 6.
 ControllableSet ControllableSets::before_stop(const Station& station, const PlannedSegment& segment,
                                               double cap) const noexcept {
-  const AxisLimits limits = limits_.share(station.share);
+  const AxisLimits limits = limits_at(station);
   const double length = station.length;
   const Derivatives path = derivatives_at(station, segment, 0.0);
   const double steepest = along(path.first, limits.acceleration);
@@ -348,7 +335,7 @@ ControllableSet ControllableSets::before_stop(const Station& station, const Plan
   for (int n = 0; n < 40; ++n, jerk *= 0.8) {
     b = std::pow(4.5 * jerk * length * length, 2.0 / 3.0);
     a = -std::cbrt(6.0 * length * jerk * jerk);
-    if (station.straight || keeps(path, {b, a}, jerk, limits)) break;
+    if (station.straight || keeps(limits.share(stopping_share), path, {std::sqrt(b), a}, jerk)) break;
   }
   Polygon polygon;
   polygon.add(0.0, 0.0);

@@ -1,4 +1,4 @@
-// From which states of the motion a stop is certain, with every limit kept: the look-ahead of a control.
+// From which states of the motion a stop is certain, with every limit kept.
 #pragma once
 
 #include <algorithm>
@@ -27,8 +27,6 @@ struct ControllableSet {
   static constexpr std::size_t max_corners = 12;
   std::size_t count = 0;
   std::array<double, max_corners> b{}, a{};
-
-  friend bool operator==(const ControllableSet&, const ControllableSet&) = default;
 };
 
 /// on_c c + on_b b + on_a a <= most, where b and a are those at the begin of an interval.
@@ -91,10 +89,10 @@ class ControllableSets {
   [[nodiscard]] ControllableSet before_stop(const Station& station, const PlannedSegment& segment,
                                             double cap) const noexcept;
 
- private:
-  [[nodiscard]] static bool keeps(const Derivatives& path, PathState state, double jerk,
-                                  const AxisLimits& limits) noexcept;
+  /// What is planned on an interval.
+  [[nodiscard]] AxisLimits limits_at(const Station& station) const noexcept { return limits_.share(station.share); }
 
+ private:
   AxisLimits limits_;
 };
 

@@ -30,20 +30,20 @@ constexpr double at_end_mm = 1e-9;
 // Where nothing is left by a little, what is too slow is taken: it is the upper bound that leads beyond the limits.
 double nearest(const Range& range, double value) noexcept { return std::min(range.high, std::max(range.low, value)); }
 
-// Way and speed after a time on s'' = a + c s.
-void go(PathState state, double c, double t, double& way, double& speed) noexcept {
+// Distance and speed after a time on s'' = a + c s.
+void go(PathState state, double c, double t, double& travel, double& speed) noexcept {
   const double v = std::sqrt(state.speed_squared);
   const double a = state.acceleration;
   const double root = std::sqrt(std::abs(c));
   const double angle = root * t;
   if (angle < 1e-4) {
-    way = t * (v + t * (0.5 * a + t * c * v / 6.0));
+    travel = t * (v + t * (0.5 * a + t * c * v / 6.0));
     speed = v + t * (a + 0.5 * t * c * v);
   } else if (c > 0.0) {
-    way = a / c * (std::cosh(angle) - 1.0) + v / root * std::sinh(angle);
+    travel = a / c * (std::cosh(angle) - 1.0) + v / root * std::sinh(angle);
     speed = a / root * std::sinh(angle) + v * std::cosh(angle);
   } else {
-    way = a / c * (std::cos(angle) - 1.0) + v / root * std::sin(angle);
+    travel = a / c * (std::cos(angle) - 1.0) + v / root * std::sin(angle);
     speed = a / root * std::sin(angle) + v * std::cos(angle);
   }
 }
@@ -57,8 +57,8 @@ AxisValues PathMotion::position() const noexcept {
 }
 
 // Where the motion is so many mm on; not planned: at a stop or beyond it.
-PathMotion::Place PathMotion::place_at(double way) const noexcept {
-  Place place{station_, offset_ + way, true};
+PathMotion::Place PathMotion::place_at(double travel) const noexcept {
+  Place place{station_, offset_ + travel, true};
   while (place.offset >= plan_->station(place.station).length) {
     if (plan_->ends_in_stop(place.station)) return {place.station, plan_->station(place.station).length, false};
     place.offset -= plan_->station(place.station++).length;
@@ -66,19 +66,19 @@ PathMotion::Place PathMotion::place_at(double way) const noexcept {
   return place;
 }
 
-// Way to the next stop; beyond `most`, some more than that.
+// Distance to the next stop, infinite beyond `most`.
 double PathMotion::to_stop(double most) const noexcept {
-  double way = -offset_;
-  for (std::size_t k = station_; way <= most; ++k) {
-    way += plan_->station(k).length;
-    if (plan_->ends_in_stop(k)) return way;
+  double travel = -offset_;
+  for (std::size_t k = station_; travel <= most; ++k) {
+    travel += plan_->station(k).length;
+    if (plan_->ends_in_stop(k)) return travel;
   }
   return std::numeric_limits<double>::infinity();
 }
 
 // The path where the motion is after so much time, as far as its jerk does not matter.
 Derivatives PathMotion::derivatives_after(double time_s) const noexcept {
-  const Place place = place_at(std::max(0.0, time_s * (speed_ + 0.5 * acceleration_ * time_s)));
+  const Place place = place_at(std::max(0.0, time_s * (state_.speed + 0.5 * state_.acceleration * time_s)));
   const Station& there = plan_->station(place.station);
   return derivatives_at(there, plan_->segment_of(there), place.offset);
 }
@@ -98,12 +98,12 @@ PathMotion::Jerks PathMotion::allowed() const noexcept {
   for (const double share : jerk_looked_at) {
     const double x = share * t;
     const Derivatives path = share < 1.0 ? derivatives_after(x) : after_period_;
-    const double v = std::max(0.0, speed_ + acceleration_ * x);
+    const double v = std::max(0.0, state_.speed + state_.acceleration * x);
     for (std::size_t i = 0; i < axis_count; ++i) {
       keep(path.first[i] + 3.0 * path.second[i] * v * x,
-           v * (3.0 * path.second[i] * acceleration_ + path.third[i] * v * v), limits.jerk[i]);
+           v * (3.0 * path.second[i] * state_.acceleration + path.third[i] * v * v), limits.jerk[i]);
       if (share < 1.0) continue;
-      keep(path.first[i] * t, path.first[i] * acceleration_ + path.second[i] * v * v, limits.acceleration[i]);
+      keep(path.first[i] * t, path.first[i] * state_.acceleration + path.second[i] * v * v, limits.acceleration[i]);
     }
   }
   return jerks;
@@ -111,12 +111,10 @@ PathMotion::Jerks PathMotion::allowed() const noexcept {
 
 // Whether a stop is certain after so much time with a constant jerk.
 bool PathMotion::controllable(double jerk, double time_s, const Derivatives& path) const noexcept {
-  const double t = time_s;
-  const double a = acceleration_ + jerk * t;
-  const double v = speed_ + t * (acceleration_ + 0.5 * jerk * t);
-  const double way = t * (speed_ + t * (0.5 * acceleration_ + jerk * t * (1.0 / 6.0)));
-  if (v < 0.0 || way < 0.0) return false;
-  const Place place = place_at(way);
+  const double travel = state_.travel(jerk, time_s);
+  const auto [v, a] = state_.after(jerk, time_s);
+  if (v < 0.0 || travel < 0.0) return false;
+  const Place place = place_at(travel);
   if (!place.planned || plan_->ends_in_stop(place.station)) return false;
   const Station& station = plan_->station(place.station);
   const double left = station.length - place.offset;
@@ -173,47 +171,36 @@ bool PathMotion::choose(double& jerk) const noexcept {
 
 // Whether a landing keeps the limits where the path turns.
 bool PathMotion::keeps_limits(const Landing& landing, double excess) const noexcept {
-  double v = speed_;
-  double a = acceleration_;
-  double way = 0.0;
-  const double t = period_s_;
+  AlongPath state = state_;
+  double travel = 0.0;
   for (std::size_t part = 0; part < landing.jerk.size(); ++part) {
     const double jerk = landing.jerk[part];
     for (int n = 0; n < landing.periods[part]; ++n) {
-      way += t * (v + t * (0.5 * a + t * jerk * (1.0 / 6.0)));
-      v += t * (a + 0.5 * t * jerk);
-      a += t * jerk;
-      const Place place = place_at(way);
+      travel += state.travel(jerk, period_s_);
+      state = state.after(jerk, period_s_);
+      const Place place = place_at(travel);
       if (!place.planned) return true;  // the last of it is slow
       const Station& station = plan_->station(place.station);
-      if (v > speed_ && v * v > station.squared_limit()) return false;
-      const AxisLimits limits = plan_->limits_at(station);
+      if (state.speed > state_.speed && state.speed * state.speed > station.squared_limit()) return false;
       const Derivatives path = derivatives_at(station, plan_->segment_of(station), place.offset);
-      for (std::size_t i = 0; i < axis_count; ++i) {
-        const double acceleration = path.first[i] * a + path.second[i] * v * v;
-        const double axis_jerk = path.first[i] * jerk + v * (3.0 * path.second[i] * a + path.third[i] * v * v);
-        if (std::abs(acceleration) > excess * (1.0 + landing_rounding) * limits.acceleration[i] ||
-            std::abs(axis_jerk) > excess * (1.0 + landing_rounding) * limits.jerk[i]) {
-          return false;
-        }
-      }
+      if (!keeps(plan_->limits_at(station).share(excess * (1.0 + landing_rounding)), path, state, jerk)) return false;
     }
   }
   return true;
 }
 
-// The shortest landing after `way` mm within the limits times `excess`.
-bool PathMotion::land(double way, double excess) noexcept {
+// The shortest landing after `travel` mm within the limits times `excess`.
+bool PathMotion::land(double travel, double excess) noexcept {
   const Station& here = plan_->station(station_);
   const AxisLimits limits = plan_->limits_at(here);
   const Derivatives path = derivatives_at(here, plan_->segment_of(here), offset_);
   const double most_jerk = excess * (1.0 + landing_rounding) * along(path.first, limits.jerk);
   const double steepest =
-      excess * (1.0 + rounding) * std::max(along(path.first, limits.acceleration), std::abs(acceleration_));
-  const double a = acceleration_;
-  const double v = speed_;
+      excess * (1.0 + rounding) * std::max(along(path.first, limits.acceleration), std::abs(state_.acceleration));
+  const double a = state_.acceleration;
+  const double v = state_.speed;
   // No shorter than with a jerk that is constant.
-  const double shortest_s = 0.5 * std::max(std::abs(a) / most_jerk, std::cbrt(6.0 * way / most_jerk));
+  const double shortest_s = 0.5 * std::max(std::abs(a) / most_jerk, std::cbrt(6.0 * travel / most_jerk));
   int periods = std::max(3, static_cast<int>(shortest_s / period_s_));
   for (int n = 0; n < landings; ++n, periods += 1 + periods / (n < landings / 3 ? 32 : 8)) {
     Landing found;
@@ -221,7 +208,7 @@ bool PathMotion::land(double way, double excess) noexcept {
     std::array<double, 3> time{};
     for (std::size_t i = 0; i < 3; ++i) time[i] = found.periods[i] * period_s_;
     const double whole = time[0] + time[1] + time[2];
-    // What a jerk of 1 in each part makes of acceleration, speed and way at the end.
+    // What a jerk of 1 in each part makes of acceleration, speed and distance at the end.
     Eigen::Matrix3d effect;
     double after = whole;
     for (Eigen::Index i = 0; i < 3; ++i) {
@@ -231,17 +218,15 @@ bool PathMotion::land(double way, double excess) noexcept {
       effect(1, i) = t * (0.5 * t + after);
       effect(2, i) = t * (t * t / 6.0 + after * 0.5 * (t + after));
     }
-    const Vector3 jerk = effect.inverse() * Vector3(-a, -v - a * whole, way - whole * (v + 0.5 * a * whole));
-    double speed = v;
-    double steep = a;
-    bool keeps = jerk.cwiseAbs().maxCoeff() <= most_jerk;
-    for (std::size_t i = 0; i < 3 && keeps; ++i) {
+    const Vector3 jerk = effect.inverse() * Vector3(-a, -v - a * whole, travel - whole * (v + 0.5 * a * whole));
+    AlongPath state = state_;
+    bool keeps_most = jerk.cwiseAbs().maxCoeff() <= most_jerk;
+    for (std::size_t i = 0; i < 3 && keeps_most; ++i) {
       found.jerk[i] = jerk[static_cast<Eigen::Index>(i)];
-      speed += time[i] * (steep + 0.5 * time[i] * found.jerk[i]);
-      steep += time[i] * found.jerk[i];
-      keeps = speed >= -rounding && std::abs(steep) <= steepest;
+      state = state.after(found.jerk[i], time[i]);
+      keeps_most = state.speed >= -rounding && std::abs(state.acceleration) <= steepest;
     }
-    if (!keeps || !keeps_limits(found, excess)) continue;
+    if (!keeps_most || !keeps_limits(found, excess)) continue;
     landing_ = found;
     return true;
   }
@@ -256,8 +241,8 @@ void PathMotion::fly_on() noexcept {
   if (!landing_.runs()) come_to_rest();
 }
 
-void PathMotion::pass(double way) noexcept {
-  offset_ += std::max(way, 0.0);
+void PathMotion::pass(double travel) noexcept {
+  offset_ += std::max(travel, 0.0);
   while (offset_ >= plan_->station(station_).length) {
     // A stop is not passed but reached: see come_to_rest.
     if (plan_->ends_in_stop(station_)) {
@@ -271,26 +256,32 @@ void PathMotion::pass(double way) noexcept {
 void PathMotion::move(double jerk, double time_s) noexcept {
   double t = time_s;
   // Not beyond rest.
-  if (acceleration_ < 0.0 && jerk > 0.0 && speed_ * 2.0 * jerk <= acceleration_ * acceleration_ * (1.0 + rounding)) {
-    t = std::min(t, -acceleration_ / jerk);
+  if (state_.acceleration < 0.0 && jerk > 0.0 &&
+      state_.speed * 2.0 * jerk <= state_.acceleration * state_.acceleration * (1.0 + rounding)) {
+    t = std::min(t, -state_.acceleration / jerk);
   }
-  const double way = t * (speed_ + t * (0.5 * acceleration_ + jerk * t * (1.0 / 6.0)));
-  speed_ = std::max(0.0, speed_ + t * (acceleration_ + 0.5 * jerk * t));
-  acceleration_ += jerk * t;
+  const double travel = state_.travel(jerk, t);
+  state_ = state_.after(jerk, t);
+  state_.speed = std::max(0.0, state_.speed);
   jerk_ = jerk;
-  pass(way);
-  if (t < time_s || (speed_ <= 0.0 && acceleration_ < 0.0)) speed_ = acceleration_ = jerk_ = 0.0;
+  pass(travel);
+  if (t < time_s || (state_.speed <= 0.0 && state_.acceleration < 0.0)) come_to_standstill();
+}
+
+void PathMotion::come_to_standstill() noexcept {
+  state_ = {};
+  jerk_ = 0.0;
 }
 
 void PathMotion::come_to_rest() noexcept {
-  speed_ = acceleration_ = jerk_ = 0.0;
+  come_to_standstill();
   if (plan_->ends_in_stop(station_) && offset_ >= plan_->station(station_).length - at_end_mm) {
     ++station_;
     offset_ = 0.0;
   }
 }
 
-// The choice of c for what is left of an interval.
+// The choice of c for the rest of an interval.
 double PathMotion::course(double left, PathState state) noexcept {
   const Station& here = plan_->station(station_);
   const Range leading = ControllableSets::leading_to(plan_->set(station_ + 1), state, left);
@@ -303,7 +294,7 @@ double PathMotion::course(double left, PathState state) noexcept {
   double c = leading.high;
   if (range.low <= range.high) {
     // What the limits allow at once, if the rest lets it.
-    c = nearest(range, speed_ > 0.0 ? jerks_.high / speed_ : range.high);
+    c = nearest(range, state_.speed > 0.0 ? jerks_.high / state_.speed : range.high);
   } else if (leading.low <= leading.high) {
     // Between the places that were looked at: as it was begun, which misses the least.
     c = nearest(leading, course_station_ == station_ ? course_ : 0.5 * (range.low + range.high));
@@ -322,35 +313,36 @@ void PathMotion::follow() noexcept {
       // A landing begins with a period; none was found where the end is reached.
       return left <= at_end_mm ? come_to_rest() : move(0.0, rest);
     }
-    const PathState state{speed_ * speed_, acceleration_};
+    const PathState state{state_.speed * state_.speed, state_.acceleration};
     const double c = course(left, state);
-    if (acceleration_ < 0.0 && -acceleration_ < c * left && acceleration_ * acceleration_ > c * state.speed_squared) {
+    if (state_.acceleration < 0.0 && -state_.acceleration < c * left &&
+        state_.acceleration * state_.acceleration > c * state.speed_squared) {
       // That would be rest within the interval: with the jerk that ends both.
-      return move(speed_ > 0.0 ? acceleration_ * acceleration_ / (2.0 * speed_) : 0.0, rest);
+      return move(state_.speed > 0.0 ? state_.acceleration * state_.acceleration / (2.0 * state_.speed) : 0.0, rest);
     }
-    double way = 0.0;
+    double travel = 0.0;
     double speed = 0.0;
     double t = rest;
-    go(state, c, t, way, speed);
-    if (way > left) {
+    go(state, c, t, travel, speed);
+    if (travel > left) {
       double low = 0.0;
       double high = rest;
       for (int halving = 0; halving < 40; ++halving) {
         t = 0.5 * (low + high);
-        go(state, c, t, way, speed);
-        (way > left ? high : low) = t;
+        go(state, c, t, travel, speed);
+        (travel > left ? high : low) = t;
       }
       t = high;
-      way = left;
+      travel = left;
     }
-    way = std::max(way, 0.0);
-    acceleration_ += c * way;
-    speed_ = std::max(speed, 0.0);
-    jerk_ = c * speed_;
-    pass(way);
+    travel = std::max(travel, 0.0);
+    state_.acceleration += c * travel;
+    state_.speed = std::max(speed, 0.0);
+    jerk_ = c * state_.speed;
+    pass(travel);
     rest -= t;
-    // There is no way back.
-    if (speed_ <= 0.0 && acceleration_ < 0.0) acceleration_ = 0.0;
+    // The motion does not go back.
+    if (state_.speed <= 0.0 && state_.acceleration < 0.0) state_.acceleration = 0.0;
   }
 }
 
@@ -358,10 +350,10 @@ void PathMotion::advance() noexcept {
   if (landing_.runs()) return fly_on();
   if (at_end()) return;
   const double near = landing_lengths * plan_->stopping_length();
-  const double way = to_stop(near);
+  const double travel = to_stop(near);
   const bool last = plan_->ends_in_stop(station_);
-  if (last || (way <= near && acceleration_ < 0.0)) {
-    if (land(way, 1.0)) return fly_on();
+  if (last || (travel <= near && state_.acceleration < 0.0)) {
+    if (land(travel, 1.0)) return fly_on();
   }
   after_period_ = derivatives_after(period_s_);
   after_two_ = derivatives_after(2.0 * period_s_);
@@ -371,7 +363,7 @@ void PathMotion::advance() noexcept {
   if (last) {
     // Whatever the limits are, not past the stop.
     for (double excess = first_excess; excess < last_excess; excess *= next_excess) {
-      if (land(way, excess)) return fly_on();
+      if (land(travel, excess)) return fly_on();
     }
   }
   follow();

@@ -40,7 +40,7 @@ class PathMotion {
     bool planned;
   };
 
-  [[nodiscard]] Place place_at(double way) const noexcept;
+  [[nodiscard]] Place place_at(double travel) const noexcept;
   [[nodiscard]] double to_stop(double most) const noexcept;
   [[nodiscard]] Derivatives derivatives_after(double time_s) const noexcept;
   [[nodiscard]] Jerks allowed() const noexcept;
@@ -48,10 +48,11 @@ class PathMotion {
   [[nodiscard]] bool controllable(double jerk) const noexcept;
   [[nodiscard]] bool choose(double& jerk) const noexcept;
   [[nodiscard]] bool keeps_limits(const Landing& landing, double excess) const noexcept;
-  bool land(double way, double excess) noexcept;
+  bool land(double travel, double excess) noexcept;
   void fly_on() noexcept;
   void move(double jerk, double time_s) noexcept;
-  void pass(double way) noexcept;
+  void pass(double travel) noexcept;
+  void come_to_standstill() noexcept;
   void come_to_rest() noexcept;
   void follow() noexcept;
   [[nodiscard]] double course(double left, PathState state) noexcept;
@@ -60,8 +61,7 @@ class PathMotion {
   double period_s_;
   std::size_t station_ = 0;
   double offset_ = 0.0;
-  double speed_ = 0.0;
-  double acceleration_ = 0.0;
+  AlongPath state_;
   double jerk_ = 0.0;  // of the last period
   Landing landing_;
   double course_ = 0.0;  // the last choice of c, and the interval that it was made for

@@ -22,7 +22,7 @@ constexpr std::array<double, 5> passings{1.0, 0.85, 0.7, 0.55, 0.4};
 }  // namespace
 
 PathPlan::PathPlan(std::vector<PlannedSegment> segments, const AxisLimits& limits, double period_s)
-    : limits_(limits), path_(std::move(segments), limits, period_s), rules_(limits) {
+    : path_(std::move(segments), limits, period_s), rules_(limits) {
   make_stations();
   sets_.resize(stations_.size());
   expected_.resize(stations_.size());
@@ -39,7 +39,7 @@ void PathPlan::make_stations() {
     // What the axes allow.
     for (const double x : {0.0, station.length}) {
       const Derivatives path = derivatives_at(station, segment_of(station), x);
-      station.speed_limit = std::min(station.speed_limit, along(path.first, limits_.speed));
+      station.speed_limit = std::min(station.speed_limit, along(path.first, limits_at(station).speed));
     }
     if (station.straight) {
       station.straight_acceleration = along(station.first, limits_at(station).acceleration);

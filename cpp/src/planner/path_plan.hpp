@@ -24,7 +24,7 @@ class PathPlan {
     return path_.segments()[station.segment];
   }
   [[nodiscard]] const ControllableSets& rules() const noexcept { return rules_; }
-  [[nodiscard]] AxisLimits limits_at(const Station& station) const noexcept { return limits_.share(station.share); }
+  [[nodiscard]] AxisLimits limits_at(const Station& station) const noexcept { return rules_.limits_at(station); }
   [[nodiscard]] double stopping_length() const noexcept { return path_.stopping_length(); }
   /// Whether the motion rests at the end of an interval.
   [[nodiscard]] bool ends_in_stop(std::size_t index) const noexcept { return stations_[index + 1].stop; }
@@ -37,7 +37,6 @@ class PathPlan {
   [[nodiscard]] PathState fastest_after(std::size_t index, PathState state) const noexcept;
   [[nodiscard]] double best_passing(std::size_t index) const noexcept;
 
-  AxisLimits limits_;
   RoundedPath path_;
   ControllableSets rules_;
   std::vector<Station> stations_;

@@ -19,7 +19,7 @@ constexpr double closest_on_half = 300.0;
 constexpr double radians_of_arc = 0.1;
 // Periods that an interval lasts at the programmed feed.
 constexpr double periods_of_interval = 4.0;
-// Towards a stop intervals shrink with the way that is left, down to what the jerk travels in so many periods.
+// Towards a stop intervals shrink with the distance to it, down to what the jerk travels in so many periods.
 constexpr double share_before_stop = 0.4;
 constexpr double stopping_periods = 5.0;
 // Junctions that are looked at to each side.
@@ -52,6 +52,12 @@ Rounding bend_rounding(double u, bool before) noexcept {
           side * (w * (7.0 / 6.0) - 0.5), 7.0 / 6.0};
 }
 
+// The half-width at which jumps of these shares take the whole tolerance: turn d + bend d^2 = 1.
+double width_within(double turn, double bend) noexcept {
+  const double half = 0.5 * turn;
+  return 1.0 / (half + std::sqrt(half * half + bend));
+}
+
 }  // namespace
 
 RoundedPath::RoundedPath(std::vector<PlannedSegment> segments, const AxisLimits& limits, double period_s)
@@ -77,12 +83,7 @@ double RoundedPath::widest(std::size_t junction) const noexcept {
   std::size_t before = junction;
   for (std::size_t n = 0; n < lookahead && !starts_anew(before); ++n) --before;
   if (!starts_anew(before)) width = std::min(width, 0.5 * (entry.distance - segments_[before].distance));
-  const double share = entry.turn_share * width + entry.bend_share * width * width;
-  if (share > 1.0) {
-    const double half = 0.5 * entry.turn_share;
-    width = 1.0 / (half + std::sqrt(half * half + entry.bend_share));
-  }
-  return width;
+  return std::min(width, width_within(entry.turn_share, entry.bend_share));
 }
 
 // The largest half-width d for which the junctions within 2 d, rounded as widely, stay within the tolerance together:
@@ -117,8 +118,7 @@ void RoundedPath::choose(std::size_t junction) noexcept {
     if (starts_anew(next)) continue;  // at a stop nothing jumps that counts
     turn += segments_[next].turn_share;
     bend += segments_[next].bend_share;
-    const double half = 0.5 * turn;
-    const double within = 1.0 / (half + std::sqrt(half * half + bend));
+    const double within = width_within(turn, bend);
     if (within < width) width = std::max(within, 0.5 * nearest);
     if (width <= 0.5 * nearest) break;
   }
@@ -195,7 +195,7 @@ double RoundedPath::next_break() const noexcept {
 
 // The square of the speed that the junctions around let a motion have.
 double RoundedPath::squared_speed() const noexcept {
-  const double gain = 2.0 * *std::min_element(limits_.acceleration.begin(), limits_.acceleration.end());
+  const double gain = 2.0 * *std::ranges::min_element(limits_.acceleration);
   double squared = gain * x_;
   see_roundings([&](const PlannedSegment& junction, bool) {
     squared = std::min(squared, junction.passed + gain * std::abs(x_ - junction.distance));

@@ -13,7 +13,7 @@ namespace shapegcode {
 /// add up. Half-widths are so chosen that what adds up stays within the tolerance.
 class RoundedPath {
  public:
-  /// `lookahead`: so many junctions are looked at to each side of one whose half-width is chosen.
+  /// Chooses the half-widths.
   RoundedPath(std::vector<PlannedSegment> segments, const AxisLimits& limits, double period_s);
 
   /// The next interval; false at the end.

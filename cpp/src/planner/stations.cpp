@@ -12,14 +12,13 @@ constexpr double no_share = 1e-9;
 // What an arc adds to the cubic: it turns by the same angle for every mm.
 void add_arc(const Segment& arc, double s_mm, Derivatives& derivatives) noexcept {
   const Vector3 tangent = tangent_at(arc, s_mm);
-  const Vector3 point = point_at(arc, s_mm);
+  const Vector3 bend = bend_at(arc, s_mm);
   const double turning = arc.sweep_rad / arc.length_mm;
   for (std::size_t i = 0; i < axis_count; ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
     derivatives.first[i] += tangent[axis];
-    if (axis == arc.normal) continue;
-    derivatives.second[i] -= turning * turning * (point[axis] - arc.centre_mm[axis]);
-    derivatives.third[i] -= turning * turning * tangent[axis];
+    derivatives.second[i] += bend[axis];
+    if (axis != arc.normal) derivatives.third[i] -= turning * turning * tangent[axis];
   }
 }
 
@@ -32,6 +31,17 @@ double along(const AxisValues& direction, const AxisValues& limits) noexcept {
     if (share > no_share) least = std::min(least, limits[i] / share);
   }
   return least;
+}
+
+bool keeps(const AxisLimits& limits, const Derivatives& path, const AlongPath& state, double jerk) noexcept {
+  const double a = state.acceleration;
+  const double v = state.speed;
+  for (std::size_t i = 0; i < axis_count; ++i) {
+    const double acceleration = path.first[i] * a + path.second[i] * v * v;
+    const double axis_jerk = path.first[i] * jerk + v * (3.0 * path.second[i] * a + path.third[i] * v * v);
+    if (std::abs(acceleration) > limits.acceleration[i] || std::abs(axis_jerk) > limits.jerk[i]) return false;
+  }
+  return true;
 }
 
 Derivatives derivatives_at(const Station& station, const PlannedSegment& segment, double x) noexcept {

@@ -30,6 +30,23 @@ struct Derivatives {
   AxisValues first{}, second{}, third{};
 };
 
+/// Speed and acceleration along the path.
+struct AlongPath {
+  double speed = 0.0, acceleration = 0.0;
+  /// Distance that a time with a constant jerk takes it.
+  [[nodiscard]] double travel(double jerk, double time_s) const noexcept {
+    return time_s * (speed + time_s * (0.5 * acceleration + jerk * time_s * (1.0 / 6.0)));
+  }
+  /// Then.
+  [[nodiscard]] AlongPath after(double jerk, double time_s) const noexcept {
+    return {speed + time_s * (acceleration + 0.5 * jerk * time_s), acceleration + jerk * time_s};
+  }
+};
+
+/// Whether every axis keeps the limits of acceleration and jerk.
+[[nodiscard]] bool keeps(const AxisLimits& limits, const Derivatives& path, const AlongPath& state,
+                         double jerk) noexcept;
+
 /// A place of the path and the interval from there to the next one, on which the position of every axis is a cubic: of
 /// an arc, what is added to the arc.
 struct Station {
@@ -37,7 +54,7 @@ struct Station {
   double length = 0.0;    ///< of the interval
   double offset = 0.0;    ///< from the start of the segment
   std::size_t segment = 0;
-  bool stop = false;  ///< the motion comes to rest here, and goes on when all that follows is at rest
+  bool stop = false;  ///< the motion comes to rest here
   bool arc = false;
   bool valley = false;                                      ///< the slowest place around: braking is over here
   bool straight = false;                                    ///< a line that no rounding reaches

@@ -1,15 +1,12 @@
 #include "shapegcode/planner.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "base/checks.hpp"
-#include "base/refuse.hpp"
 #include "planner/path_motion.hpp"
 #include "planner/path_plan.hpp"
 #include "planner/segments.hpp"
@@ -35,15 +32,6 @@ constexpr int most_plans = 24;
 // A motion that gets on by less in so many periods does not end.
 constexpr std::size_t progress_periods = 4096;
 constexpr double progress_mm = 1e-6;
-
-// Second derivative of a segment by the distance: towards the centre of an arc.
-Vector3 bend_at(const Segment& segment, double s_mm) noexcept {
-  if (segment.kind != SegmentKind::arc) return Vector3::Zero();
-  const double turning = segment.sweep_rad / segment.length_mm;
-  Vector3 inwards = segment.centre_mm - point_at(segment, s_mm);
-  inwards[segment.normal] = 0.0;
-  return turning * turning * inwards;
-}
 
 double size_of(const Vector3& jump) noexcept {
   const double size = jump.norm();
