@@ -27,10 +27,17 @@ void register_shaped_command(py::module_& module) {
       .value("command", ContourTarget::command, "The shaped command.")
       .value("response", ContourTarget::response, "The plant's response to it: the part.");
 
+  py::enum_<CommandPlanner>(module, "CommandPlanner", "What plans the command of a run before it is shaped.")
+      .value("look_ahead", CommandPlanner::look_ahead, "Ramps along the path, corners passed slowly.")
+      .value("time_optimal", CommandPlanner::time_optimal,
+             "Corners rounded within the contour tolerance, jerk of every axis kept.");
+
   py::class_<ShapingOptions>(module, "ShapingOptions",
                              "How a region is turned into a shaped command on the block grid.")
       .def(py::init<>())
       .def_readwrite("limits", &ShapingOptions::limits, "Limits of the look-ahead.")
+      .def_readwrite("planner", &ShapingOptions::planner,
+                     "The time-optimal one asks for feed, acceleration and jerk of every axis in `limits`.")
       .def_readwrite("tolerance", &ShapingOptions::tolerance, "Of the shaper with what follows it.")
       .def_readwrite("block_period_s", &ShapingOptions::block_period_s, "s.")
       .def_readwrite("interpolation_period_s", &ShapingOptions::interpolation_period_s, "s.")

@@ -25,6 +25,7 @@ using shapegcode::Path;
 using shapegcode::plan_speed;
 using shapegcode::plan_within_tolerance;
 using shapegcode::PlannedRun;
+using shapegcode::RunPlanner;
 using shapegcode::RegionShaper;
 using shapegcode::RunFilter;
 using shapegcode::Segment;
@@ -177,19 +178,25 @@ TEST_CASE("feed search: only what leaves the tolerance is slowed") {
   const ShapingOptions options = options_for(ContourTarget::command, 0.003);
   const std::vector<Fir> shaper{grid_shaper()};
   const RunFilter filter(shaper, options.target, options.modes, block_s, 1.0);
-  const PlannedRun plan = plan_within_tolerance(path, options.limits, filter, 5, 0.003);
+  const RunPlanner planner(options, 0.0);
+  const PlannedRun plan = plan_within_tolerance(path, {}, filter, planner, 0.003);
   REQUIRE(plan.stops.empty());
   CHECK(plan.largest_deviation_mm <= 0.003);
   CHECK(plan.largest_deviation_mm > 0.003 * 0.8);  // the highest speed, not just some
-  std::size_t cursor = 0;
-  const auto speed_at = [&](double distance) {
-    cursor = 0;
-    const double time = plan.profile->time_s(distance, cursor);
-    cursor = 0;
-    return plan.profile->speed_mm_per_s(time, cursor);
-  };
-  CHECK(speed_at(0.5 * (path->distance_mm(1) + path->distance_mm(2))) < 60.0);
-  CHECK(speed_at(0.5 * (path->distance_mm(3) + path->distance_mm(4))) == doctest::Approx(feed));
+  const auto rows = plan.motion->read(filter.half_period_s, 0.0);
+  const std::size_t count = 2 * plan.motion->block_periods(filter.half_period_s) + 1;
+  Vector3 before;
+  rows->next(before);
+  std::vector<double> fastest(path->size(), 0.0);
+  for (std::size_t row = 1; row < count; ++row) {
+    Vector3 here;
+    rows->next(here);
+    const double speed = (here - before).norm() / filter.half_period_s;
+    fastest[rows->segment()] = std::max(fastest[rows->segment()], speed);
+    before = here;
+  }
+  CHECK(fastest[1] < 60.0);
+  CHECK(fastest[3] == doctest::Approx(feed).epsilon(1e-3));
 }
 
 TEST_CASE("feed search: a corner that no speed passes within the tolerance is a stop") {

@@ -74,8 +74,8 @@ PathPointer right_angle(double feed) {
   return path_of({make_line({0, 0, 0}, {20, 0, 0}, feed), make_line({20, 0, 0}, {20, 20, 0}, feed)});
 }
 
-std::shared_ptr<const SpeedProfile> planned(const PathPointer& path, const MotionLimits& limits = {}) {
-  return std::make_shared<const SpeedProfile>(plan_speed(*path, limits));
+std::shared_ptr<const RunMotion> planned(const PathPointer& path, const MotionLimits& limits = {}) {
+  return motion_of(path, std::make_shared<const SpeedProfile>(plan_speed(*path, limits)), 5);
 }
 
 RunFilter filter_for(ContourTarget target) {
@@ -91,7 +91,7 @@ Rows rows_of(RunShaper& shaper) {
 
 Rows shaped(const PathPointer& path, ContourTarget target, const RunLimits& run = {}, const MotionLimits& limits = {}) {
   const RunFilter filter = filter_for(target);
-  RunShaper shaper(path, planned(path, limits), filter, run, 5);
+  RunShaper shaper(path, planned(path, limits), filter, run);
   return rows_of(shaper);
 }
 
@@ -195,7 +195,7 @@ TEST_CASE("run shaper: a run that is longer than what is kept in memory") {
   }
   const PathPointer path = path_of(segments);
   const RunFilter filter = filter_for(ContourTarget::command);
-  RunShaper shaper(path, planned(path), filter, {}, 5);
+  RunShaper shaper(path, planned(path), filter, {});
   const Rows rows = rows_of(shaper);
   REQUIRE(rows.size() > 60000);
   // Straight on from the start: every row lies near the segment where it should be, by the distance that it went.

@@ -22,6 +22,12 @@ enum class ContourTarget {
   response,  ///< the plant's response to it: the part
 };
 
+/// What plans the command of a run before it is shaped.
+enum class CommandPlanner : std::uint8_t {
+  look_ahead,    ///< `plan_speed`: ramps along the path, corners passed slowly
+  time_optimal,  ///< `time_optimal_motion`: corners rounded within the contour tolerance, jerk of every axis kept
+};
+
 /// Kernel, at delays 0, 1, ... samples of `period_s`, from a command before shaping to what shall follow the path: the
 /// shaper's own taps, or its taps followed by an axis' modes under a command that is linear between samples. A shaper
 /// that cancels the modes leaves a kernel hardly longer than itself; the tail of one that does not is cut where less
@@ -82,6 +88,9 @@ class ContourSolver {
 /// How a region is turned into a shaped command on the block grid.
 struct ShapingOptions {
   MotionLimits limits;
+  /// The time-optimal one asks for feed, acceleration and jerk of every axis in `limits`; their rules for corners do
+  /// not count for it.
+  CommandPlanner planner = CommandPlanner::look_ahead;
   FilterTolerance tolerance;  ///< of the shaper with what follows it
   double block_period_s = 0.005;
   double interpolation_period_s = 0.001;

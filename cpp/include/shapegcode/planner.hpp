@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "shapegcode/path.hpp"
 #include "shapegcode/samples.hpp"
 
@@ -22,5 +25,12 @@ struct TrajectoryLimits {
 /// Throws Error(argument) on limits that are not above zero and finite, a tolerance below zero, a segment without a
 /// feed, or more set-points than can be numbered; Error(numeric) if the limits cannot be kept.
 [[nodiscard]] Samples time_optimal_trajectory(const Path& path, const TrajectoryLimits& limits, double period_s);
+
+/// The same with the segment of the path that each set-point belongs to.
+struct TimeOptimalMotion {
+  Samples set_points;
+  std::vector<std::uint32_t> segments;
+};
+[[nodiscard]] TimeOptimalMotion time_optimal_motion(const Path& path, const TrajectoryLimits& limits, double period_s);
 
 }  // namespace shapegcode

@@ -26,33 +26,25 @@ constexpr double slowest_share = 0.05;
 constexpr std::size_t max_rows_kept = std::size_t{1} << 22U;
 constexpr float none = std::numeric_limits<float>::infinity();
 
-// Speed at which the next round may pass a position that was passed at `speed` with `deviation`. Deviation grows with
-// the square of the speed on curves, and at least with the speed at corners.
-double next_speed(double speed, double deviation, double tolerance, bool curve) noexcept {
-  const double share = aim * tolerance / std::max(deviation, 1e-3 * tolerance);
-  return speed * (curve ? std::sqrt(share) : share);
-}
-
 }  // namespace
 
-FeedSearch::FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
-                       std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s)
+FeedSearch::FeedSearch(std::shared_ptr<const Path> path, const RunLimits& limits, const RunFilter& filter,
+                       const RunPlanner& planner, double tolerance_mm, double least_feed_mm_per_s)
     : path_(std::move(path)),
       limits_(limits),
       filter_(filter),
-      steps_per_half_(steps_per_half),
+      planner_(planner),
       tolerance_(tolerance_mm),
       min_feed_(least_feed_mm_per_s),
       caps_{std::vector<float>(path_->size(), none), std::vector<float>(path_->size(), none)} {}
 
 void FeedSearch::begin_round() {
-  plan_ = {path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, {}, &caps_)), 0.0, {}, {}};
+  plan_ = {path_, planner_.plan(path_, &caps_), 0.0, {}, {}};
   deviation_.at_junction.assign(path_->size(), 0.0F);
   deviation_.on_segment.assign(path_->size(), -1.0F);
   deviation_.near_corner.assign(path_->size(), 0.0F);
   deviation_.largest = 0.0F;
-  shaper_ =
-      std::make_unique<RunShaper>(path_, plan_.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
+  shaper_ = std::make_unique<RunShaper>(path_, plan_.motion, filter_, limits_, &deviation_);
   row_ = 0;
 }
 
@@ -88,24 +80,24 @@ PlannedRun FeedSearch::run() {
     const bool within = last.largest_deviation_mm <= tolerance_;
     if (within && round == 0) return last;  // nothing was slowed, so nothing can be raised
     is_slowed_ = true;
-    if (within && (!best.profile || last.profile->duration_s() < best.profile->duration_s())) {
+    if (within && (!best.motion || last.motion->duration_s() < best.motion->duration_s())) {
       RunRows rows = std::move(last.rows);
       best = last;
       best.rows = std::move(rows);
     }
-    bool changed = adjust(round < raising_rounds);
+    bool changed = adjust(*last.motion, round < raising_rounds);
     if (!stops_.empty()) {
       last.stops = std::move(stops_);
       return last;
     }
-    if (!within && (!changed || round >= raising_rounds) && limits_.law == AccelerationLaw::constant_time) {
+    if (!within && (!changed || round >= raising_rounds) && planner_.rules().law == AccelerationLaw::constant_time) {
       changed = slow_lines() || changed;
     }
     if (!changed || (within && round >= raising_rounds)) {
       break;
     }
   }
-  if (best.profile) {
+  if (best.motion) {
     return best;
   }
   // Corners that do not answer to a lower speed: what bends them is the change of speed around them.
@@ -118,15 +110,27 @@ PlannedRun FeedSearch::run() {
   return last;
 }
 
+// Speed at which the next round may pass a position that was passed at `speed` with `deviation`, of which `own_mm` is
+// not the speed's doing. Deviation grows with the square of the speed on curves, and at least with the speed at
+// corners.
+double FeedSearch::next_speed(double speed, double deviation, bool curve, double own_mm) const noexcept {
+  const double left = tolerance_ - own_mm;
+  const double share = aim * left / std::max(deviation - own_mm, 1e-3 * left);
+  return speed * (curve ? std::sqrt(share) : share);
+}
+
 // New caps; false if none changed.
-bool FeedSearch::adjust(bool raise) {
+bool FeedSearch::adjust(const RunMotion& motion, bool raise) {
   bool changed = false;
+  const MotionLimits& rules = planner_.rules();
+  const SpeedCaps* passed_at = motion.passed();
+  double own_mm = 0.0;
   const auto adjust_one = [&](float& cap, double speed, double deviation, bool curve, double least) {
     const bool capped = cap < none;
     if (deviation <= tolerance_ && !(capped && raise && deviation < enough * tolerance_)) {
       return;
     }
-    double next = next_speed(speed, deviation, tolerance_, curve);
+    double next = next_speed(speed, deviation, curve, own_mm);
     if (deviation <= tolerance_) {
       next = std::min(next, largest_raise * speed);
     } else if (next < least) {
@@ -140,11 +144,14 @@ bool FeedSearch::adjust(bool raise) {
   };
   for (std::size_t i = 0; i < path_->size(); ++i) {
     const Segment segment = (*path_)[i];
-    const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
+    const double limit = segment_speed_limit(segment, rules);
+    double speed = std::min(static_cast<double>(caps_.on_segment[i]), limit);
+    if (passed_at != nullptr) speed = std::min(speed, static_cast<double>(passed_at->on_segment[i]));
+    own_mm = 0.0;
     if (segment.kind == SegmentKind::arc) {
       const float clear = deviation_.on_segment[i];
       adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true,
-                 slowest(segment_speed_limit(segment, limits_)));
+                 slowest(limit));
     }
     if (i == 0) {
       continue;
@@ -154,9 +161,11 @@ bool FeedSearch::adjust(bool raise) {
     if (change < 1e-6) {
       continue;  // an arc that begins or ends tangentially is slowed as a whole
     }
-    const double first = std::min({corner_speed_limit(before, segment, limits_), segment_speed_limit(segment, limits_),
-                                   segment_speed_limit(before, limits_)});
-    const double passed = std::min(first, static_cast<double>(caps_.at_junction[i]));
+    const double first =
+        std::min({corner_speed_limit(before, segment, rules), limit, segment_speed_limit(before, rules)});
+    double passed = std::min(first, static_cast<double>(caps_.at_junction[i]));
+    if (passed_at != nullptr) passed = std::min(passed, static_cast<double>(passed_at->at_junction[i]));
+    own_mm = motion.rounding_mm();
     const bool is_curve = change < corner_change;
     adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], is_curve, is_curve ? slowest(first) : 0.0);
     if (caps_.at_junction[i] < std::max(creep_mm_per_s, creep_share * first)) {
@@ -180,11 +189,11 @@ bool FeedSearch::slow_lines() {
     if (segment.kind == SegmentKind::arc || deviation <= tolerance_) {
       continue;
     }
-    const double first = segment_speed_limit(segment, limits_);
+    const double first = segment_speed_limit(segment, planner_.rules());
     const double speed = std::min(static_cast<double>(caps_.on_segment[i]), first);
     const double least = slowest(first);
     if (speed > least) {
-      caps_.on_segment[i] = static_cast<float>(std::max(least, next_speed(speed, deviation, tolerance_, false)));
+      caps_.on_segment[i] = static_cast<float>(std::max(least, next_speed(speed, deviation, false, 0.0)));
       changed = true;
     }
   }
@@ -195,9 +204,9 @@ RunLimits run_limits(const MotionLimits& limits) {
   return {limits.max_feed_mm_per_s, limits.max_acceleration_mm_per_s2};
 }
 
-PlannedRun plan_within_tolerance(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
-                                 std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s) {
-  return FeedSearch(std::move(path), limits, filter, steps_per_half, tolerance_mm, least_feed_mm_per_s).run();
+PlannedRun plan_within_tolerance(std::shared_ptr<const Path> path, const RunLimits& limits, const RunFilter& filter,
+                                 const RunPlanner& planner, double tolerance_mm, double least_feed_mm_per_s) {
+  return FeedSearch(std::move(path), limits, filter, planner, tolerance_mm, least_feed_mm_per_s).run();
 }
 
 }  // namespace shapegcode

@@ -9,6 +9,7 @@
 #include "command/run_corrector.hpp"
 #include "command/run_deviation.hpp"
 #include "command/run_filter.hpp"
+#include "command/run_motion.hpp"
 #include "command/run_shaper.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/path.hpp"
@@ -27,9 +28,9 @@ struct RunRows {
 /// A run with the speed at which it keeps the contour tolerance.
 struct PlannedRun {
   std::shared_ptr<const Path> path;
-  std::shared_ptr<const SpeedProfile> profile;
+  std::shared_ptr<const RunMotion> motion;
   double largest_deviation_mm = 0.0;  ///< of what follows the path, as far as the plan tells
-  /// Segments before which the run must come to rest, because no speed into them keeps the tolerance. The profile is
+  /// Segments before which the run must come to rest, because no speed into them keeps the tolerance. The motion is
   /// then of no use: plan the pieces between.
   std::vector<std::size_t> stops;
   /// The run itself, shaped while it was measured; empty where it is longer than what is kept.
@@ -40,9 +41,9 @@ struct PlannedRun {
 /// cannot wait until all are measured.
 class FeedSearch {
  public:
-  /// `filter` stays the caller's.
-  FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
-             std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s);
+  /// `filter` and `planner` stay the caller's. `limits`: of the corrections.
+  FeedSearch(std::shared_ptr<const Path> path, const RunLimits& limits, const RunFilter& filter,
+             const RunPlanner& planner, double tolerance_mm, double least_feed_mm_per_s);
 
   /// To be called before the first round: starts from these speeds, one per segment, of the same path.
   void start_from(SpeedCaps caps) noexcept { caps_ = std::move(caps); }
@@ -66,14 +67,15 @@ class FeedSearch {
 
  private:
   PlannedRun measured();
-  bool adjust(bool raise);
+  bool adjust(const RunMotion& motion, bool raise);
+  [[nodiscard]] double next_speed(double speed, double deviation, bool curve, double own_mm) const noexcept;
   [[nodiscard]] double slowest(double speed) const noexcept;
   bool slow_lines();
 
   std::shared_ptr<const Path> path_;
-  MotionLimits limits_;
+  RunLimits limits_;
   const RunFilter& filter_;
-  std::size_t steps_per_half_;
+  const RunPlanner& planner_;
   double tolerance_;
   double min_feed_;
   SpeedCaps caps_;
@@ -90,8 +92,8 @@ class FeedSearch {
 /// only on the arcs and at the corners that leave the tolerance, until all keep it; what was slowed too far is raised
 /// again. `tolerance_mm` is of what the filter's target says shall follow the path. A corner that would have to be
 /// crept through is a stop; nothing else is slowed below `least_feed_mm_per_s`, which a controller may not run.
-[[nodiscard]] PlannedRun plan_within_tolerance(std::shared_ptr<const Path> path, const MotionLimits& limits,
-                                               const RunFilter& filter, std::size_t steps_per_half, double tolerance_mm,
+[[nodiscard]] PlannedRun plan_within_tolerance(std::shared_ptr<const Path> path, const RunLimits& limits,
+                                               const RunFilter& filter, const RunPlanner& planner, double tolerance_mm,
                                                double least_feed_mm_per_s = 0.0);
 
 }  // namespace shapegcode

@@ -1,6 +1,7 @@
 #include "command/run_deviation.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 namespace shapegcode {
@@ -16,6 +17,7 @@ DeviationMeter::DeviationMeter(RunReader& rows, RunDeviation& measured)
   if (filter.target == ContourTarget::response && !filter.following) {
     plant_ = std::make_unique<ModalPlant>(filter.modes, filter.half_period_s);
   }
+  if (rows.motion().rounding_mm() > 0.0) tracker_.emplace(rows.path());
 }
 
 // A row as the emitted blocks pass it: a block is straight, or an arc where the path is one.
@@ -43,6 +45,14 @@ Vector3 DeviationMeter::deviation(std::size_t row) {
   return rows_.left_of_error(row);
 }
 
+// Distance of what the blocks move from the path.
+double DeviationMeter::across_path(std::size_t row) {
+  const Vector3& left_here = left(row);
+  if (tracker_) return std::abs(tracker_->step(rows_.wanted(row) + left_here));
+  const Vector3& tangent = rows_.tangent(row);
+  return (left_here - tangent.dot(left_here) * tangent).norm();
+}
+
 double DeviationMeter::missed_by(const Vector3& corner, std::size_t row) const noexcept {
   double nearest = MotionLimits::none;
   for (std::size_t k = row - std::min(row, 2 * around); k < row; ++k) {
@@ -62,9 +72,7 @@ void DeviationMeter::measure(std::size_t row) {
   shaped_ = row == 0 ? rows_.shaped(here, true) : shaped_next_;
   shaped_next_ = rows_.shaped(here + 1, true);
   left(row) = deviation(row);
-  const Vector3& left_here = left(row);
-  const Vector3& tangent = rows_.tangent(row);
-  double size = (left_here - tangent.dot(left_here) * tangent).norm();
+  double size = across_path(row);
   // At a corner the distance by which the corner itself is missed counts.
   const auto at = static_cast<std::ptrdiff_t>(row);
   const std::uint32_t behind = rows_.segment(at - static_cast<std::ptrdiff_t>(around));

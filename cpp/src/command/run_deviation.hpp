@@ -3,9 +3,11 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "command/run_reader.hpp"
+#include "shapegcode/measure/contour.hpp"
 #include "shapegcode/plant/modal.hpp"
 
 namespace shapegcode {
@@ -31,6 +33,7 @@ class DeviationMeter {
 
  private:
   [[nodiscard]] Vector3 deviation(std::size_t row);
+  [[nodiscard]] double across_path(std::size_t row);
   [[nodiscard]] Vector3 as_block(std::size_t row) const noexcept;
   /// Distance by which the last rows up to `row` miss a corner.
   [[nodiscard]] double missed_by(const Vector3& corner, std::size_t row) const noexcept;
@@ -41,6 +44,8 @@ class DeviationMeter {
   RunDeviation& measured_;
   std::size_t half_;                   // of the shaper, rows
   std::unique_ptr<ModalPlant> plant_;  // of the response; null where modes move
+  // Of a motion that leaves the path by itself: what follows it is measured against the path.
+  std::optional<ContourTracker> tracker_;
   std::array<Vector3, 16> left_{};     // deviations of the last rows
   Vector3 shaped_before_ = Vector3::Zero();
   Vector3 shaped_ = Vector3::Zero();

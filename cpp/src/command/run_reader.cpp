@@ -14,22 +14,21 @@ double smooth_step(double x) noexcept { return x * x * (3.0 - 2.0 * x); }
 
 }  // namespace
 
-RunReader::RunReader(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
-                     const RunFilter& filter, std::size_t steps_per_half, bool keeps_places)
+RunReader::RunReader(std::shared_ptr<const Path> path, std::shared_ptr<const RunMotion> motion, const RunFilter& filter,
+                     bool keeps_places)
     : path_(std::move(path)),
+      motion_(std::move(motion)),
       corners_(*path_),
       filter_(filter),
-      steps_per_half_(steps_per_half),
       keeps_places_(keeps_places),
-      ahead_(path_, profile, filter.half_period_s / static_cast<double>(steps_per_half)) {
-  const std::size_t steps_per_period = 2 * steps_per_half_;
-  const std::size_t periods_in = (ahead_.sample_count() - 1 + steps_per_period - 1) / steps_per_period;
+      ahead_(motion_->read(filter.half_period_s, 0.0)) {
+  const std::size_t periods_in = motion_->block_periods(filter.half_period_s);
   rows_in_ = 2 * periods_in + 1;
   const auto shaper_rows = static_cast<std::size_t>(filter_.shaper_rows());
   periods_ = static_cast<std::uint32_t>(periods_in + shaper_rows / 2);
   reach_ = shaper_rows;
   if (filter_.target != ContourTarget::none) {
-    target_ = std::make_unique<Interpolator>(path_, std::move(profile), ahead_.period_s(), filter_.mean_delay_s);
+    target_ = motion_->read(filter.half_period_s, filter_.mean_delay_s);
     for (const auto& at_node : filter_.kernels) {
       for (const auto& moved : at_node) {
         for (const std::vector<double>& kernel : moved)
@@ -50,7 +49,7 @@ void RunReader::read_row() {
 
 void RunReader::read_command() {
   Vector3 position;
-  ahead_.step(position, read_ == 0 ? 1 : steps_per_half_);
+  ahead_->next(position);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     if (read_ == 0) {
       command_[axis].assign(static_cast<std::size_t>(history_), position[static_cast<Eigen::Index>(axis)]);
@@ -60,7 +59,7 @@ void RunReader::read_command() {
     command_[axis].push_back(position[static_cast<Eigen::Index>(axis)]);
     correction_[axis].push_back(0.0);
   }
-  const Segment& on = ahead_.on();
+  const Segment& on = ahead_->on();
   if (read_ == 0) feed_.assign(static_cast<std::size_t>(history_), on.feed_mm_per_s);
   feed_.push_back(on.feed_mm_per_s);
   if (filter_.following) {
@@ -76,7 +75,7 @@ void RunReader::read_command() {
 }
 
 void RunReader::read_error() {
-  const std::size_t segment = ahead_.segment();
+  const std::size_t segment = ahead_->segment();
   // Near a corner the place along the path matters too: it is where both legs meet.
   const double delay_rows = std::max(1.0, filter_.mean_delay_s / filter_.half_period_s);
   if (corners_.passed(segment_before_, segment)) {
@@ -88,9 +87,9 @@ void RunReader::read_error() {
   since_corner_ += 1.0;
 
   Vector3 wanted;
-  target_->step(wanted, read_ == 1 ? 1 : steps_per_half_);
+  target_->next(wanted);
   const std::size_t at = target_->segment();
-  const Vector3 tangent = tangent_at(target_->on(), target_->distance_mm() - path_->distance_mm(at));
+  const Vector3 tangent = target_->tangent();
   Vector3 error;
   const std::size_t row = index(read_ - 1);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {

@@ -9,7 +9,7 @@
 
 #include "command/junctions.hpp"
 #include "command/run_filter.hpp"
-#include "shapegcode/motion.hpp"
+#include "command/run_motion.hpp"
 #include "shapegcode/path.hpp"
 
 namespace shapegcode {
@@ -22,12 +22,12 @@ namespace shapegcode {
 /// The deviation is the one across the path; along it only near corners, where time cannot be given away.
 class RunReader {
  public:
-  /// `step_s`, the sampling step of the path, is half a block period over `steps_per_half`. `keeps_places`: tangents,
-  /// target positions and segments are kept, too.
-  RunReader(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile, const RunFilter& filter,
-            std::size_t steps_per_half, bool keeps_places);
+  /// `motion`: along the path. `keeps_places`: tangents, target positions and segments are kept, too.
+  RunReader(std::shared_ptr<const Path> path, std::shared_ptr<const RunMotion> motion, const RunFilter& filter,
+            bool keeps_places);
 
   [[nodiscard]] const Path& path() const noexcept { return *path_; }
+  [[nodiscard]] const RunMotion& motion() const noexcept { return *motion_; }
   [[nodiscard]] const Corners& corners() const noexcept { return corners_; }
   [[nodiscard]] const RunFilter& filter() const noexcept { return filter_; }
   /// Whole block periods of the shaped run.
@@ -97,12 +97,12 @@ class RunReader {
   }
 
   std::shared_ptr<const Path> path_;
+  std::shared_ptr<const RunMotion> motion_;
   Corners corners_;
   const RunFilter& filter_;
-  std::size_t steps_per_half_;
   bool keeps_places_;
-  Interpolator ahead_;                    // the command before shaping
-  std::unique_ptr<Interpolator> target_;  // where the path should be: later by the shaper's mean delay
+  std::unique_ptr<RunRowsReader> ahead_;   // the command before shaping
+  std::unique_ptr<RunRowsReader> target_;  // where the path should be: later by the shaper's mean delay
   std::size_t reach_ = 0;
   std::size_t rows_in_ = 0;
   std::uint32_t periods_ = 0;

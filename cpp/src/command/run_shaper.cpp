@@ -4,10 +4,9 @@
 
 namespace shapegcode {
 
-RunShaper::RunShaper(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
-                     const RunFilter& filter, const RunLimits& limits, std::size_t steps_per_half,
-                     RunDeviation* measured)
-    : rows_(std::move(path), std::move(profile), filter, steps_per_half, measured != nullptr) {
+RunShaper::RunShaper(std::shared_ptr<const Path> path, std::shared_ptr<const RunMotion> motion, const RunFilter& filter,
+                     const RunLimits& limits, RunDeviation* measured)
+    : rows_(std::move(path), std::move(motion), filter, measured != nullptr) {
   if (filter.target != ContourTarget::none) {
     corrector_.emplace(rows_, limits);
   }

@@ -18,8 +18,8 @@ namespace shapegcode {
 class RunShaper {
  public:
   /// `filter` stays the caller's. `measured`: filled while the run is given out if not null; asks for a target.
-  RunShaper(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile, const RunFilter& filter,
-            const RunLimits& limits, std::size_t steps_per_half, RunDeviation* measured = nullptr);
+  RunShaper(std::shared_ptr<const Path> path, std::shared_ptr<const RunMotion> motion, const RunFilter& filter,
+            const RunLimits& limits, RunDeviation* measured = nullptr);
   // The corrector and the meter look into the rows beside them.
   RunShaper(const RunShaper&) = delete;
   RunShaper& operator=(const RunShaper&) = delete;

@@ -1,7 +1,5 @@
 #include "shapegcode/command.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,7 +8,6 @@
 
 #include "command/feed_search.hpp"
 #include "command/run_shaper.hpp"
-#include "shapegcode/error.hpp"
 #include "shapegcode/motion.hpp"
 
 namespace shapegcode {
@@ -58,10 +55,9 @@ class ShapedRun {
     plan_ = search.plan();
   }
   // `filter` stays the caller's.
-  ShapedRun(PlannedRun plan, const RunFilter& filter, const RunLimits& limits, std::size_t steps_per_half)
-      : plan_(std::move(plan)) {
+  ShapedRun(PlannedRun plan, const RunFilter& filter, const RunLimits& limits) : plan_(std::move(plan)) {
     if (plan_.rows.positions.size() == 0) {
-      own_ = std::make_unique<RunShaper>(plan_.path, plan_.profile, filter, limits, steps_per_half);
+      own_ = std::make_unique<RunShaper>(plan_.path, plan_.motion, filter, limits);
     }
   }
 
@@ -121,9 +117,9 @@ struct RegionShaper::State {
   std::shared_ptr<const Path> path_;
   ShapingOptions options_;
   RunFilter filter_;
+  std::unique_ptr<const RunPlanner> planner_;
   std::vector<std::uint32_t> marks_;
   std::vector<SegmentRange> ranges_;  // still to be run, the next one last
-  std::size_t steps_per_half_ = 1;
   std::uint32_t rest_periods_ = 0;
 
   SegmentRange now_{0, 0};
@@ -151,27 +147,19 @@ RegionShaper::State::State(std::shared_ptr<const Path> path, const Fir& shaper,
               {options_.following, options_.mode_tables}),
       marks_(marked_segments.begin(), marked_segments.end()) {
   filter_.feed_excess_ratio = options_.feed_excess_ratio;
+  // A shaper delays by half its length, or so: what it mixes lies that far to both sides.
+  const double last_tap_s = filter_.shaper_rows() * filter_.half_period_s;
+  const double spread_s =
+      std::max(filter_.mean_delay_s, last_tap_s - filter_.mean_delay_s) + 0.5 * options_.rest_at_stop_s;
   if (std::isfinite(options_.feed_excess_ratio)) {
-    // A shaper delays by half its length, or so: what it mixes lies that far to both sides.
-    const double last_tap_s = filter_.shaper_rows() * filter_.half_period_s;
     options_.limits.feed_excess_ratio = options_.feed_excess_ratio;
-    options_.limits.feed_spread_s =
-        std::max(filter_.mean_delay_s, last_tap_s - filter_.mean_delay_s) + 0.5 * options_.rest_at_stop_s;
+    options_.limits.feed_spread_s = spread_s;
   }
-  const double ticks = options_.block_period_s / options_.interpolation_period_s;
-  if (!(ticks >= 1.0 - 1e-9) || !(std::abs(ticks - std::round(ticks)) <= 1e-6)) {
-    throw Error(ErrorKind::argument,
-                fmt::format("block period {} s is not a whole multiple of the interpolation period {} s",
-                            options_.block_period_s, options_.interpolation_period_s));
-  }
-  // The middle of an odd number of ticks lies between two of them.
-  const auto whole = static_cast<std::size_t>(std::lround(ticks));
-  steps_per_half_ = whole % 2 == 0 ? whole / 2 : whole;
+  planner_ = std::make_unique<const RunPlanner>(options_, spread_s);
   rest_periods_ = static_cast<std::uint32_t>(std::ceil(options_.rest_at_stop_s / options_.block_period_s - 1e-9));
-  // With a target the search for the highest feed keeps the tolerance.
-  const FilterTolerance filter = options_.target == ContourTarget::none ? options_.tolerance : FilterTolerance{};
-  std::vector<std::size_t> borders = forced_stops(path_->segments(), options_.plunge_axis_angle_rad,
-                                                  options_.plunge_corner_angle_rad, options_.limits, filter);
+  std::vector<std::size_t> borders =
+      forced_stops(path_->segments(), options_.plunge_axis_angle_rad, options_.plunge_corner_angle_rad,
+                   planner_->rules(), planner_->left_to_filter());
   const std::size_t forced = borders.size();
   for (const std::uint32_t segment : options_.further_stops) {
     if (segment > 0 && segment < path_->size()) borders.push_back(segment);
@@ -204,7 +192,7 @@ bool RegionShaper::State::begin_run() {
   }
   PlannedRun plan = plan_run();
   largest_deviation_mm_ = std::max(largest_deviation_mm_, plan.largest_deviation_mm);
-  run_ = std::make_unique<ShapedRun>(std::move(plan), filter_, run_limits(options_.limits), steps_per_half_);
+  run_ = std::make_unique<ShapedRun>(std::move(plan), filter_, run_limits(options_.limits));
   given_ = 0;
   run_->next(at_);
   note_marks(run_->plan());
@@ -212,7 +200,7 @@ bool RegionShaper::State::begin_run() {
 }
 
 std::unique_ptr<FeedSearch> RegionShaper::State::search_of(const std::shared_ptr<const Path>& part) const {
-  return std::make_unique<FeedSearch>(part, options_.limits, filter_, steps_per_half_,
+  return std::make_unique<FeedSearch>(part, run_limits(options_.limits), filter_, *planner_,
                                       options_.tolerance.contour_tolerance_mm, options_.least_feed_mm_per_s);
 }
 
@@ -224,11 +212,7 @@ PlannedRun RegionShaper::State::plan_run() {
     const auto part = sub_path(path_, now_.first, now_.last);
     if (options_.target == ContourTarget::none) {
       is_slowed_ = true;  // nobody asks by how much
-      return {part,
-              std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits, options_.tolerance)),
-              0.0,
-              {},
-              {}};
+      return {part, planner_->plan(part), 0.0, {}, {}};
     }
     const std::unique_ptr<FeedSearch> search = search_ ? std::move(search_) : search_of(part);
     if (start_caps_ != nullptr) {
@@ -259,7 +243,7 @@ PlannedTolerance RegionShaper::State::plan_only(SpeedCaps& caps) {
   while (!ranges_.empty()) {
     const PlannedRun plan = plan_run();
     planned.deviation_mm = std::max(planned.deviation_mm, plan.largest_deviation_mm);
-    periods += RunShaper(plan.path, plan.profile, filter_, run_limits(options_.limits), steps_per_half_).periods();
+    periods += RunShaper(plan.path, plan.motion, filter_, run_limits(options_.limits)).periods();
     if (!ranges_.empty()) periods += rest_periods_;
   }
   planned.duration_s = static_cast<double>(periods) * options_.block_period_s;
@@ -276,11 +260,10 @@ void RegionShaper::State::restart() {
 }
 
 void RegionShaper::State::note_marks(const PlannedRun& run) {
-  const double delay_s = 0.5 * run.profile->jerk_time_s() + filter_.mean_delay_s;
   std::size_t cursor = 0;
   while (segment_periods_.size() < marks_.size() && marks_[segment_periods_.size()] < now_.last) {
     const std::size_t local = marks_[segment_periods_.size()] - now_.first;
-    const double time = local == 0 ? 0.0 : run.profile->time_s(run.path->distance_mm(local), cursor) + delay_s;
+    const double time = local == 0 ? 0.0 : run.motion->entered_s(local, cursor) + filter_.mean_delay_s;
     const auto period = static_cast<std::uint32_t>(std::lround(time / options_.block_period_s));
     segment_periods_.push_back(period_ + std::min(period, run_->periods()));
   }

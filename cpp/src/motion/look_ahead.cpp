@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/refuse.hpp"
+#include "motion/feed_sections.hpp"
 #include "motion/phase_maker.hpp"
 #include "motion/pieces.hpp"
 #include "motion/planned_motion.hpp"
@@ -21,7 +22,8 @@ struct PathSpeeds {
   std::vector<Jump> jump;       // the same
   std::vector<double> fastest;  // of each segment, ever; these are empty if nobody looks at jumps
   std::vector<double> passed;   // [i]: highest speed at which segment i is ever entered
-  double jerk_s = 0.0;
+  double jerk_s = 0.0;          // which mixes the motion before and behind a place
+  bool mixes_segments = true;   // and not at corners alone
 };
 
 PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
@@ -86,8 +88,9 @@ class Zones {
         jump = zone_of_jump(speeds.jump[junction], speeds.passed[junction], steepest_of(limits),
                             jump_time_s(limits, speeds.jerk_s));
       }
-      extend(carry, junction_zones({speeds.on_segment[from], path.feed_mm_per_s(from) * limits.feed_override,
-                                    speeds.on_segment[into], speeds.corner[junction], jump},
+      const double slow = speeds.mixes_segments ? speeds.on_segment[from] : MotionLimits::none;
+      extend(carry, junction_zones({slow, path.feed_mm_per_s(from) * limits.feed_override, speeds.on_segment[into],
+                                    speeds.corner[junction], jump},
                                    limits, speeds.jerk_s));
       if (looks) {
         cut_to(carry, speeds.fastest[into], jump_time_s(limits, speeds.jerk_s));
@@ -187,15 +190,92 @@ std::vector<Piece> planned_pieces(const Path& path, const MotionLimits& limits, 
   return pieces;
 }
 
-}  // namespace
-
-SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
-                        const SpeedCaps* caps) {
+void check_plan(const Path& path, const MotionLimits& limits, const FilterTolerance& filter, const SpeedCaps* caps) {
   check_limits(limits, filter);
   const std::size_t n = path.size();
   if (caps != nullptr && (caps->on_segment.size() != n || caps->at_junction.size() != n)) {
     detail::refuse("speed caps of a path of {} segments: one per segment", n);
   }
+}
+
+// Sections of one speed are one; one that is shorter than this goes with its neighbour, at the lower speed.
+constexpr double shortest_section_mm = 1e-3;
+
+std::size_t joined(std::array<Section, max_pieces>& sections, std::size_t count) noexcept {
+  std::size_t last = 0;
+  for (std::size_t k = 1; k < count; ++k) {
+    Section& before = sections[last];
+    const bool is_short = std::min(before.length, sections[k].length) < shortest_section_mm;
+    if (is_short || before.limit == sections[k].limit) {
+      before = {before.length + sections[k].length, std::min(before.limit, sections[k].limit), false};
+    } else {
+      sections[++last] = sections[k];
+    }
+  }
+  return last + 1;
+}
+
+}  // namespace
+
+Segment section_of(const Segment& segment, double begin_mm, double end_mm) noexcept {
+  if (begin_mm <= 0.0 && end_mm >= segment.length_mm) return segment;
+  Segment section = segment;
+  section.start_mm = point_at(segment, begin_mm);
+  section.end_mm = point_at(segment, end_mm);
+  section.length_mm = end_mm - begin_mm;
+  section.stop_at_end = segment.stop_at_end && end_mm >= segment.length_mm;
+  if (segment.kind == SegmentKind::arc) {
+    const double first = begin_mm / segment.length_mm;
+    const double last = end_mm / segment.length_mm;
+    const double widens = segment.end_radius_mm - segment.start_radius_mm;
+    section.start_radius_mm = segment.start_radius_mm + widens * first;
+    section.end_radius_mm = segment.start_radius_mm + widens * last;
+    section.start_angle_rad = segment.start_angle_rad + segment.sweep_rad * first;
+    section.sweep_rad = segment.sweep_rad * (last - first);
+  }
+  return section;
+}
+
+FeedSections feed_sections(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
+                           const SpeedCaps* caps, double corner_spread_s) {
+  check_plan(path, limits, filter, caps);
+  MotionLimits unaccelerated = limits;
+  unaccelerated.law = AccelerationLaw::jerk_limited;
+  unaccelerated.jerk_time_s = corner_spread_s;
+  unaccelerated.max_acceleration_mm_per_s2.setConstant(MotionLimits::none);
+  unaccelerated.max_jerk_mm_per_s3.setConstant(MotionLimits::none);
+  PathSpeeds speeds = path_speeds(path, unaccelerated, filter, caps);
+  speeds.mixes_segments = false;
+  const Zones zones(path, unaccelerated, speeds);
+  FeedSections found;
+  PathBuilder builder;
+  std::array<Section, max_pieces> sections;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const Segment segment = path[i];
+    std::size_t count = 1;
+    sections[0] = {segment.length_mm, speeds.on_segment[i], false};
+    if (!zones.empty() && segment.length_mm > 0.0) {
+      count = zones.split(i, segment, speeds.on_segment[i], MotionLimits::none, sections);
+      count = joined(sections, count);
+    }
+    double begin = 0.0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double end = k + 1 == count ? segment.length_mm : begin + sections[k].length;
+      Segment section = section_of(segment, begin, end);
+      section.feed_mm_per_s = sections[k].limit;
+      builder.add(section);
+      found.segments.push_back(static_cast<std::uint32_t>(i));
+      begin = end;
+    }
+  }
+  found.path = builder.path();
+  return found;
+}
+
+SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
+                        const SpeedCaps* caps) {
+  check_plan(path, limits, filter, caps);
+  const std::size_t n = path.size();
   if (n == 0 || path.length_mm() <= 0.0) {
     return SpeedProfile({}, path.length_mm(), 0.0);
   }

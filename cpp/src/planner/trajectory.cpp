@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "base/checks.hpp"
@@ -38,10 +40,14 @@ double size_of(const Vector3& jump) noexcept {
   return size > no_jump ? size : 0.0;
 }
 
-std::vector<PlannedSegment> planned_segments(const Path& path, double tolerance_mm) {
+// `numbers`: of each of them on the path.
+std::vector<PlannedSegment> planned_segments(const Path& path, double tolerance_mm,
+                                             std::vector<std::uint32_t>& numbers) {
   std::vector<PlannedSegment> segments;
   segments.reserve(path.size());
+  std::uint32_t number = 0;
   for (const Segment& segment : path.segments()) {
+    const std::uint32_t here = number++;
     if (!(segment.feed_mm_per_s > 0.0) || !std::isfinite(segment.feed_mm_per_s)) {
       throw Error(ErrorKind::argument, "segment without a feed greater than zero", segment.line);
     }
@@ -65,6 +71,7 @@ std::vector<PlannedSegment> planned_segments(const Path& path, double tolerance_
       if (bent > 0.0) planned.bend_share = bend_deviation * bent / tolerance_mm;
     }
     segments.push_back(planned);
+    numbers.push_back(here);
   }
   return segments;
 }
@@ -172,14 +179,16 @@ void check(const TrajectoryLimits& limits, double period_s) {
 
 }  // namespace
 
-Samples time_optimal_trajectory(const Path& path, const TrajectoryLimits& limits, double period_s) {
+TimeOptimalMotion time_optimal_motion(const Path& path, const TrajectoryLimits& limits, double period_s) {
   check(limits, period_s);
-  std::vector<PlannedSegment> segments = planned_segments(path, limits.contour_tolerance_mm);
-  Samples samples;
+  std::vector<std::uint32_t> numbers;
+  std::vector<PlannedSegment> segments = planned_segments(path, limits.contour_tolerance_mm, numbers);
+  TimeOptimalMotion motion;
+  Samples& samples = motion.set_points;
   samples.period_s = period_s;
   if (segments.empty()) {
     samples.positions_mm.resize(0, axis_count);
-    return samples;
+    return motion;
   }
   double feed_share = 1.0;
   for (int n = 0; n < most_plans; ++n) {
@@ -196,10 +205,15 @@ Samples time_optimal_trajectory(const Path& path, const TrajectoryLimits& limits
     samples.positions_mm.resize(std::ssize(found.points), axis_count);
     for (std::size_t k = 0; k < found.points.size(); ++k) {
       samples.positions_mm.row(static_cast<Eigen::Index>(k)) = found.points[k];
+      motion.segments.push_back(numbers[found.segments[k]]);
     }
-    return samples;
+    return motion;
   }
   throw Error(ErrorKind::numeric, "no motion within the limits was found");
+}
+
+Samples time_optimal_trajectory(const Path& path, const TrajectoryLimits& limits, double period_s) {
+  return std::move(time_optimal_motion(path, limits, period_s).set_points);
 }
 
 }  // namespace shapegcode

@@ -40,6 +40,7 @@ MACHINE_KEYS = {
     "--contour": "shaping.contour",
     "--shaper": "shaping.family",
     "--per-axis": "shaping.per_axis",
+    "--planner": "shaping.planner",
     "--part-mass": "shaping.part_mass_kg",
     "--shape-rapids": "shaping.rapids",
     "--max-time-increase": "price.program_time_percent",

@@ -41,6 +41,7 @@ def convert(
     contour_tolerance_um: float | None = None,
     shaper: str | None = None,
     per_axis: bool | None = None,
+    planner: str | None = None,
     rapids: bool | None = None,
     budget: Budget | None = None,
     arc_feed_ratio: float | None = None,
@@ -64,6 +65,7 @@ def convert(
         contour_tolerance_um: largest deviation of it from the path, µm: `tolerance.contour_um`.
         shaper: family of the shaper, such as "zvd": `shaping.family`.
         per_axis: a shaper for each axis: `shaping.per_axis`.
+        planner: what plans a cut before it is shaped, "look-ahead" or "optimal": `shaping.planner`.
         rapids: rapids become shaped moves where that saves time: `shaping.rapids`.
         budget: what the emitted text may need; None: no limit.
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc: `shaping.arc_feed_ratio`.
@@ -94,6 +96,7 @@ def convert(
         "tolerance.contour_um": contour_tolerance_um,
         "shaping.family": shaper,
         "shaping.per_axis": per_axis,
+        "shaping.planner": planner,
         "shaping.rapids": rapids,
         "shaping.arc_feed_ratio": arc_feed_ratio,
         "price.program_time_percent": max_time_increase_percent,

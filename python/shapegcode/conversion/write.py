@@ -124,6 +124,10 @@ _CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, 
 
 _FADED = 1.0 / 3.0  # of the time after which a vibration is a millionth: it is a hundredth
 
+_PLANNERS = {
+    "look-ahead": _core.CommandPlanner.look_ahead,
+    "optimal": _core.CommandPlanner.time_optimal,
+}
 _TARGETS = {
     "response": _core.ContourTarget.response,
     "command": _core.ContourTarget.command,
@@ -224,6 +228,7 @@ class RegionWriter:
         options = _core.ShapingOptions()
         options.limits = limits
         options.tolerance = tolerance
+        options.planner = _PLANNERS[self._machine.shaping.planner]
         options.block_period_s = grid.block_period_s
         options.interpolation_period_s = self._model.period_s
         options.plunge_axis_angle_rad = self._machine.shaping.plunge_angle_deg * _DEGREE
