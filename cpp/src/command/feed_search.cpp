@@ -150,8 +150,7 @@ bool FeedSearch::adjust(const RunMotion& motion, bool raise) {
     own_mm = 0.0;
     if (segment.kind == SegmentKind::arc) {
       const float clear = deviation_.on_segment[i];
-      adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true,
-                 slowest(limit));
+      adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true, slowest(limit));
     }
     if (i == 0) {
       continue;

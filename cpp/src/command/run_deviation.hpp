@@ -46,7 +46,7 @@ class DeviationMeter {
   std::unique_ptr<ModalPlant> plant_;  // of the response; null where modes move
   // Of a motion that leaves the path by itself: what follows it is measured against the path.
   std::optional<ContourTracker> tracker_;
-  std::array<Vector3, 16> left_{};     // deviations of the last rows
+  std::array<Vector3, 16> left_{};  // deviations of the last rows
   Vector3 shaped_before_ = Vector3::Zero();
   Vector3 shaped_ = Vector3::Zero();
   Vector3 shaped_next_ = Vector3::Zero();

@@ -15,8 +15,10 @@
 namespace shapegcode {
 namespace {
 
-// Of the contour tolerance: what rounding corners takes, the rest is for what the shaper does.
-constexpr double rounding_share = 0.5;
+// Of the contour tolerance: what rounding corners takes, the rest is for what the shaper does. That is little where the
+// contour is brought back behind it, and most of it where it is not.
+constexpr double rounding_share = 0.75;
+constexpr double rounding_share_uncompensated = 0.25;
 // Without a tolerance corners are rounded as for this one.
 constexpr double largest_rounding_mm = 0.05;
 // The feed is reached from rest, with full jerk up and down, in twice as many periods at least: in fewer a motion of
@@ -24,7 +26,8 @@ constexpr double largest_rounding_mm = 0.05;
 constexpr double periods_to_feed = 6.0;
 // Set-points that are planned for one row, at most.
 constexpr std::size_t finest = 16;
-// The planner finds no motion for a path in a hundred made to break it: then it tries half the period, so often.
+// The planner finds no motion for a path in a hundred made to break it: then half the period is tried, so often, and
+// after that the ramps of the look-ahead.
 constexpr int halvings = 2;
 
 class ProfileReader : public RunRowsReader {
@@ -192,6 +195,18 @@ PlannedRows rows_of(const TimeOptimalMotion& motion, const FeedSections& section
   return rows;
 }
 
+// Set-points to be planned for one row, so that the slowest section is long enough under way to its feed. Where that
+// would be too many, less jerk is planned.
+std::size_t finer_steps(const Path& sections, double half_period_s, Vector3& max_jerk_mm_per_s3) {
+  double slowest = MotionLimits::none;
+  for (const Segment& section : sections.segments()) slowest = std::min(slowest, section.feed_mm_per_s);
+  const double wanted_s = std::sqrt(slowest / max_jerk_mm_per_s3.maxCoeff()) / periods_to_feed;
+  const double steps = std::clamp(std::ceil(half_period_s / wanted_s), 1.0, static_cast<double>(finest));
+  const double time_s = periods_to_feed * half_period_s / steps;
+  max_jerk_mm_per_s3 = max_jerk_mm_per_s3.cwiseMin(slowest / (time_s * time_s));
+  return static_cast<std::size_t>(steps);
+}
+
 void require_axis_limits(const MotionLimits& limits) {
   for (int i = 0; i < axis_count; ++i) {
     if (std::isfinite(limits.max_feed_mm_per_s[i]) && std::isfinite(limits.max_acceleration_mm_per_s2[i]) &&
@@ -246,7 +261,8 @@ RunPlanner::RunPlanner(const ShapingOptions& options, double spread_s)
   if (kind_ == CommandPlanner::time_optimal) {
     require_axis_limits(limits_);
     rules_ = without_corner_rules(limits_);
-    rounding_mm_ = rounding_share * std::min(tolerance_.contour_tolerance_mm, largest_rounding_mm);
+    const double share = target_ == ContourTarget::none ? rounding_share_uncompensated : rounding_share;
+    rounding_mm_ = share * std::min(tolerance_.contour_tolerance_mm, largest_rounding_mm);
   }
 }
 
@@ -273,22 +289,17 @@ std::shared_ptr<const RunMotion> RunPlanner::time_optimal(const std::shared_ptr<
   const FeedSections sections = feed_sections(*path, rules_, left_to_filter(), caps, 2.0 * spread_s_);
   TrajectoryLimits limits{limits_.max_feed_mm_per_s, limits_.max_acceleration_mm_per_s2, limits_.max_jerk_mm_per_s3,
                           rounding_mm_};
-  double slowest = MotionLimits::none;
-  for (const Segment& segment : path->segments()) slowest = std::min(slowest, segment_speed_limit(segment, rules_));
-  const double period_s = std::sqrt(slowest / limits.max_jerk_mm_per_s3.maxCoeff()) / periods_to_feed;
-  const double finer = std::clamp(std::ceil(half_period_s_ / period_s), 1.0, static_cast<double>(finest));
-  const double feed_time_s = periods_to_feed * half_period_s_ / finer;
-  limits.max_jerk_mm_per_s3 = limits.max_jerk_mm_per_s3.cwiseMin(slowest / (feed_time_s * feed_time_s));
-  std::size_t every = static_cast<std::size_t>(finer);
+  std::size_t every = finer_steps(sections.path, half_period_s_, limits.max_jerk_mm_per_s3);
   for (int n = 0;; ++n, every *= 2) {
     try {
       const double step_s = half_period_s_ / static_cast<double>(every);
       PlannedRows rows = rows_of(time_optimal_motion(sections.path, limits, step_s), sections, every);
       rows.path = path;
-      return std::make_shared<const PlannedMotion>(std::make_shared<const PlannedRows>(std::move(rows)),
-                                                   half_period_s_, rounding_mm_);
+      return std::make_shared<const PlannedMotion>(std::make_shared<const PlannedRows>(std::move(rows)), half_period_s_,
+                                                   rounding_mm_);
     } catch (const Error& error) {
-      if (error.kind() != ErrorKind::numeric || n == halvings) throw;
+      if (error.kind() != ErrorKind::numeric) throw;
+      if (n == halvings) return along_path(path, caps);
     }
   }
 }

@@ -22,8 +22,8 @@ struct PathSpeeds {
   std::vector<Jump> jump;       // the same
   std::vector<double> fastest;  // of each segment, ever; these are empty if nobody looks at jumps
   std::vector<double> passed;   // [i]: highest speed at which segment i is ever entered
-  double jerk_s = 0.0;          // which mixes the motion before and behind a place
-  bool mixes_segments = true;   // and not at corners alone
+  double jerk_s = 0.0;
+  double corner_spread_s = 0.0;  // time around a corner in which its speed holds, beside that
 };
 
 PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
@@ -76,7 +76,7 @@ PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const Filte
 class Zones {
  public:
   Zones(const Path& path, const MotionLimits& limits, const PathSpeeds& speeds) {
-    if (speeds.jerk_s <= 0.0 && limits.feed_spread_s <= 0.0 && speeds.jump.empty()) {
+    if (speeds.jerk_s + speeds.corner_spread_s <= 0.0 && limits.feed_spread_s <= 0.0 && speeds.jump.empty()) {
       return;
     }
     const std::size_t n = path.size();
@@ -88,10 +88,13 @@ class Zones {
         jump = zone_of_jump(speeds.jump[junction], speeds.passed[junction], steepest_of(limits),
                             jump_time_s(limits, speeds.jerk_s));
       }
-      const double slow = speeds.mixes_segments ? speeds.on_segment[from] : MotionLimits::none;
-      extend(carry, junction_zones({slow, path.feed_mm_per_s(from) * limits.feed_override, speeds.on_segment[into],
-                                    speeds.corner[junction], jump},
+      const double corner = speeds.corner[junction];
+      extend(carry, junction_zones({speeds.on_segment[from], path.feed_mm_per_s(from) * limits.feed_override,
+                                    speeds.on_segment[into], corner, jump},
                                    limits, speeds.jerk_s));
+      if (speeds.corner_spread_s > 0.0 && corner < speeds.on_segment[into]) {
+        extend(carry[corner_zone], {corner, slow_reach(corner, speeds.corner_spread_s)});
+      }
       if (looks) {
         cut_to(carry, speeds.fastest[into], jump_time_s(limits, speeds.jerk_s));
       }
@@ -241,11 +244,16 @@ FeedSections feed_sections(const Path& path, const MotionLimits& limits, const F
   check_plan(path, limits, filter, caps);
   MotionLimits unaccelerated = limits;
   unaccelerated.law = AccelerationLaw::jerk_limited;
-  unaccelerated.jerk_time_s = corner_spread_s;
+  unaccelerated.jerk_time_s = 0.0;
   unaccelerated.max_acceleration_mm_per_s2.setConstant(MotionLimits::none);
   unaccelerated.max_jerk_mm_per_s3.setConstant(MotionLimits::none);
   PathSpeeds speeds = path_speeds(path, unaccelerated, filter, caps);
-  speeds.mixes_segments = false;
+  speeds.corner_spread_s = corner_spread_s;
+  // The turn of a polyline is that of its lines, as an arc's.
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const double turning = corner_speed_limit(path[i - 1], path[i], unaccelerated);
+    for (double* speed : {&speeds.on_segment[i - 1], &speeds.on_segment[i]}) *speed = std::min(*speed, turning);
+  }
   const Zones zones(path, unaccelerated, speeds);
   FeedSections found;
   PathBuilder builder;

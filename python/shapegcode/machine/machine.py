@@ -130,6 +130,18 @@ class Machine(TomlTable):
             )
         return self
 
+    @model_validator(mode="after")
+    def _planner_knows_the_jerk(self) -> Machine:
+        if self.shaping.planner == "optimal":
+            missing = [f"axes.{a}.max_jerk_mm_s3" for a in "xyz" if getattr(self.axes, a).max_jerk_mm_s3 is None]
+            if missing:
+                raise KeyProblem(
+                    "shaping.planner",
+                    "optimal",
+                    f'needs {", ".join(missing)}: state the largest jerk of each axis, or use "look-ahead"',
+                )
+        return self
+
     _remarks: dict[str, str] = PrivateAttr(default_factory=dict)
     _origins_in_comments: bool = PrivateAttr(default=False)
 

@@ -174,7 +174,8 @@ class _RapidShaper:
 def _without_contour(model: MachineModel) -> MachineModel:
     """The same machine for moves in the air: their contour is neither corrected nor judged."""
     machine = model.machine
-    shaping = machine.shaping.model_copy(update={"contour": "off"})
+    # A straight move has no corner to round: the look-ahead's ramps serve.
+    shaping = machine.shaping.model_copy(update={"contour": "off", "planner": "look-ahead"})
     tolerance = machine.tolerance.model_copy(update={"contour_um": math.inf, "feed_excess_ratio": math.inf})
     return MachineModel(machine.model_copy(update={"shaping": shaping, "tolerance": tolerance}))
 
