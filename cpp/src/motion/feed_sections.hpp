@@ -14,9 +14,9 @@ struct FeedSections {
   std::vector<std::uint32_t> segments;  ///< of the path that was cut, for each of them
 };
 
-/// `limits` as `plan_speed` looks at them, but for acceleration and jerk. The speed of a corner, of `filter` and `caps`,
-/// holds for `corner_spread_s` around it; a lower programmed feed holds as long before and behind its segment as
-/// `limits` say. Throws Error(argument) as plan_speed does.
+/// `limits` as `plan_speed` looks at them, but for acceleration and jerk. The speed of a corner, of `filter` and
+/// `caps`, holds for `corner_spread_s` around it; a lower programmed feed holds as long before and behind its segment
+/// as `limits` say. Throws Error(argument) as plan_speed does.
 [[nodiscard]] FeedSections feed_sections(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
                                          const SpeedCaps* caps, double corner_spread_s);
 
