@@ -204,6 +204,9 @@ void check_plan(const Path& path, const MotionLimits& limits, const FilterTolera
 // Sections of one speed are one; one that is shorter than this goes with its neighbour, at the lower speed.
 constexpr double shortest_section_mm = 1e-3;
 
+// So long beside its ends a section is one by itself: what a planner lowers for a junction holds there alone.
+constexpr double beside_s = 0.15;
+
 std::size_t joined(std::array<Section, max_pieces>& sections, std::size_t count) noexcept {
   std::size_t last = 0;
   for (std::size_t k = 1; k < count; ++k) {
@@ -267,13 +270,22 @@ FeedSections feed_sections(const Path& path, const MotionLimits& limits, const F
       count = joined(sections, count);
     }
     double begin = 0.0;
-    for (std::size_t k = 0; k < count; ++k) {
-      const double end = k + 1 == count ? segment.length_mm : begin + sections[k].length;
+    const auto add_to = [&](double end, double limit) {
       Segment section = section_of(segment, begin, end);
-      section.feed_mm_per_s = sections[k].limit;
+      section.feed_mm_per_s = limit;
       builder.add(section);
       found.segments.push_back(static_cast<std::uint32_t>(i));
       begin = end;
+    };
+    for (std::size_t k = 0; k < count; ++k) {
+      const double limit = sections[k].limit;
+      const double end = k + 1 == count ? segment.length_mm : begin + sections[k].length;
+      const double beside_mm = beside_s * limit;
+      if (end - begin > 4.0 * beside_mm) {
+        add_to(begin + beside_mm, limit);
+        add_to(end - beside_mm, limit);
+      }
+      add_to(end, limit);
     }
   }
   found.path = builder.path();

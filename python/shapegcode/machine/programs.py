@@ -289,9 +289,9 @@ class Shaping(TomlTable):
         default="response",
     )
     planner: Literal["look-ahead", "optimal"] = key(
-        'what plans the command of a cut before it is shaped. "look-ahead": as the control\'s own look-ahead, by its law '
-        'of acceleration and its rule for corners; "optimal": as fast as feed, acceleration and jerk of the axes allow, '
-        "corners and short moves rounded within tolerance.contour_um (needs axes.*.max_jerk_mm_s3)",
+        'what plans the command of a cut before it is shaped. "look-ahead": as the control\'s own look-ahead, by its '
+        'law of acceleration and its rule for corners; "optimal": as fast as feed, acceleration and jerk of the axes '
+        "allow, corners and short moves rounded within tolerance.contour_um (needs axes.*.max_jerk_mm_s3)",
         default="look-ahead",
     )
     rapids: Bool = key(
