@@ -30,11 +30,11 @@ from judge import play
 
 TICKS = 5  # of a block
 TICK_S = 1e-3
-PLAYED_S = 200.0  # of a cut, from which its acceleration and jerk are taken at most
+PLAYED_S = 100.0  # of a cut, from which its acceleration and jerk are taken at most
 LEAST_UM = 1.0  # no tolerance below is asked for
 HEADS = (
-    "program", "time s", "look-ahead s", "optimal s", "", "at its contour", "contour µm", "residual µm", "blocks",
-    "acceleration", "jerk", "conversion s",
+    "program", "original s", "look-ahead s", "optimal s", "same tolerance", "same contour", "contour µm",
+    "residual µm", "blocks", "acceleration", "jerk", "conversion s",
 )  # fmt: skip
 
 

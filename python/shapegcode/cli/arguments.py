@@ -257,7 +257,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "what to do": ("write", "fit", "servo", "runs", "tap_plan", "list_families"),
     "what to shape": (
-        "shaper", "contour", "per_axis", "shape_rapids", "arc_feed", "shape_all", "only", "leave", "block_period",
+        "shaper", "contour", "per_axis", "planner", "shape_rapids", "arc_feed", "shape_all", "only", "leave",
+        "block_period",
     ),
     "tolerance": (
         "at_least", "contour_tolerance", "vibration_limit", "max_duration", "max_abs_sum", "margin", "settling_band",
