@@ -57,7 +57,7 @@ PyController make_controller(double period_s, const std::optional<MotionLimits>&
                              const AxisLimit& max_acceleration, const AxisLimit& max_jerk,
                              std::vector<FollowingLimits> following, double contour_tolerance_mm,
                              double smoothing_time_s, const AnyShaper& shaper, bool contour_correction,
-                             py::ssize_t window, py::ssize_t queue) {
+                             py::ssize_t window, py::ssize_t queue, std::optional<int> lead_periods) {
   ControllerSettings settings;
   settings.period_s = period_s;
   if (limits) {
@@ -75,6 +75,8 @@ PyController make_controller(double period_s, const std::optional<MotionLimits>&
   settings.contour_correction = contour_correction;
   settings.window = count_of(window, "window");
   settings.queue = count_of(queue, "queue");
+  settings.plans_in_step = !lead_periods.has_value();
+  settings.lead_periods = lead_periods.value_or(settings.lead_periods);
   return PyController(settings);
 }
 
@@ -112,18 +114,23 @@ void register_answers(py::module_& module) {
 Args:
     max_feed: Highest speed in its own unit (mm or degrees) per s.
     max_acceleration: Likewise per s^2.
-    max_jerk: Likewise per s^3.)")
-      .def(py::init([](double max_feed, double max_acceleration, double max_jerk) {
-             return FollowingLimits{max_feed, max_acceleration, max_jerk};
+    max_jerk: Likewise per s^3.
+    tolerance: By how much it may deviate where its speed along the path changes at once, in its unit; 0: the motion comes to rest
+        there.)")
+      .def(py::init([](double max_feed, double max_acceleration, double max_jerk, double tolerance) {
+             return FollowingLimits{max_feed, max_acceleration, max_jerk, tolerance};
            }),
            py::kw_only(), py::arg("max_feed") = MotionLimits::none, py::arg("max_acceleration") = MotionLimits::none,
-           py::arg("max_jerk") = MotionLimits::none, "Checked by the control that takes them.")
+           py::arg("max_jerk") = MotionLimits::none, py::arg("tolerance") = MotionLimits::none,
+           "Checked by the control that takes them.")
       .def_readonly("max_feed", &FollowingLimits::max_feed, "Unit per s.")
       .def_readonly("max_acceleration", &FollowingLimits::max_acceleration, "Unit per s^2.")
       .def_readonly("max_jerk", &FollowingLimits::max_jerk, "Unit per s^3.")
+      .def_readonly("tolerance", &FollowingLimits::tolerance, "Unit.")
       .def("__repr__", [](const FollowingLimits& self) {
         return "FollowingLimits(max_feed=" + shown(self.max_feed) +
-               ", max_acceleration=" + shown(self.max_acceleration) + ", max_jerk=" + shown(self.max_jerk) + ")";
+               ", max_acceleration=" + shown(self.max_acceleration) + ", max_jerk=" + shown(self.max_jerk) +
+               ", tolerance=" + shown(self.tolerance) + ")";
       });
 }
 
@@ -151,6 +158,9 @@ void register_state(py::module_& module) {
           "steps", [](const PyState& self) { return self.state.steps; }, "Set-points given so far.")
       .def_property_readonly(
           "starvations", [](const PyState& self) { return self.state.starvations; }, "How often the segments ran out.")
+      .def_property_readonly(
+          "late_plans", [](const PyState& self) { return self.state.late_plans; },
+          "How often the motion slowed down because nothing further was planned in time.")
       .def("__repr__", [](const PyState& self) {
         const ControllerState& state = self.state;
         return "ControllerState(activity=" + std::string(text_of(state.activity)) +
@@ -159,39 +169,43 @@ void register_state(py::module_& module) {
                ", feed_override=" + shown(state.feed_override) + ", line=" + std::to_string(state.line) +
                ", segments_done=" + std::to_string(state.segments_done) +
                ", segments_waiting=" + std::to_string(state.segments_waiting) +
-               ", steps=" + std::to_string(state.steps) + ", starvations=" + std::to_string(state.starvations) + ")";
+               ", steps=" + std::to_string(state.steps) + ", starvations=" + std::to_string(state.starvations) +
+               ", late_plans=" + std::to_string(state.late_plans) + ")";
       });
 }
 
 constexpr const char* controller_doc =
     R"(A path that grows while it is run: what a control does between blocks and drives.
 
-Look-ahead over a window of segments, a jerk-limited profile, one set-point per period through contour correction,
-smoothing and shaper. Speeds, accelerations and jerks that are finite are kept by the set-points. One thread may push,
-one may step, any may call the rest but restart(); step() and run() release the global lock. It is the C++ class of the
-same name, which is the real-time form.
+Look-ahead over a window of segments: junctions rounded within the tolerance, run nearly as fast as speed, acceleration and
+jerk of every axis allow, one set-point per period through contour correction, smoothing and shaper. Limits that are
+finite are kept by the set-points. One thread may push, one may step, one may plan, any may call the rest but restart();
+step(), run() and plan() release the global lock. It is the C++ class of the same name, which is the real-time form.
 
 Args:
     period_s: Time between set-points in s.
-    limits: What look-ahead keeps, with the rules for corners. None: nothing but what the next three say, under the
+    limits: Limits, with the rules for corners. None: nothing but what the next three say, under the
         jerk-limited law if there is an acceleration.
     max_feed_mm_per_s: Of X, Y and Z, shape (3,), or one number for all; in place of that of `limits`.
     max_acceleration_mm_per_s2: Likewise.
     max_jerk_mm_per_s3: Likewise; wants an acceleration.
     following: Limits of the axes that follow the path, at most six.
-    contour_tolerance_mm: What smoothing and shaper may cut off corners and arcs; inf: as much as the limits let them.
+    contour_tolerance_mm: By how much rounded corners, smoothing and shaper may deviate from the path. 0: corners are
+        exact stops; inf: neighbouring corners are rounded up to the middle between them.
     smoothing_time_s: Length of each of two moving averages over every axis in s; 0: none.
     shaper: Shaper on the grid of the period, Fir, or Mode (whose ZV on the grid it is) for all axes, a list of them
         with one for each axis, FollowingFir; None: none.
     contour_correction: Take back, to the second order, what smoothing and shaper cut off arcs.
     window: Segments that the look-ahead sees, 8 at least.
     queue: Segments that may wait in all; rounded up to a power of two, and holds the window.
+    lead_periods: Another thread calls plan(), which plans so many periods ahead of the motion. None: step() plans when what
+        is planned runs out.
 
 Raises:
     ArgumentError: A value outside its range.
     DesignError: A Shaper whose times are not on the grid of the period.
 
-Source: this project; look-ahead as in plan_speed.)";
+Source: this project, as time_optimal_trajectory.)";
 
 void register_pushes(py::class_<PyController>& controller) {
   controller
@@ -262,10 +276,11 @@ void register_controller(py::module_& module) {
   controller.def(py::init(&make_controller), py::kw_only(), py::arg("period_s") = 0.001, py::arg("limits") = py::none(),
                  py::arg("max_feed_mm_per_s") = py::none(), py::arg("max_acceleration_mm_per_s2") = py::none(),
                  py::arg("max_jerk_mm_per_s3") = py::none(), py::arg("following") = py::tuple(),
-                 py::arg("contour_tolerance_mm") = MotionLimits::none,
+                 py::arg("contour_tolerance_mm") = ControllerSettings{}.contour_tolerance_mm,
                  py::arg("smoothing_time_s") = ControllerSettings{}.smoothing_time_s, py::arg("shaper") = py::none(),
                  py::arg("contour_correction") = false, py::arg("window") = ControllerSettings{}.window,
-                 py::arg("queue") = ControllerSettings{}.queue, "ArgumentError if it is not what the class asks for.");
+                 py::arg("queue") = ControllerSettings{}.queue, py::arg("lead_periods") = py::none(),
+                 "ArgumentError if it is not what the class asks for.");
   register_pushes(controller);
   controller
       .def("step", &PyController::step, py::arg("periods") = 1, R"(The next set-points, one for each period.
@@ -289,11 +304,13 @@ Returns:
 
 Raises:
     ArgumentError: Periods below 0.)")
+      .def("plan", &PyController::plan,
+           "Plans on until enough lies ahead; with `lead_periods`, from one thread. False: there was nothing to do.")
       .def(
           "feed_override", [](PyController& self, double ratio) { self.control().feed_override(ratio); },
           py::arg("ratio"),
-          "Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. 0 acts from "
-          "the next step on, another ratio after a period for each eight segments in sight.")
+          "Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. It acts on what is not "
+          "planned yet, after 8 to 32 periods and the lead; 0 is a hold.")
       .def(
           "hold", [](PyController& self) { self.control().hold(); }, "Come to rest along the path.")
       .def(
@@ -312,16 +329,10 @@ Raises:
                              "Where the following axes are at the end of the last segment, (n_axes - 3,).")
       .def_property_readonly(
           "delay_periods", [](const PyController& self) { return self.control().delay_periods(); },
-          "Mean delay of jerk time, correction, smoothing and shaper, in periods.")
+          "Mean delay of correction, smoothing and shaper, in periods.")
       .def_property_readonly(
           "correction_delay", [](const PyController& self) { return self.control().correction_delay(); },
-          "Periods of that which are the contour correction's.")
-      .def_property_readonly(
-          "planning_limits", [](const PyController& self) { return self.control().planning_limits(); },
-          "What plan_speed takes for the same profile of a whole path: MotionLimits.")
-      .def_property_readonly(
-          "planning_tolerance", [](const PyController& self) { return self.control().planning_tolerance(); },
-          "Likewise: FilterTolerance.");
+          "Periods of that which are the contour correction's.");
 }
 
 }  // namespace shapegcode::bindings

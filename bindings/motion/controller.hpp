@@ -36,15 +36,16 @@ struct PyState {
   std::size_t axes;
 };
 
-// One thread may push and one may step: the global lock keeps two from pushing at once, a lock of its own two that
-// step.
+// One thread may push, one may step and one may plan: the global lock keeps two from pushing at once, locks of their
+// own two that step or plan.
 class PyController {
  public:
   explicit PyController(const ControllerSettings& settings)
       : control_(settings),
         axes_(static_cast<std::size_t>(control_.axes())),
         following_(axes_ - axis_count, 0.0),
-        stepping_(std::make_unique<std::mutex>()) {}
+        stepping_(std::make_unique<std::mutex>()),
+        planning_(std::make_unique<std::mutex>()) {}
 
   const MotionController& control() const noexcept { return control_; }
   MotionController& control() noexcept { return control_; }
@@ -115,6 +116,12 @@ class PyController {
     return pybind11::array_t<double>({count, static_cast<pybind11::ssize_t>(axes_)}, rows.data());
   }
 
+  bool plan() {
+    const pybind11::gil_scoped_release release;
+    const std::lock_guard lock(*planning_);
+    return control_.plan();
+  }
+
   void restart(const std::vector<double>& position) {
     if (position.size() != axes_) {
       throw Error(ErrorKind::argument, "position has " + std::to_string(position.size()) + " values, must have " +
@@ -138,7 +145,7 @@ class PyController {
   std::size_t axes_;
   Vector3 end_ = Vector3::Zero();
   std::vector<double> following_;
-  std::unique_ptr<std::mutex> stepping_;
+  std::unique_ptr<std::mutex> stepping_, planning_;
 };
 
 }  // namespace shapegcode::bindings

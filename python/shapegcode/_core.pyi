@@ -1070,8 +1070,10 @@ class FollowingLimits:
         max_feed: Highest speed in its own unit (mm or degrees) per s.
         max_acceleration: Likewise per s^2.
         max_jerk: Likewise per s^3.
+        tolerance: By how much it may deviate where its speed along the path changes at once, in its unit; 0: the motion comes to rest
+            there.
     """
-    def __init__(self, *, max_feed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., max_jerk: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
+    def __init__(self, *, max_feed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., max_jerk: typing.SupportsFloat | typing.SupportsIndex = ..., tolerance: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
         """
         Checked by the control that takes them.
         """
@@ -1091,6 +1093,11 @@ class FollowingLimits:
     def max_jerk(self) -> float:
         """
         Unit per s^3.
+        """
+    @property
+    def tolerance(self) -> float:
+        """
+        Unit.
         """
 class ControllerState:
     """
@@ -1112,6 +1119,11 @@ class ControllerState:
     def feed_override(self) -> float:
         """
         Ratio of the programmed feeds.
+        """
+    @property
+    def late_plans(self) -> int:
+        """
+        How often the motion slowed down because nothing further was planned in time.
         """
     @property
     def line(self) -> int:
@@ -1152,34 +1164,37 @@ class MotionController:
     """
     A path that grows while it is run: what a control does between blocks and drives.
     
-    Look-ahead over a window of segments, a jerk-limited profile, one set-point per period through contour correction,
-    smoothing and shaper. Speeds, accelerations and jerks that are finite are kept by the set-points. One thread may push,
-    one may step, any may call the rest but restart(); step() and run() release the global lock. It is the C++ class of the
-    same name, which is the real-time form.
+    Look-ahead over a window of segments: junctions rounded within the tolerance, run nearly as fast as speed, acceleration and
+    jerk of every axis allow, one set-point per period through contour correction, smoothing and shaper. Limits that are
+    finite are kept by the set-points. One thread may push, one may step, one may plan, any may call the rest but restart();
+    step(), run() and plan() release the global lock. It is the C++ class of the same name, which is the real-time form.
     
     Args:
         period_s: Time between set-points in s.
-        limits: What look-ahead keeps, with the rules for corners. None: nothing but what the next three say, under the
+        limits: Limits, with the rules for corners. None: nothing but what the next three say, under the
             jerk-limited law if there is an acceleration.
         max_feed_mm_per_s: Of X, Y and Z, shape (3,), or one number for all; in place of that of `limits`.
         max_acceleration_mm_per_s2: Likewise.
         max_jerk_mm_per_s3: Likewise; wants an acceleration.
         following: Limits of the axes that follow the path, at most six.
-        contour_tolerance_mm: What smoothing and shaper may cut off corners and arcs; inf: as much as the limits let them.
+        contour_tolerance_mm: By how much rounded corners, smoothing and shaper may deviate from the path. 0: corners are
+            exact stops; inf: neighbouring corners are rounded up to the middle between them.
         smoothing_time_s: Length of each of two moving averages over every axis in s; 0: none.
         shaper: Shaper on the grid of the period, Fir, or Mode (whose ZV on the grid it is) for all axes, a list of them
             with one for each axis, FollowingFir; None: none.
         contour_correction: Take back, to the second order, what smoothing and shaper cut off arcs.
         window: Segments that the look-ahead sees, 8 at least.
         queue: Segments that may wait in all; rounded up to a power of two, and holds the window.
+        lead_periods: Another thread calls plan(), which plans so many periods ahead of the motion. None: step() plans when what
+            is planned runs out.
     
     Raises:
         ArgumentError: A value outside its range.
         DesignError: A Shaper whose times are not on the grid of the period.
     
-    Source: this project; look-ahead as in plan_speed.
+    Source: this project, as time_optimal_trajectory.
     """
-    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limits: MotionLimits | None = None, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, following: collections.abc.Sequence[FollowingLimits] = (), contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = ..., smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.01, shaper: Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode] | FollowingFir | None = None, contour_correction: bool = False, window: typing.SupportsInt | typing.SupportsIndex = 128, queue: typing.SupportsInt | typing.SupportsIndex = 1024) -> None:
+    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limits: MotionLimits | None = None, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, following: collections.abc.Sequence[FollowingLimits] = (), contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = 0.05, smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, shaper: Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode] | FollowingFir | None = None, contour_correction: bool = False, window: typing.SupportsInt | typing.SupportsIndex = 128, queue: typing.SupportsInt | typing.SupportsIndex = 1024, lead_periods: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
         """
         ArgumentError if it is not what the class asks for.
         """
@@ -1189,11 +1204,15 @@ class MotionController:
         """
     def feed_override(self, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
-        Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. 0 acts from the next step on, another ratio after a period for each eight segments in sight.
+        Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. It acts on what is not planned yet, after 8 to 32 periods and the lead; 0 is a hold.
         """
     def hold(self) -> None:
         """
         Come to rest along the path.
+        """
+    def plan(self) -> bool:
+        """
+        Plans on until enough lies ahead; with `lead_periods`, from one thread. False: there was nothing to do.
         """
     def push(self, segment: Segment, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None) -> PushResult:
         """
@@ -1298,7 +1317,7 @@ class MotionController:
     @property
     def delay_periods(self) -> float:
         """
-        Mean delay of jerk time, correction, smoothing and shaper, in periods.
+        Mean delay of correction, smoothing and shaper, in periods.
         """
     @property
     def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -1314,16 +1333,6 @@ class MotionController:
     def n_axes(self) -> int:
         """
         Axes of a set-point.
-        """
-    @property
-    def planning_limits(self) -> MotionLimits:
-        """
-        What plan_speed takes for the same profile of a whole path: MotionLimits.
-        """
-    @property
-    def planning_tolerance(self) -> FilterTolerance:
-        """
-        Likewise: FilterTolerance.
         """
     @property
     def state(self) -> ControllerState:

@@ -140,7 +140,10 @@ def ours(
     run = subprocess.run([driver, how, file], input="\n".join(task), capture_output=True, text=True, check=False)
     if run.returncode != 0:
         raise RuntimeError(run.stderr.strip())
-    return read_points(file), json.loads(run.stdout)
+    points = read_points(file)
+    if how == "play":
+        points = np.vstack([route.start, points])  # where it rests before the first step
+    return points, json.loads(run.stdout)
 
 
 def read_points(file: Path, axes: int = 3) -> Array:

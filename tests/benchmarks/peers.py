@@ -47,7 +47,7 @@ WINDOWS = (10, 20, 50, 100, 200, 500)
 ASKED_WINDOW, ASKED_LOSS = 100, 0.01
 ALLOWED_RATIO = 1.001
 ASKED_MEDIAN, ASKED_WORST = 1.03, 1.10  # of our time over the shortest
-CURVE_LINES = 20_000
+CURVE_LINES = 4_000
 
 ONE_AXIS = Limits.of(100.0, 1000.0, 50_000.0)
 THREE_AXES = Limits((200.0, 200.0, 100.0), (2000.0, 2000.0, 1000.0), (100_000.0, 100_000.0, 50_000.0))
@@ -119,12 +119,11 @@ def single_moves(driver: Path, peers: Peers, folder: Path, passes: int) -> tuple
                 who = f"Ruckig {answer['version']}" + (f", {question['synchronization']}" if target[1] else "")
                 times = (f"{told['calculation_us']:.1f}", f"{told['step_us']:.2f}", f"{told['longest_step_us']:.1f}")
                 lines.append(row(name, who, found, *times))
-        for smoothing_s in (0.0, 0.01):
-            points, told = ours(driver, route, limits, folder / "ours", smoothing=smoothing_s, passes=passes)
-            found = figures(points, limits, route)
-            kept += [found.speed, found.acceleration, found.jerk]
-            times = (f"{told['push_us']:.1f}", f"{told['step_us']:.2f}", f"{told['longest_step_us']:.1f}")
-            lines.append(row(name, f"shapegcode online, smoothing {1e3 * smoothing_s:g} ms", found, *times))
+        points, told = ours(driver, route, limits, folder / "ours", tolerance=0.05, passes=passes)
+        found = figures(points, limits, route)
+        kept += [found.speed, found.acceleration, found.jerk]
+        times = (f"{told['push_us']:.1f}", f"{told['step_us']:.2f}", f"{told['longest_step_us']:.1f}")
+        lines.append(row(name, "shapegcode online", found, *times))
         points, told = ours(driver, route, limits, folder / "ours", "plan", tolerance=0.05, passes=passes)
         found = figures(points, limits, route)
         kept += [found.speed, found.acceleration, found.jerk]
@@ -173,7 +172,7 @@ def small_arcs(driver: Path, peers: Peers, folder: Path) -> tuple[str, list[floa
     for points, _ in klipper(peers, folder, {"arcs": route}, settings).values():
         lines.append(row("small arcs", "Klipper's host, chords of 0.1 mm", figures(points, LINUXCNC, route)))
     for tolerance_mm, limits in ((0.1, LINUXCNC), (0.01, LINUXCNC), (0.1, JERKY)):
-        points, _ = ours(driver, route, limits, folder / "ours", smoothing=0.01, tolerance=tolerance_mm)
+        points, _ = ours(driver, route, limits, folder / "ours", tolerance=tolerance_mm)
         own = figures(points, limits)
         kept += [own.speed, own.acceleration, own.jerk]
         more = f", tolerance {tolerance_mm} mm" + (", as much jerk as LinuxCNC" if limits is JERKY else "")
@@ -214,11 +213,11 @@ def programs(driver: Path, peers: Peers, folder: Path) -> tuple[str, list[float]
             lines.append(row(name, "Klipper's host", figures(points, MILL, route), move_us))
         else:
             lines.append([name, "Klipper's host: not available as a package", *[""] * 6])
-        points, told = ours(driver, route, MILL, folder / "ours", smoothing=0.01, tolerance=0.05)
+        points, told = ours(driver, route, MILL, folder / "ours", tolerance=0.05)
         found = figures(points, MILL, route)
         kept += [found.speed, found.acceleration, found.jerk]
         spent_us = told["step_us"] * told["steps"] / len(route.pieces)
-        lines.append(row(name, "shapegcode online, smoothing 10 ms", found, f"{spent_us:.1f}"))
+        lines.append(row(name, "shapegcode online", found, f"{spent_us:.1f}"))
         points, told = ours(driver, route, MILL, folder / "ours", "plan", tolerance=0.05)
         found = figures(points, MILL, route)
         kept += [found.speed, found.acceleration, found.jerk]
@@ -307,7 +306,7 @@ def fine_blocks() -> str:
 def windows(driver: Path, folder: Path, quick: bool) -> tuple[str, list[float]]:
     """How much longer the path takes when only so many segments are seen; the losses at the window asked for."""
     curve = folder / "long_curve.nc"
-    workload.write_program(curve, CURVE_LINES // (10 if quick else 1))
+    workload.write_program(curve, CURVE_LINES // (4 if quick else 1))
     golden = [file for file in sorted(PROGRAMS.iterdir()) if file.suffix.upper() == ".NC"]
     fine = folder / "fine.nc"
     fine.write_text(fine_blocks(), encoding="ascii")
@@ -361,7 +360,8 @@ def random_paths(driver: Path, count: int) -> tuple[str, list[float]]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="500 random paths, a shorter curve, fewer passes")
+    parser.add_argument("--quick", action="store_true", help="50 random paths, a shorter curve, fewer passes")
+    parser.add_argument("--paths", type=int, default=1000, help="random paths (default: %(default)s, half an hour)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was judged to FILE")
     arguments = parser.parse_args()
     driver, peers = native.built("peers"), Peers()
@@ -374,7 +374,7 @@ def main() -> int:
             "Programs": lambda: programs(driver, peers, folder),
             "Beside the shortest time": lambda: shortest_time(driver, folder, 20 if arguments.quick else 200),
             "Window of the look-ahead": lambda: windows(driver, folder, arguments.quick),
-            "Random paths": lambda: random_paths(driver, 500 if arguments.quick else 10_000),
+            "Random paths": lambda: random_paths(driver, 50 if arguments.quick else arguments.paths),
         }
         for title, part in parts.items():
             text, ratios[title] = part()

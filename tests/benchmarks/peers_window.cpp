@@ -12,7 +12,7 @@
 #include <string_view>
 
 #include "peers.hpp"
-#include "shapegcode/motion.hpp"
+#include "shapegcode/planner.hpp"
 #include "shapegcode/program.hpp"
 
 namespace shapegcode::peers {
@@ -58,9 +58,11 @@ std::size_t moving_periods(const ControllerSettings& settings, const std::vector
 }
 
 std::size_t planned_periods(const ControllerSettings& settings, const std::vector<Segment>& segments) {
-  const MotionController control(settings);
-  const SpeedProfile plan = plan_speed(Path(segments), control.planning_limits(), control.planning_tolerance());
-  return static_cast<std::size_t>(std::ceil(plan.ramp_duration_s() / settings.period_s - 1e-9));
+  const MotionLimits& given = settings.limits;
+  const TrajectoryLimits limits{given.max_feed_mm_per_s, given.max_acceleration_mm_per_s2, given.max_jerk_mm_per_s3,
+                                settings.contour_tolerance_mm};
+  return static_cast<std::size_t>(
+      time_optimal_trajectory(Path(segments), limits, settings.period_s).positions_mm.rows() - 1);
 }
 
 void compare(Task task, const std::vector<std::size_t>& windows, const char* program) {

@@ -38,7 +38,7 @@ ControllerSettings settings_with(ControllerShaper shaper, bool correction) {
   settings.following.resize(n_following, {90.0, 1000.0, 50000.0});
   settings.shaper = std::move(shaper);
   settings.contour_correction = correction;
-  settings.window = 32;
+  settings.window = 16;
   settings.queue = 128;
   return settings;
 }
@@ -46,21 +46,28 @@ ControllerSettings settings_with(ControllerShaper shaper, bool correction) {
 /// Lines and quarter arcs without an end: one after the other from where the last one ended.
 class Way {
  public:
-  Segment next(bool stop_at_end = false) noexcept {
-    const double out = ++made_ % 40 < 20 ? 1.0 : -1.0;
+  [[nodiscard]] Segment next(bool stop_at_end = false) const noexcept {
+    const int number = made_ + 1;
+    const double out = number % 40 < 20 ? 1.0 : -1.0;
     Segment segment;
-    if (made_ % 4 == 0) {
+    if (number % 4 == 0) {
       const Vector3 end = at_ + Vector3(2.0, 2.0, 0.3) * out;
       segment = make_arc(at_, end, at_ + Vector3(0.0, 2.0, 0.0) * out, std::numbers::pi / 2, 2, 60.0);
     } else {
-      segment = make_line(at_, at_ + Vector3(made_ % 3 == 0 ? 0.02 : 1.5, 0.4, 0.1) * out, 60.0);
+      segment = make_line(at_, at_ + Vector3(number % 3 == 0 ? 0.02 : 1.5, 0.4, 0.1) * out, 60.0);
     }
     segment.stop_at_end = stop_at_end;
     return segment;
   }
-  void passed(const Segment& segment) noexcept { at_ = segment.end_mm; }
-  void restart() noexcept { at_.setZero(); }
-  [[nodiscard]] Ends following() const noexcept { return {0.5 * made_, at_[0]}; }
+  void passed(const Segment& segment) noexcept {
+    at_ = segment.end_mm;
+    ++made_;
+  }
+  void restart() noexcept {
+    at_.setZero();
+    made_ = 0;
+  }
+  [[nodiscard]] Ends following() const noexcept { return {0.5 * (made_ + 1), at_[0]}; }
 
  private:
   Vector3 at_ = Vector3::Zero();
@@ -103,7 +110,7 @@ struct Control {
 long live(Control& control) noexcept {
   long steps = 0;
   MotionController& controller = control.controller;
-  for (int round = 0; round < 40; ++round) {
+  for (int round = 0; round < 8; ++round) {
     control.push(1000);
     for (int i = 0; i < 400; ++i, ++steps) {
       if (i % 37 == 0) controller.feed_override(0.1 * static_cast<double>(steps % 21));

@@ -108,7 +108,7 @@ static void square(void) {
   }
   CHECK(activity == SHAPEGCODE_IDLE);
   CHECK(set_point[0] == 0.0 && set_point[1] == 0.0 && set_point[2] == 0.0);
-  CHECK(fastest <= 1.2 * feed_mm_per_s * (1 + 1e-9) && fastest > 1.19 * feed_mm_per_s);
+  CHECK(fastest <= 1.001 * 1.2 * feed_mm_per_s && fastest > 1.19 * feed_mm_per_s);
   for (step = 0; step < 4; ++step) CHECK(nearest[step] <= tolerance_mm);
   CHECK(state_of(control).segments_done == 4 && state_of(control).segments_waiting == 0);
   CHECK(state_of(control).starvations == 0 && state_of(control).feed_override == 1.2);

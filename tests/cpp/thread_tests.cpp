@@ -1,6 +1,6 @@
-// Sessions of the controller with a thread for each of its parts, for ThreadSanitizer: one steps, one pushes and turns
-// the override, one reads the state. What the sanitizer finds ends the process with its own exit code; what is checked
-// here is that no reader sees half a state.
+// Sessions of the controller with a thread for each of its parts, for ThreadSanitizer: one steps, one plans, one pushes
+// and turns the override, one reads the state. What the sanitizer finds ends the process with its own exit code; what
+// is checked here is that no reader sees half a state.
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -19,7 +19,7 @@ using namespace shapegcode;
 namespace {
 
 constexpr std::uint32_t sessions = 8;
-constexpr std::size_t max_steps = 1'000'000;
+constexpr std::size_t max_steps = 20'000'000;
 
 std::atomic<int> failures{0};
 
@@ -39,6 +39,8 @@ ControllerSettings settings_of(std::uint32_t session) {
   settings.following.resize(session % 4 == 1 ? 2 : 0);
   settings.shaper = Fir({0, 11}, {0.516, 0.484});
   settings.window = session % 2 == 0 ? 8 : 64;
+  settings.plans_in_step = session % 4 == 0;
+  settings.lead_periods = session % 8 < 4 ? 20 : 200;
   settings.queue = 66;  // small: pushing waits for stepping, and places are used again and again
   return settings;
 }
@@ -66,6 +68,11 @@ void session_of(std::uint32_t session) {
     }
     control.feed_override(2.0);
   });
+  std::thread planner([&] {
+    while (!settings.plans_in_step && !ended.load(std::memory_order_relaxed)) {
+      if (!control.plan()) std::this_thread::yield();
+    }
+  });
   std::thread reader([&] {
     std::uint64_t last = 0;
     while (!ended.load(std::memory_order_relaxed)) {
@@ -82,10 +89,12 @@ void session_of(std::uint32_t session) {
   while (steps < max_steps && control.state().segments_done < segments.size()) {
     control.step({point.data(), static_cast<std::size_t>(control.axes())});
     ++steps;
+    if (!settings.plans_in_step) std::this_thread::yield();
   }
   check(steps < max_steps, "the path did not end", session);
   ended.store(true, std::memory_order_relaxed);
   pusher.join();
+  planner.join();
   reader.join();
 }
 

@@ -20,7 +20,7 @@ Rows = npt.NDArray[np.float64]
 PERIOD_S = 0.001
 ACCELERATION = 1000.0
 JERK = 50_000.0
-JERK_TIME_S = 2 * ACCELERATION / JERK  # from full acceleration to full braking
+JERK_TIME_S = ACCELERATION / JERK  # from rest to full acceleration
 FEED = 100.0
 LIMITS: dict[str, Any] = {"max_acceleration_mm_per_s2": ACCELERATION, "max_jerk_mm_per_s3": JERK}
 
@@ -43,9 +43,16 @@ def arrival(rows: Rows) -> int:
 
 
 @pytest.mark.parametrize(("length", "feed"), [(40.0, 100.0), (3.0, 100.0), (200.0, 300.0), (0.5, 100.0)])
-def test_a_single_move_takes_the_time_of_its_trapezoid_and_the_jerk_time(length: float, feed: float) -> None:
-    peak = min(feed, math.sqrt(length * ACCELERATION))
-    seconds = length / peak + peak / ACCELERATION + JERK_TIME_S
+def test_a_single_move_takes_the_shortest_time(length: float, feed: float) -> None:
+    """Seven phases: with the feed, without it, or without the full acceleration."""
+    ramp = ACCELERATION * JERK_TIME_S
+    peak = (math.sqrt(ramp**2 + 4 * ACCELERATION * length) - ramp) / 2
+    if peak >= feed:
+        seconds = length / feed + feed / ACCELERATION + JERK_TIME_S
+    elif peak >= ramp:
+        seconds = 2 * (peak / ACCELERATION + JERK_TIME_S)
+    else:
+        seconds = 4 * (length / (2 * JERK)) ** (1 / 3)
     rows = line(length, control(), feed)
     assert arrival(rows) * PERIOD_S == pytest.approx(seconds, abs=2 * PERIOD_S)
     assert rows[-1, 0] == length
@@ -129,9 +136,9 @@ def test_set_points_keep_limits_and_end_where_the_last_segment_does(
     assert made.state.segments_done == len(ends)
     assert made.state.activity == sg.Activity.idle
     speeds = np.linalg.norm(differences(run, 1, start), axis=1)
-    assert speeds.max() <= FEED * max(1.0, dial) * (1 + 1e-9)
-    assert np.abs(differences(run, 2, start)).max() <= ACCELERATION * (1 + 1e-6)
-    assert np.abs(differences(run, 3, start)).max() <= JERK * (1 + 1e-4)
+    assert speeds.max() <= FEED * max(1.0, dial) * 1.001
+    assert np.abs(differences(run, 2, start)).max() <= ACCELERATION * 1.001
+    assert np.abs(differences(run, 3, start)).max() <= JERK * 1.001
     for end in ends:
         assert np.linalg.norm(run - np.array(end), axis=1).min() <= 0.05 + FEED * 2 * PERIOD_S
 
@@ -146,9 +153,9 @@ def test_hold_rests_on_the_path_and_resume_goes_on() -> None:
     assert made.state.activity == sg.Activity.held
     assert made.state.speed_mm_per_s == 0.0
     assert (made.step(50) == stopping[-1]).all()
-    # What braking from the feed takes, v^2/2A, and what the jerk time held back.
-    way = FEED**2 / (2 * ACCELERATION) + FEED * JERK_TIME_S
-    assert stopping[-1, 0] - before[-1, 0] <= way
+    # What braking from the feed takes, with the jerk, and what was planned before: 32 periods at most.
+    braking_mm = FEED / 2 * (FEED / ACCELERATION + JERK_TIME_S)
+    assert stopping[-1, 0] - before[-1, 0] <= braking_mm + FEED * 33 * PERIOD_S
     made.resume()
     assert made.run()[-1].tolist() == [60, 60, 0]
     assert made.state.activity == sg.Activity.idle
@@ -237,7 +244,7 @@ def test_a_path_longer_than_the_queue_is_taken_piece_by_piece() -> None:
 
 
 def test_arcs_are_circles() -> None:
-    made = control(max_acceleration_mm_per_s2=5000.0)
+    made = control(max_acceleration_mm_per_s2=5000.0, contour_tolerance_mm=0.0)
     made.push_arc([0, 0, 0], [20, 0, 0], 2 * math.pi, 50.0)
     made.push_arc([20, -20, 4], [20, 0, 0], math.pi / 2, 50.0, stop_at_end=True)
     rows = made.run()
@@ -271,7 +278,9 @@ def test_one_thread_pushes_while_another_steps() -> None:
         ({"max_acceleration_mm_per_s2": [1.0, -1.0, 1.0]}, "-1"),
         ({"max_feed_mm_per_s": math.nan}, "nan"),
         ({"smoothing_time_s": -0.5}, "-0.5"),
-        ({"contour_tolerance_mm": 0.0}, "0"),
+        ({"contour_tolerance_mm": -0.1}, "-0.1"),
+        ({"contour_tolerance_mm": 0.0, "smoothing_time_s": 0.01}, "0"),
+        ({"lead_periods": -1}, "-1"),
         ({"following": [sg.FollowingLimits()] * 7}, "7"),
         ({"following": [sg.FollowingLimits(max_feed=-2.0)]}, "-2"),
         ({"shaper": [sg.Fir([0], [1.0])] * 2}, "2"),
@@ -296,7 +305,6 @@ def test_the_rules_for_corners_are_those_of_the_limits() -> None:
             made.push_line(end, 20.0, stop_at_end=end[0] == 40)
         times.append(arrival(made.run()))
     assert times[0] < times[1]
-    assert stopped.planning_limits.corner_stop_angle_rad == 0.1
 
 
 def test_the_state_says_what_it_is() -> None:
@@ -314,19 +322,42 @@ def test_the_state_says_what_it_is() -> None:
     assert 0 < state.speed_mm_per_s <= FEED
     assert repr(state).startswith("ControllerState(activity=moving, set_point=[")
     assert repr(sg.FollowingLimits(max_feed=50.0)) == (
-        "FollowingLimits(max_feed=50.0, max_acceleration=inf, max_jerk=inf)"
+        "FollowingLimits(max_feed=50.0, max_acceleration=inf, max_jerk=inf, tolerance=inf)"
     )
     with pytest.raises(AttributeError):
         state.steps = 5  # type: ignore[misc]
 
 
 def test_the_delay_is_what_the_set_points_lag() -> None:
-    """Behind the profile's ramps: on a straight way at constant speed a mean delay is a shift."""
+    """Behind the ramp of the motion: on a straight line at constant speed a mean delay is a shift."""
     rows = line(60.0, control(smoothing_time_s=0.01, shaper=sg.Fir([0, 20], [0.75, 0.25])))
-    ramp = FEED / ACCELERATION
+    ramp = FEED / ACCELERATION + JERK_TIME_S
     middle = 400
     ideal = FEED * (middle * PERIOD_S - ramp / 2)
     made = control(smoothing_time_s=0.01, shaper=sg.Fir([0, 20], [0.75, 0.25]))
     lag = (ideal - rows[middle - 1, 0]) / FEED / PERIOD_S
     assert lag == pytest.approx(made.delay_periods, abs=1.01)
     assert made.correction_delay == 0
+
+
+def test_without_a_tolerance_corners_are_exact_stops() -> None:
+    made = control(contour_tolerance_mm=0.0)
+    for end in ([10, 0, 0], [10, 10, 0], [20, 20, 0]):
+        made.push_line(end, FEED, stop_at_end=end[0] == 20)
+    rows = made.run()
+    for corner in ([10, 0, 0], [10, 10, 0]):
+        assert np.abs(rows - corner).max(axis=1).min() < 1e-9
+
+
+def test_planned_by_another_caller() -> None:
+    made = control(lead_periods=20)
+    made.push_line([10, 0, 0], FEED, stop_at_end=True)
+    assert (made.step(5) == 0.0).all()  # nothing is planned
+    assert made.plan()
+    assert not made.plan()
+    rows = []
+    while made.state.segments_done < 1:
+        made.plan()
+        rows.append(made.step(10))
+    assert made.state.late_plans == 0
+    np.testing.assert_array_equal(np.vstack(rows)[: len(line(10.0, control()))][-1], [10.0, 0.0, 0.0])

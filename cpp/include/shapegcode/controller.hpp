@@ -37,6 +37,9 @@ struct FollowingLimits {
   double max_feed = MotionLimits::none;
   double max_acceleration = MotionLimits::none;
   double max_jerk = MotionLimits::none;
+  /// By how much the axis may deviate where its speed along the path changes at once; 0: the motion comes to rest
+  /// there.
+  double tolerance = MotionLimits::none;
 };
 
 /// Shapers of a control: one for all axes, one for each, or a set followed along an axis (of X, Y, Z).
@@ -51,21 +54,25 @@ struct ControllerSettings {
   MotionLimits limits;
   /// One for each axis behind X, Y and Z, at most six.
   std::vector<FollowingLimits> following;
-  /// What smoothing and shaper may cut off corners and arcs; none: as much as the limits let them.
-  double contour_tolerance_mm = MotionLimits::none;
-  /// Length of each of two moving averages over every axis, which spread what a corner or the begin of an arc asks for
-  /// at once. 0 = none: then such a corner is passed at a crawl where acceleration or jerk are limited.
-  double smoothing_time_s = 0.01;
+  /// By how much rounded corners, smoothing and shaper may deviate from the path. 0: corners are exact stops; none:
+  /// neighbouring corners are rounded up to the middle between them, smoothing and shaper cut off what they do.
+  double contour_tolerance_mm = 0.05;
+  /// Length of each of two moving averages over every axis; 0 = none, as rounded corners need none.
+  double smoothing_time_s = 0.0;
   /// One that follows an axis is read in front of the smoothing. Its changes take up to a quarter of acceleration and
   /// jerk, and limit the feed where that would not be enough.
   ControllerShaper shaper = Fir({0}, {1.0});
-  /// Take back, to the second order, what smoothing and shaper cut off arcs. Costs `correction_delay()` periods and a
-  /// third of every limit, which the correction may need for itself.
+  /// Take back, to the second order, what smoothing and shaper cut off arcs. Costs `correction_delay()` periods, and of
+  /// every limit what the correction may need for itself.
   bool contour_correction = false;
-  /// Segments that the look-ahead sees (8 at least; an eighth more are taken in, since those being worked out are not
-  /// seen yet), and those that may wait in all; the second is rounded up to a power of two, and holds the window.
+  /// Segments that the look-ahead sees (8 at least), and those that may wait in all; the second is rounded up to a
+  /// power of two, and holds the window.
   std::size_t window = 128;
   std::size_t queue = 1024;
+  /// step() plans for itself when what is planned runs out: for simulations and tests, which know no clock. Otherwise
+  /// another thread calls plan(), `lead_periods` ahead of the motion: a real-time control.
+  bool plans_in_step = true;
+  int lead_periods = 60;
 };
 
 /// Answer to a segment that was pushed.
@@ -104,6 +111,7 @@ struct ControllerState {
   std::uint64_t segments_waiting = 0;
   std::uint64_t steps = 0;
   std::uint64_t starvations = 0;  ///< how often the segments ran out
+  std::uint64_t late_plans = 0;   ///< how often the motion slowed down because nothing further was planned in time
 };
 
 /// A path that grows while it is run: look-ahead over a window of segments, a jerk-limited profile, one set-point per
@@ -127,15 +135,18 @@ class MotionController {
   /// the following axes alone if they move: its length is then the largest of their ways, its feed that axis'.
   PushResult push(const Segment& segment, std::span<const double> following_end = {}) noexcept;
 
-  /// The next set-point into `out` (axes() values), from the real-time thread: no allocation, no lock, no exception;
-  /// the look-ahead works in portions, bounded whatever the window is.
+  /// The next set-point into `out` (axes() values), from the real-time thread: no allocation, no lock, no exception. It
+  /// takes what is planned, in bounded time; with `plans_in_step` it also plans, every 8 to 32 periods.
   Activity step(std::span<double> out) noexcept;
 
+  /// Plans on until enough lies ahead, from one thread, the pushing or another one; not with `plans_in_step`. Does not
+  /// allocate. False: there was nothing to do, call it again after some periods.
+  bool plan() noexcept;
+
   /// Ratio of the programmed feeds, 0 to 2; what is outside of that, or no number, is taken as the nearer end (no
-  /// number: as it was). 0 acts from the next step on, another ratio when the path in sight has been planned with it:
-  /// after a period for each eight segments of it, and as many again where the ratio before is still being worked out.
+  /// number: as it was). It acts on what is not planned yet: after 8 to 32 periods and the lead; 0 is a hold.
   void feed_override(double ratio) noexcept;
-  /// Come to rest along the path; resume() goes on.
+  /// Come to rest along the path, beginning after 32 periods or an eighth of the lead at the latest; resume() goes on.
   void hold() noexcept;
   void resume() noexcept;
   /// Come to rest along the path and forget the rest of it.
@@ -150,9 +161,6 @@ class MotionController {
   [[nodiscard]] double delay_periods() const noexcept;
   /// Periods of that which are the correction's.
   [[nodiscard]] int correction_delay() const noexcept;
-  /// What plan_speed takes for the same profile of a whole path at a feed override of 1.
-  [[nodiscard]] const MotionLimits& planning_limits() const noexcept;
-  [[nodiscard]] const FilterTolerance& planning_tolerance() const noexcept;
 
  private:
   class Implementation;

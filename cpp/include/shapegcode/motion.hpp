@@ -19,14 +19,6 @@ enum class AccelerationLaw : std::uint8_t {
   jerk_limited,   ///< the acceleration of the axes, smoothed by the jerk time
 };
 
-/// What a filter behind the path makes of a jump: of the speed of an axis, as at a corner, or of its acceleration, as
-/// where an arc begins. Without duration nobody looks at jumps.
-struct JumpResponse {
-  double duration_s = 0.0;          ///< of the filter
-  double acceleration_per_s = 0.0;  ///< largest acceleration per jump of speed; jerk per jump of acceleration
-  double jerk_per_s2 = 0.0;         ///< largest jerk per jump of speed
-};
-
 /// What look-ahead keeps. Infinity switches a limit off.
 struct MotionLimits {
   static constexpr double none = std::numeric_limits<double>::infinity();
@@ -50,9 +42,6 @@ struct MotionLimits {
   /// look-ahead mixes the motion of this time to both sides.
   double feed_spread_s = 0.0;
   double feed_excess_ratio = 0.0;  ///< by this share a neighbour may be faster without that
-  /// Where a filter with this response follows, acceleration and jerk are kept at corners and arcs as well: half of
-  /// each limit is the jump's, the other half that of what the path does at the time.
-  JumpResponse jumps;
 };
 
 /// Within what a filter behind the interpolation must stay at corners and on arcs. Without spread it limits nothing.

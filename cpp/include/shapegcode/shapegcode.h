@@ -118,16 +118,20 @@ typedef struct shapegcode_settings {
   shapegcode_limits limits;
   shapegcode_following_limits following[SHAPEGCODE_MOST_FOLLOWING_AXES];
   size_t following_count;
-  double contour_tolerance_mm;       ///< what smoothing and shaper may cut off; INFINITY: any
+  double contour_tolerance_mm;       ///< of rounded corners, smoothing and shaper; INFINITY: any
   double smoothing_time_s;           ///< length of each of two moving averages; 0: none
   const shapegcode_shaper* shapers;  ///< copied by create
   size_t shaper_count;               ///< 0: none; 1: one for all axes; else one for each axis
   int32_t contour_correction;        ///< 1: take back what smoothing and shaper cut off arcs
   size_t window;                     ///< segments that the look-ahead sees, 8 at least
-  size_t queue;  ///< segments that may wait in all; rounded up to a power of two, and holds the window
+  size_t queue;           ///< segments that may wait in all; rounded up to a power of two, and holds the window
+  int32_t plans_in_step;  ///< 1: step() plans for itself, every 8 to 32 periods; 0: another thread calls plan()
+  int32_t lead_periods;   ///< that plan() is ahead of the motion
+  double following_tolerance[SHAPEGCODE_MOST_FOLLOWING_AXES];  ///< where the speed of such an axis changes at once
 } shapegcode_settings;
 
-/// Writes the defaults: no limits, no shaper, 1 ms. `struct_size` is sizeof(shapegcode_settings).
+/// Writes the defaults: no limits, no shaper, 1 ms, a contour tolerance of 0.05 mm. `struct_size` is
+/// sizeof(shapegcode_settings).
 shapegcode_status shapegcode_settings_init(shapegcode_settings* settings, size_t struct_size);
 
 /// A snapshot for a user interface.
@@ -143,9 +147,10 @@ typedef struct shapegcode_state {
   uint64_t steps;
   uint64_t starvations;  ///< how often the segments ran out
   uint32_t line;         ///< of the segment that is being run
+  uint64_t late_plans;   ///< how often the motion slowed down because nothing further was planned in time
 } shapegcode_state;
 
-/// A control. One thread may push, one may step, any may call the rest but create, destroy and restart.
+/// A control. One thread may push, one may step, one may plan, any may call the rest but create, destroy and restart.
 typedef struct shapegcode_controller shapegcode_controller;
 
 /// Makes a control at rest at zero. On any answer but SHAPEGCODE_OK `*controller` is NULL and `message` (may be NULL)
@@ -179,12 +184,17 @@ shapegcode_status shapegcode_controller_push_arc(shapegcode_controller* controll
                                                  int stop_at_end);
 
 /// The next set-point, of as many values as there are axes, and what the control does (`activity` may be NULL). From
-/// the real-time thread: no allocation, no lock, bounded work.
+/// the real-time thread: no allocation, no lock; bounded work, but for the planning with `plans_in_step`.
 shapegcode_status shapegcode_controller_step(shapegcode_controller* controller, double* set_point,
                                              shapegcode_activity* activity);
 
-/// Ratio of the programmed feeds; what is outside of 0 to 2 is taken as the nearer end. 0 acts from the next step on,
-/// another ratio after a period for each eight segments in sight.
+/// Plans on until enough lies ahead of the motion: from one thread, the pushing or another one, where `plans_in_step`
+/// is 0. Does not allocate. `has_worked` (may be NULL) is 0 if there was nothing to do: call it again after some
+/// periods.
+shapegcode_status shapegcode_controller_plan(shapegcode_controller* controller, int* has_worked);
+
+/// Ratio of the programmed feeds; what is outside of 0 to 2 is taken as the nearer end. It acts on what is not planned
+/// yet: after 8 to 32 periods and the lead; 0 is a hold.
 shapegcode_status shapegcode_controller_feed_override(shapegcode_controller* controller, double ratio);
 
 /// Come to rest along the path.
@@ -203,7 +213,7 @@ shapegcode_status shapegcode_controller_restart(shapegcode_controller* controlle
 shapegcode_status shapegcode_controller_state(const shapegcode_controller* controller, shapegcode_state* state,
                                               size_t struct_size);
 
-/// Mean delay of jerk time, correction, smoothing and shaper.
+/// Mean delay of correction, smoothing and shaper.
 shapegcode_status shapegcode_controller_delay(const shapegcode_controller* controller, double* periods);
 
 #ifdef __cplusplus

@@ -198,6 +198,13 @@ shapegcode_status shapegcode_controller_step(shapegcode_controller* controller, 
   return SHAPEGCODE_OK;
 }
 
+shapegcode_status shapegcode_controller_plan(shapegcode_controller* controller, int* has_worked) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  const bool worked = controller->control.plan();
+  if (has_worked != nullptr) *has_worked = worked ? 1 : 0;
+  return SHAPEGCODE_OK;
+}
+
 shapegcode_status shapegcode_controller_feed_override(shapegcode_controller* controller, double ratio) {
   if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
   controller->control.feed_override(ratio);
@@ -247,6 +254,7 @@ shapegcode_status shapegcode_controller_state(const shapegcode_controller* contr
   all.steps = now.steps;
   all.starvations = now.starvations;
   all.line = now.line;
+  all.late_plans = now.late_plans;
   std::memcpy(state, &all, struct_size);
   return SHAPEGCODE_OK;
 }

@@ -86,6 +86,9 @@ shapegcode_settings default_settings() {
   settings.contour_correction = defaults.contour_correction ? 1 : 0;
   settings.window = defaults.window;
   settings.queue = defaults.queue;
+  settings.plans_in_step = defaults.plans_in_step ? 1 : 0;
+  settings.lead_periods = defaults.lead_periods;
+  std::fill(std::begin(settings.following_tolerance), std::end(settings.following_tolerance), none.tolerance);
   return settings;
 }
 
@@ -120,8 +123,9 @@ ControllerSettings settings_of(const shapegcode_settings& given) {
   if (from.following_count > max_following_axes) {
     detail::refuse("following_count is {}, at most {} are possible", from.following_count, max_following_axes);
   }
-  for (const shapegcode_following_limits& axis : std::span(from.following, from.following_count)) {
-    settings.following.push_back({axis.max_feed, axis.max_acceleration, axis.max_jerk});
+  for (std::size_t i = 0; i < from.following_count; ++i) {
+    const shapegcode_following_limits& axis = from.following[i];
+    settings.following.push_back({axis.max_feed, axis.max_acceleration, axis.max_jerk, from.following_tolerance[i]});
   }
   settings.contour_tolerance_mm = from.contour_tolerance_mm;
   settings.smoothing_time_s = from.smoothing_time_s;
@@ -129,6 +133,8 @@ ControllerSettings settings_of(const shapegcode_settings& given) {
   settings.contour_correction = from.contour_correction != 0;
   settings.window = from.window;
   settings.queue = from.queue;
+  settings.plans_in_step = from.plans_in_step != 0;
+  settings.lead_periods = from.lead_periods;
   return settings;
 }
 

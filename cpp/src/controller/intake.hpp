@@ -1,43 +1,36 @@
-// The planning thread's side of a control: what is taken, and what a segment and its junction allow.
+// The pushing thread's side of a control: what is taken, and what a segment and its junction allow.
 #pragma once
 
-#include <array>
 #include <span>
 #include <vector>
 
-#include "controller/segment_ring.hpp"
+#include "planner/junction.hpp"
+#include "planner/segments.hpp"
 #include "shapegcode/controller.hpp"
 
 namespace shapegcode {
 
 class Intake {
  public:
-  Intake(const MotionLimits& limits, const std::vector<FollowingLimits>& following, const FilterTolerance& tolerance)
-      : limits_(limits),
-        following_(following),
-        tolerance_(tolerance),  // A segment of following axes alone knows no limit of X, Y and Z.
-        steepest_(following.empty() ? steepest_of(limits) : MotionLimits::none),
-        jump_time_s_(jump_time_s(limits, limits.jerk_time_s)) {}
+  /// `tolerance_mm`: what rounding may take of the contour tolerance; `corner_time_s`: of what the filters behind cut
+  /// off a corner that is passed at a speed, the time; 0: nothing.
+  Intake(const ControllerSettings& settings, double tolerance_mm, double corner_time_s);
 
   /// The next segment starts at this position, whatever came before.
   void restart(std::span<const double> position) noexcept;
   /// Fills an entry of the queue; unless it says `accepted`, nothing has happened.
-  PushResult take(const Segment& segment, std::span<const double> following_end, QueuedSegment& entry) noexcept;
+  PushResult take(const Segment& segment, std::span<const double> following_end, PlannedSegment& entry) noexcept;
 
  private:
-  PushResult copy(const Segment& segment, std::span<const double> following_end, QueuedSegment& entry) const noexcept;
-  void look_at(QueuedSegment& entry) const noexcept;
-  void look_at_jumps(QueuedSegment& entry) const noexcept;
+  PushResult copy(const Segment& segment, std::span<const double> following_end, PlannedSegment& entry) const noexcept;
+  void look_at(PlannedSegment& entry) const noexcept;
 
-  MotionLimits limits_;
-  std::vector<FollowingLimits> following_;
-  FilterTolerance tolerance_;
-  double steepest_;
-  double jump_time_s_;
-  Segment last_segment_;
-  std::array<double, max_following_axes> last_following_{}, last_rate_{};
-  double last_fastest_ = MotionLimits::none;
-  double last_passed_ = 0.0;
+  MotionLimits rules_;  // without those of the axes
+  MotionLimits corners_;
+  std::size_t n_following_;
+  PathTolerance tolerance_;
+  double tolerance_mm_, corner_time_s_;
+  PlannedSegment last_;
   bool has_last_ = false;
 };
 

@@ -5,11 +5,10 @@
 #include <cmath>
 
 #include "controller/intake.hpp"
-#include "controller/online_profile.hpp"
+#include "controller/online_planner.hpp"
 #include "controller/set_point_filters.hpp"
 #include "controller/settings.hpp"
 #include "controller/shared_state.hpp"
-#include "motion/speed_limits.hpp"
 #include "shapegcode/controller.hpp"
 
 namespace shapegcode {
@@ -58,12 +57,11 @@ class MotionController::Implementation {
   explicit Implementation(const ControllerSettings& settings)
       : n_following_((check_settings(settings), settings.following.size())),
         filters_(settings, axis_count + static_cast<int>(n_following_)),
-        limits_(planning_limits_of(settings, filters_)),
-        jerk_periods_(jerk_periods(settings)),
-        intake_(limits_, following_limits_of(settings, filters_), filters_.tolerance()),
-        ring_(std::bit_ceil(std::max(settings.queue, settings.window + 2))),
-        profile_(ring_, limits_, settings.window, settings.period_s),
-        smoothing_(Fir::moving_average(jerk_periods_), 1) {
+        intake_(settings, path_tolerance_of(settings, filters_), corner_time_of(filters_)),
+        queue_(std::bit_ceil(std::max(settings.queue, settings.window + 2))),
+        ring_(std::bit_ceil(queue_ + room_behind)),
+        planner_(ring_, planning_rules_of(settings, filters_)),
+        plans_in_step_(settings.plans_in_step) {
     override_.store(settings.limits.feed_override, std::memory_order_relaxed);
     restart(std::array<double, max_controller_axes>{});
   }
@@ -71,38 +69,35 @@ class MotionController::Implementation {
   PushResult push(const Segment& segment, std::span<const double> following_end) noexcept {
     if (abort_.load(std::memory_order_relaxed)) return PushResult::aborted;
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
-    if (head - tail_.load(std::memory_order_acquire) >= ring_.capacity()) return PushResult::queue_full;
+    if (head - planner_.running() >= queue_) return PushResult::queue_full;
     const PushResult result = intake_.take(segment, following_end, ring_[head]);
     if (result != PushResult::accepted) return result;
     head_.store(head + 1, std::memory_order_release);
     return PushResult::accepted;
   }
 
+  bool plan() noexcept {
+    if (is_stopping()) return false;
+    return planner_.plan(head_.load(std::memory_order_acquire), override_.load(std::memory_order_relaxed),
+                         settled_.load(std::memory_order_relaxed));
+  }
+
   Activity step(std::span<double> out) noexcept {
-    const bool stopping = hold_.load(std::memory_order_relaxed) || abort_.load(std::memory_order_relaxed);
-    profile_.stop(stopping);
-    profile_.override_feeds(override_.load(std::memory_order_relaxed));
-    profile_.look_ahead(head_.load(std::memory_order_acquire));
-    const bool settled = rest_periods_ >= settling_periods();
-    const bool rested = profile_.at_rest();
-    const double distance = profile_.distance();
-    profile_.advance(settled);
-    const bool restarted = profile_.has_restarted();
-    if (restarted) {
-      const double nothing = 0.0;
-      smoothing_.reset({&nothing, 1});
-      cursor_ = profile_.running();
-    }
-    // The last of a path may be gone within one period.
-    if (!rested || restarted || profile_.distance() != distance) rest_periods_ = 0;
-    rest_periods_ = profile_.at_rest() ? std::min(rest_periods_ + 1, settling_periods()) : 0;
-    stand_at(smoothed_distance());
+    Sections& sections = planner_.sections();
+    if (plans_in_step_ && sections.wants_more()) plan();
+    const PlannedPoint& point = sections.step(is_stopping());
+    if (sections.was_late()) ++state_.late_plans;
+    const bool rests = sections.at_rest();
+    rest_periods_ = rests ? std::min(rest_periods_ + 1, settled_periods()) : 0;
+    settled_.store(rest_periods_ == settled_periods(), std::memory_order_relaxed);
+    std::copy_n(point.position.begin(), axes(), position_.begin());
     filters_.step({position_.data(), axes()});
-    const Activity activity = activity_now();
-    if (activity == Activity::idle) end_exactly();
+    const Activity activity = activity_now(sections.current());
+    // At rest, to the last bit, whatever taps round to.
+    if (activity == Activity::idle) std::copy_n(point.position.begin(), axes(), position_.begin());
     std::copy_n(position_.begin(), std::min(out.size(), axes()), out.begin());
     ++state_.steps;
-    publish(activity);
+    publish(activity, point);
     return activity;
   }
 
@@ -115,117 +110,84 @@ class MotionController::Implementation {
   bool restart(std::span<const double> position) noexcept {
     if (!std::ranges::all_of(position, [](double value) { return std::isfinite(value); })) return false;
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
-    tail_.store(head, std::memory_order_relaxed);
     hold_.store(false, std::memory_order_relaxed);
     abort_.store(false, std::memory_order_relaxed);
-    rest_ = {};
-    std::copy_n(position.begin(), std::min(position.size(), axes()), rest_.begin());
-    position_ = rest_;
-    intake_.restart({rest_.data(), axes()});
-    profile_.restart(head);
-    cursor_ = head;
-    has_cursor_ = false;
-    const double nothing = 0.0;
-    smoothing_.reset({&nothing, 1});
-    filters_.reset({rest_.data(), axes()});
-    rest_periods_ = settling_periods();
+    AxisValues rest{};
+    std::copy_n(position.begin(), std::min(position.size(), axes()), rest.begin());
+    std::copy_n(rest.begin(), axes(), position_.begin());
+    intake_.restart({position_.data(), axes()});
+    planner_.restart(head, rest);
+    filters_.reset({position_.data(), axes()});
+    rest_periods_ = settled_periods();
+    settled_.store(true, std::memory_order_relaxed);
     state_ = {};
     first_ = head;
-    ran_out_ = true;
-    publish(Activity::idle);
+    runs_out_ = false;
+    publish(Activity::idle, planner_.sections().current().before[0]);
     return true;
   }
 
   [[nodiscard]] ControllerState state() const noexcept { return shared_.read(); }
   [[nodiscard]] std::size_t axes() const noexcept { return axis_count + n_following_; }
-  [[nodiscard]] double delay_periods() const noexcept { return 0.5 * (jerk_periods_ - 1) + filters_.mean_samples(); }
+  [[nodiscard]] double delay_periods() const noexcept { return filters_.mean_samples(); }
   [[nodiscard]] int correction_delay() const noexcept { return filters_.correction_samples(); }
-  [[nodiscard]] const MotionLimits& limits() const noexcept { return limits_; }
-  [[nodiscard]] const FilterTolerance& tolerance() const noexcept { return filters_.tolerance(); }
 
  private:
-  [[nodiscard]] int settling_periods() const noexcept { return jerk_periods_ + filters_.duration_samples(); }
-
-  double smoothed_distance() noexcept {
-    double distance = profile_.distance();
-    smoothing_.step({&distance, 1}, {&distance, 1});
-    // At rest, whatever the running sum rounds to.
-    return rest_periods_ >= jerk_periods_ ? profile_.distance() : distance;
+  // At rest for so long what leaves the filters is at rest: the first period counts.
+  [[nodiscard]] int settled_periods() const noexcept { return filters_.duration_samples() + 1; }
+  [[nodiscard]] bool is_stopping() const noexcept {
+    return hold_.load(std::memory_order_relaxed) || abort_.load(std::memory_order_relaxed) ||
+           override_.load(std::memory_order_relaxed) <= 0.0;
   }
 
-  // The point of the path at a distance.
-  void stand_at(double distance) noexcept {
-    while (cursor_ + 1 < profile_.entered() && distance >= ring_[cursor_ + 1].distance) ++cursor_;
-    has_cursor_ = has_cursor_ || cursor_ < profile_.absorbed();
-    if (!has_cursor_) {
-      position_ = rest_;
-      return;
-    }
-    const QueuedSegment& entry = ring_[cursor_];
-    const double along = distance - entry.distance;
-    const Vector3 point = point_at(entry.segment, along);
-    for (int i = 0; i < axis_count; ++i) position_[static_cast<std::size_t>(i)] = point[i];
-    const double within = std::clamp(along, 0.0, entry.segment.length_mm);
-    for (std::size_t i = 0; i < n_following_; ++i) {
-      position_[axis_count + i] = entry.following_start[i] + entry.following_rate[i] * within;
-    }
-    tail_.store(cursor_, std::memory_order_release);
-  }
-
-  // At rest at the end of what was pushed: to the last bit, whatever distances and taps round to.
-  void end_exactly() noexcept {
-    if (!has_cursor_) return;
-    const QueuedSegment& last = ring_[cursor_];
-    std::copy_n(last.segment.end_mm.data(), axis_count, position_.begin());
-    std::copy_n(last.following_end.begin(), n_following_, position_.begin() + axis_count);
-  }
-
-  Activity activity_now() noexcept {
-    const bool settled = rest_periods_ >= settling_periods();
-    const bool stopping = hold_.load(std::memory_order_relaxed);
-    const bool out = profile_.ran_out();
-    if (out && !ran_out_ && !ring_[profile_.running() - 1].segment.stop_at_end) ++state_.starvations;
-    ran_out_ = out;
+  Activity activity_now(const Section& section) noexcept {
+    const bool rests = planner_.sections().at_rest();
+    const bool settled = rests && rest_periods_ == settled_periods();
     if (abort_.load(std::memory_order_relaxed)) return settled ? Activity::aborted : Activity::stopping;
-    if (stopping) return settled ? Activity::held : Activity::stopping;
-    if (out && settled) return Activity::idle;
-    if (out && !ring_[profile_.running() - 1].segment.stop_at_end) return Activity::starved;
-    return Activity::moving;
+    if (hold_.load(std::memory_order_relaxed)) return settled ? Activity::held : Activity::stopping;
+    const bool is_last = section.done == head_.load(std::memory_order_relaxed);
+    const bool runs_out = section.runs_out && is_last;
+    if (runs_out && !runs_out_) ++state_.starvations;
+    runs_out_ = runs_out;
+    if (settled && is_last) return Activity::idle;
+    return runs_out ? Activity::starved : Activity::moving;
   }
 
-  void publish(Activity activity) noexcept {
+  void publish(Activity activity, const PlannedPoint& point) noexcept {
+    const Section& section = planner_.sections().current();
+    const std::uint64_t running = planner_.sections().at_rest() ? section.done : point.point.segment;
     state_.activity = activity;
     std::copy_n(position_.begin(), axes(), state_.set_point.begin());
-    state_.speed_mm_per_s = profile_.speed();
-    state_.distance_mm = profile_.distance();
+    state_.speed_mm_per_s = point.point.state.speed;
+    state_.distance_mm = point.distance;
     state_.feed_override = override_.load(std::memory_order_relaxed);
-    state_.line = has_cursor_ ? ring_[cursor_].segment.line : 0;
-    state_.segments_done = profile_.running() - first_;
-    state_.segments_waiting = head_.load(std::memory_order_relaxed) - profile_.running();
+    state_.line = point.line;
+    state_.segments_done = running - first_;
+    state_.segments_waiting = head_.load(std::memory_order_relaxed) - running;
     shared_.write(state_);
   }
 
+  // For segments that are done with, but whose roundings may reach what follows.
+  static constexpr std::size_t room_behind = RoundedPath::lookback + 1;
+
   std::size_t n_following_;
   SetPointFilters filters_;
-  MotionLimits limits_;
-  int jerk_periods_;
-  Intake intake_;  // of the planning thread
+  Intake intake_;  // of the pushing thread
+  std::size_t queue_;
   SegmentRing ring_;
+  OnlinePlanner planner_;
+  bool plans_in_step_;
   std::atomic<std::uint64_t> head_{0};  // the next segment to be pushed
-  std::atomic<std::uint64_t> tail_{0};  // the oldest one that is still needed
   std::atomic<double> override_{1.0};
   std::atomic<bool> hold_{false};
   std::atomic<bool> abort_{false};
+  std::atomic<bool> settled_{true};
 
   // Of the real-time thread.
-  OnlineProfile profile_;
-  FirStream smoothing_;
-  std::uint64_t cursor_ = 0;  // segment of the set-point before the filters
   std::uint64_t first_ = 0;
-  bool has_cursor_ = false;
-  bool ran_out_ = true;
+  bool runs_out_ = false;
   int rest_periods_ = 0;
-  std::array<double, max_controller_axes> position_{}, rest_{};
+  std::array<double, max_controller_axes> position_{};
   ControllerState state_;
   SharedState shared_;
 };
@@ -239,6 +201,7 @@ MotionController& MotionController::operator=(MotionController&&) noexcept = def
 PushResult MotionController::push(const Segment& segment, std::span<const double> following_end) noexcept {
   return implementation_->push(segment, following_end);
 }
+bool MotionController::plan() noexcept { return implementation_->plan(); }
 Activity MotionController::step(std::span<double> out) noexcept { return implementation_->step(out); }
 void MotionController::feed_override(double ratio) noexcept { implementation_->feed_override(ratio); }
 void MotionController::hold() noexcept { implementation_->hold(true); }
@@ -249,7 +212,5 @@ ControllerState MotionController::state() const noexcept { return implementation
 int MotionController::axes() const noexcept { return static_cast<int>(implementation_->axes()); }
 double MotionController::delay_periods() const noexcept { return implementation_->delay_periods(); }
 int MotionController::correction_delay() const noexcept { return implementation_->correction_delay(); }
-const MotionLimits& MotionController::planning_limits() const noexcept { return implementation_->limits(); }
-const FilterTolerance& MotionController::planning_tolerance() const noexcept { return implementation_->tolerance(); }
 
 }  // namespace shapegcode

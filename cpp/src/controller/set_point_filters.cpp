@@ -11,6 +11,9 @@
 namespace shapegcode {
 namespace {
 
+// By which a sum of taps may miss 1.
+constexpr double tap_rounding = 1e-12;
+
 // Sums of taps that are 1 to the last bits only would move the machine when it is at rest.
 Fir scaled_to_one(const Fir& fir) {
   if (fir.is_moving_average() || fir.decay() != 0.0) return fir;
@@ -105,25 +108,15 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
 void SetPointFilters::measure(const Fir& chain, double period_s) {
   const std::vector<double>& taps = chain.taps();
   double gain = 0.0;
-  double highest = 0.0;
-  double steepest = 0.0;
   double deviation = 0.0;
-  double before = 0.0;
   const double mean = chain.mean_samples();
-  for (std::size_t k = 0; k <= taps.size(); ++k) {
-    const double tap = k < taps.size() ? taps[k] : 0.0;
-    gain += std::abs(tap);
-    highest = std::max(highest, std::abs(tap));
-    steepest = std::max(steepest, std::abs(tap - before));
-    deviation += std::abs(tap) * std::abs(static_cast<double>(k) - mean);
-    before = tap;
+  for (std::size_t k = 0; k < taps.size(); ++k) {
+    gain += std::abs(taps[k]);
+    deviation += std::abs(taps[k]) * std::abs(static_cast<double>(k) - mean);
   }
   duration_ = std::max(duration_, static_cast<int>(taps.size()) - 1);
   mean_ = std::max(mean_, mean);
-  gain_ = std::max(gain_, gain);
-  jumps_.duration_s = std::max(jumps_.duration_s, static_cast<double>(taps.size()) * period_s);
-  jumps_.acceleration_per_s = std::max(jumps_.acceleration_per_s, highest / period_s);
-  jumps_.jerk_per_s2 = std::max(jumps_.jerk_per_s2, steepest / (period_s * period_s));
+  if (gain > 1.0 + tap_rounding) gain_ = std::max(gain_, gain);
   // After the correction rounding may leave less than nothing.
   const double variance = correction_delay_ > 0 ? 0.0 : chain.variance_samples2();
   tolerance_.variance_s2 = std::max(tolerance_.variance_s2, variance * period_s * period_s);

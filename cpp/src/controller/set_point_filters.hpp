@@ -24,8 +24,6 @@ class SetPointFilters {
   [[nodiscard]] int duration_samples() const noexcept { return duration_; }
   [[nodiscard]] double mean_samples() const noexcept { return mean_; }
   [[nodiscard]] int correction_samples() const noexcept { return correction_delay_; }
-  /// Largest response of any axis to a jump.
-  [[nodiscard]] const JumpResponse& jumps() const noexcept { return jumps_; }
   /// Largest sum of the magnitudes of an axis' taps: by how much it may exceed what comes in.
   [[nodiscard]] double gain() const noexcept { return gain_; }
   /// What a shaper costs while it follows a position.
@@ -54,7 +52,6 @@ class SetPointFilters {
   int duration_ = 0;
   double mean_ = 0.0;
   int correction_delay_ = 0;
-  JumpResponse jumps_;
   double gain_ = 1.0;
   ChangeCost change_;
   FilterTolerance tolerance_;

@@ -11,10 +11,14 @@ namespace shapegcode {
 namespace {
 
 constexpr std::size_t min_window = 8;
+constexpr int max_lead = 10'000;
 constexpr std::size_t max_segments = std::size_t{1} << 24;
 
 // Share of acceleration and jerk that the changes of a shaper may take which follows a position.
 constexpr double change_share = 0.25;
+
+// Stands for no limit of the acceleration, mm/s^2.
+constexpr double no_acceleration = 1e8;
 
 bool changes(const SetPointFilters& filters) noexcept { return filters.change().acceleration_per_mm > 0.0; }
 
@@ -50,18 +54,10 @@ double changing_speed(const ControllerSettings& settings, const SetPointFilters&
 
 }  // namespace
 
-int jerk_periods(const ControllerSettings& settings) {
-  double longest_s = jerk_time(settings.limits, MotionLimits::none);
-  for (const FollowingLimits& axis : settings.following) {
-    if (std::isfinite(axis.max_jerk)) longest_s = std::max(longest_s, 2.0 * axis.max_acceleration / axis.max_jerk);
-  }
-  const double periods = std::ceil(longest_s / settings.period_s - 1e-9);
-  return std::max(1, static_cast<int>(require_count(periods, max_filter_samples, "the jerk time", "periods")));
-}
-
 void check_settings(const ControllerSettings& settings) {
   require_period(settings.period_s);
-  check_limits(settings.limits, {settings.contour_tolerance_mm, 1.0, 0.0, 0.0});
+  check_limits(settings.limits, {});
+  require(settings.contour_tolerance_mm >= 0.0, "contour tolerance", settings.contour_tolerance_mm, "mm", ">= 0");
   require(settings.limits.feed_override <= max_override, "feed override", settings.limits.feed_override, "", "<= 2");
   if (settings.following.size() > max_following_axes) {
     detail::refuse("{} following axes, at most {} are possible", settings.following.size(), max_following_axes);
@@ -80,41 +76,69 @@ void check_settings(const ControllerSettings& settings) {
     require(axis.max_feed > 0.0, "feed limit of a following axis", axis.max_feed, "", "> 0");
     require(axis.max_acceleration > 0.0, "acceleration limit of a following axis", axis.max_acceleration, "", "> 0");
     require(axis.max_jerk > 0.0, "jerk limit of a following axis", axis.max_jerk, "", "> 0");
+    require(axis.tolerance >= 0.0, "tolerance of a following axis", axis.tolerance, "", ">= 0");
     jerk_has_acceleration(axis.max_jerk, axis.max_acceleration, axis_count + i);
   }
+  require(settings.lead_periods >= 0 && settings.lead_periods <= max_lead, "lead",
+          static_cast<double>(settings.lead_periods), "periods", "0 ... 10000");
   require(settings.window >= min_window && settings.window <= max_segments, "window",
           static_cast<double>(settings.window), "segments", "8 ... 16777216");
   require(settings.queue <= max_segments, "queue", static_cast<double>(settings.queue), "segments", "0 ... 16777216");
 }
 
-MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
+namespace {
+
+AxisLimits axis_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
   const double share = own_share(filters) / filters.gain();
-  MotionLimits limits = settings.limits;
-  limits.feed_override = 1.0;  // the one at the begin may be raised later; zones reach as far as any can be
-  const int periods = jerk_periods(settings);
-  limits.jerk_time_s = periods > 1 ? periods * settings.period_s : 0.0;
-  limits.max_feed_mm_per_s = (limits.max_feed_mm_per_s / filters.gain()).cwiseMin(changing_speed(settings, filters));
-  limits.max_acceleration_mm_per_s2 *= share;
-  limits.max_jerk_mm_per_s3 *= share;
-  const bool limited = limits.max_acceleration_mm_per_s2.minCoeff() < MotionLimits::none ||
-                       std::ranges::any_of(settings.following, [](const FollowingLimits& axis) {
-                         return axis.max_acceleration < MotionLimits::none;
-                       });
-  if (limited) limits.jumps = filters.jumps();
+  const double speed = changing_speed(settings, filters);
+  AxisLimits limits;
+  limits.axes = axis_count + settings.following.size();
+  for (std::size_t i = 0; i < limits.axes; ++i) {
+    if (i < axis_count) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      limits.speed[i] = std::min(settings.limits.max_feed_mm_per_s[axis] / filters.gain(), speed);
+      limits.acceleration[i] = settings.limits.max_acceleration_mm_per_s2[axis];
+      limits.jerk[i] = settings.limits.max_jerk_mm_per_s3[axis];
+    } else {
+      const FollowingLimits& axis = settings.following[i - axis_count];
+      limits.speed[i] = axis.max_feed / filters.gain();
+      if (changes(filters)) {
+        limits.speed[i] = std::min(limits.speed[i], feed_beside_changes(axis, speed, filters.change()));
+      }
+      limits.acceleration[i] = axis.max_acceleration;
+      limits.jerk[i] = axis.max_jerk;
+    }
+    limits.acceleration[i] = std::min(limits.acceleration[i], no_acceleration) * share;
+    limits.jerk[i] *= share;
+  }
   return limits;
 }
 
-std::vector<FollowingLimits> following_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
-  const double share = own_share(filters) / filters.gain();
-  const double speed = changing_speed(settings, filters);
-  std::vector<FollowingLimits> limits = settings.following;
-  for (FollowingLimits& axis : limits) {
-    axis.max_feed /= filters.gain();
-    if (changes(filters)) axis.max_feed = std::min(axis.max_feed, feed_beside_changes(axis, speed, filters.change()));
-    axis.max_acceleration *= share;
-    axis.max_jerk *= share;
+}  // namespace
+
+PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPointFilters& filters) {
+  if (filters.duration_samples() > 0) {
+    require(settings.contour_tolerance_mm > 0.0, "contour tolerance with smoothing or shaper",
+            settings.contour_tolerance_mm, "mm", "> 0");
   }
-  return limits;
+  PlanningRules rules;
+  rules.period_s = settings.period_s;
+  rules.limits = axis_limits_of(settings, filters);
+  // What filters behind cut off a path that bends at an acceleration a across it is half their variance times a.
+  const double variance_s2 = filters.tolerance().variance_s2;
+  if (variance_s2 > 0.0) rules.max_across = settings.contour_tolerance_mm / variance_s2;
+  rules.window = settings.window;
+  rules.lead_periods = settings.plans_in_step ? 0 : settings.lead_periods;
+  rules.settling_periods = filters.duration_samples();
+  return rules;
+}
+
+double path_tolerance_of(const ControllerSettings& settings, const SetPointFilters& filters) {
+  return filters.duration_samples() > 0 ? 0.5 * settings.contour_tolerance_mm : settings.contour_tolerance_mm;
+}
+
+double corner_time_of(const SetPointFilters& filters) {
+  return filters.correction_samples() > 0 ? 0.5 * filters.tolerance().mean_deviation_s : 0.0;
 }
 
 }  // namespace shapegcode

@@ -1,23 +1,24 @@
 // What the settings of a control come to.
 #pragma once
 
-#include <vector>
-
+#include "controller/online_planner.hpp"
 #include "controller/set_point_filters.hpp"
 #include "shapegcode/controller.hpp"
 
 namespace shapegcode {
 
-/// Throws Error(argument) on settings that are none, with value and limit.
+/// By how much the feeds may be raised.
+inline constexpr double max_override = 2.0;
+
+/// Throws Error(argument) on invalid settings, with value and limit.
 void check_settings(const ControllerSettings& settings);
 
-/// Periods of the smoothing by the jerk time; 1 = none. Whole ones, so that it lasts what was asked for at least.
-[[nodiscard]] int jerk_periods(const ControllerSettings& settings);
-
-/// Limits of the path, so that what leaves the filters keeps those of the settings; their jerk time is that of the
-/// smoothing, 0 = none.
-[[nodiscard]] MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPointFilters& filters);
-[[nodiscard]] std::vector<FollowingLimits> following_limits_of(const ControllerSettings& settings,
-                                                               const SetPointFilters& filters);
+/// Limits of the motion along the path, so that what leaves the filters keeps those of the settings.
+[[nodiscard]] PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPointFilters& filters);
+/// What rounding may take of the contour tolerance: half of it where filters behind take the other half, mm.
+[[nodiscard]] double path_tolerance_of(const ControllerSettings& settings, const SetPointFilters& filters);
+/// Where a contour correction leaves only what filters cut off corners: of that the time, by which it grows with the
+/// speed.
+[[nodiscard]] double corner_time_of(const SetPointFilters& filters);
 
 }  // namespace shapegcode

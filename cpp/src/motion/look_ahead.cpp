@@ -18,10 +18,7 @@ namespace {
 // What the junctions and segments of a path allow.
 struct PathSpeeds {
   std::vector<double> on_segment;
-  std::vector<double> corner;   // [i]: where segment i is entered
-  std::vector<Jump> jump;       // the same
-  std::vector<double> fastest;  // of each segment, ever; these are empty if nobody looks at jumps
-  std::vector<double> passed;   // [i]: highest speed at which segment i is ever entered
+  std::vector<double> corner;  // [i]: where segment i is entered
   double jerk_s = 0.0;
   double corner_spread_s = 0.0;  // time around a corner in which its speed holds, beside that
 };
@@ -32,11 +29,6 @@ PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const Filte
   PathSpeeds speeds;
   speeds.on_segment.resize(n);
   speeds.corner.assign(n + 1, MotionLimits::none);
-  if (looks_at_jumps(limits)) {
-    speeds.jump.assign(n, Jump::none);
-    speeds.fastest.resize(n);
-    speeds.passed.resize(n);
-  }
   double steepest = 0.0;
   Segment before;
   for (std::size_t i = 0; i < n; ++i) {
@@ -49,17 +41,6 @@ PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const Filte
     }
     if (i > 0) {
       corner = corner_speed_limit(before, segment, limits, filter);
-    }
-    if (looks_at_jumps(limits)) {
-      speeds.fastest[i] = fastest_speed(segment, limits, filter);
-    }
-    if (i > 0 && looks_at_jumps(limits)) {
-      const JunctionJumps jumps = junction_jumps(before, segment);
-      const double fastest = std::min(speeds.fastest[i - 1], speeds.fastest[i]);
-      speeds.jump[i] = jumps.kind;
-      corner = std::min(corner, junction_jump_speed(before, segment, limits, jumps, fastest));
-      speeds.passed[i] =
-          std::min({corner, fastest, attainable(speeds.passed[i - 1], before.length_mm, steepest_of(limits))});
     }
     if (caps != nullptr) {
       speed = std::min(speed, static_cast<double>(caps->on_segment[i]));
@@ -76,27 +57,16 @@ PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const Filte
 class Zones {
  public:
   Zones(const Path& path, const MotionLimits& limits, const PathSpeeds& speeds) {
-    if (speeds.jerk_s + speeds.corner_spread_s <= 0.0 && limits.feed_spread_s <= 0.0 && speeds.jump.empty()) {
-      return;
-    }
+    if (speeds.jerk_s + speeds.corner_spread_s <= 0.0 && limits.feed_spread_s <= 0.0) return;
     const std::size_t n = path.size();
     const auto sweep = [&](std::size_t from, std::size_t into, ZoneSet carry, SteadyColumn<ZoneSet>& zones) {
       const std::size_t junction = std::max(from, into);
-      const bool looks = !speeds.jump.empty();
-      Zone jump;
-      if (looks && speeds.jump[junction] != Jump::none) {
-        jump = zone_of_jump(speeds.jump[junction], speeds.passed[junction], steepest_of(limits),
-                            jump_time_s(limits, speeds.jerk_s));
-      }
       const double corner = speeds.corner[junction];
       extend(carry, junction_zones({speeds.on_segment[from], path.feed_mm_per_s(from) * limits.feed_override,
-                                    speeds.on_segment[into], corner, jump},
+                                    speeds.on_segment[into], corner},
                                    limits, speeds.jerk_s));
       if (speeds.corner_spread_s > 0.0 && corner < speeds.on_segment[into]) {
         extend(carry[corner_zone], {corner, slow_reach(corner, speeds.corner_spread_s)});
-      }
-      if (looks) {
-        cut_to(carry, speeds.fastest[into], jump_time_s(limits, speeds.jerk_s));
       }
       zones.push_back(carry);
       return beyond(carry, path[into].length_mm);
@@ -114,9 +84,9 @@ class Zones {
   }
 
   [[nodiscard]] bool empty() const noexcept { return at_start_.size() == 0; }
-  std::size_t split(std::size_t i, const Segment& segment, double limit, double beside_turn,
+  std::size_t split(std::size_t i, const Segment& segment, double limit,
                     std::array<Section, max_pieces>& out) const noexcept {
-    return split_segment(at_start_[i], at_end_[at_end_.size() - 1 - i], segment.length_mm, limit, beside_turn, out);
+    return split_segment(at_start_[i], at_end_[at_end_.size() - 1 - i], segment.length_mm, limit, out);
   }
 
  private:
@@ -132,14 +102,13 @@ std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, con
   for (std::size_t i = 0; i < path.size(); ++i) {
     std::size_t count = 1;
     const Segment segment = path[i];
-    sections[0] = {segment.length_mm, speeds.on_segment[i], false};
+    sections[0] = {segment.length_mm, speeds.on_segment[i]};
     if (!zones.empty()) {
-      const double beside_turn = speeds.jump.empty() ? MotionLimits::none : limit_beside_turn(segment, limits);
-      count = zones.split(i, segment, speeds.on_segment[i], beside_turn, sections);
+      count = zones.split(i, segment, speeds.on_segment[i], sections);
     }
     for (std::size_t k = 0; k < count; ++k) {
-      const auto& [length, limit, reduced] = sections[k];
-      pieces.push_back({length, limit, segment_acceleration(segment, limit, limits, reduced), MotionLimits::none});
+      const auto& [length, limit] = sections[k];
+      pieces.push_back({length, limit, segment_acceleration(segment, limit, limits), MotionLimits::none});
     }
   }
   return pieces;
@@ -213,7 +182,7 @@ std::size_t joined(std::array<Section, max_pieces>& sections, std::size_t count)
     Section& before = sections[last];
     const bool is_short = std::min(before.length, sections[k].length) < shortest_section_mm;
     if (is_short || before.limit == sections[k].limit) {
-      before = {before.length + sections[k].length, std::min(before.limit, sections[k].limit), false};
+      before = {before.length + sections[k].length, std::min(before.limit, sections[k].limit)};
     } else {
       sections[++last] = sections[k];
     }
@@ -264,9 +233,9 @@ FeedSections feed_sections(const Path& path, const MotionLimits& limits, const F
   for (std::size_t i = 0; i < path.size(); ++i) {
     const Segment segment = path[i];
     std::size_t count = 1;
-    sections[0] = {segment.length_mm, speeds.on_segment[i], false};
+    sections[0] = {segment.length_mm, speeds.on_segment[i]};
     if (!zones.empty() && segment.length_mm > 0.0) {
-      count = zones.split(i, segment, speeds.on_segment[i], MotionLimits::none, sections);
+      count = zones.split(i, segment, speeds.on_segment[i], sections);
       count = joined(sections, count);
     }
     double begin = 0.0;

@@ -1,5 +1,5 @@
 // Sections of path with one limit each, the speeds where they meet, and the phases of constant acceleration within
-// them. Used by both forms of the look-ahead: over a whole path, and over a window of it.
+// them.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ struct Piece {
   double start_speed = 0.0;
 };
 
-/// A slow or reduced section that reaches over a junction into a neighbour.
+/// A slow section that reaches over a junction into a neighbour.
 struct Zone {
   double limit = MotionLimits::none;
   double reach = 0.0;
@@ -46,21 +46,12 @@ struct JunctionSpeeds {
   double from_feed = 0.0;  ///< its programmed feed
   double into = 0.0;       ///< limit of the segment that it reaches into
   double corner = MotionLimits::none;
-  Zone jump;  ///< see zone_of_jump; none: nothing jumps
 };
 
-/// The zones of a junction: of its speed, or of a slower segment, which the smoothing by the jerk time mixes; of a
-/// lower programmed feed, for what a filter mixes; and of a jump, beside which the path is accelerated gently. The last
-/// has no speed, but the kind of the jump in its place, the greatest being the least.
-enum ZoneKind : std::size_t { corner_zone, slow_zone, feed_zone, jump_zone, zone_kinds };
+/// The zones of a junction: of its speed, or of a slower segment, which the smoothing by the jerk time mixes; and of a
+/// lower programmed feed, for what a filter mixes.
+enum ZoneKind : std::size_t { corner_zone, slow_zone, feed_zone, zone_kinds };
 using ZoneSet = std::array<Zone, zone_kinds>;
-
-/// The zone of a jump that is passed at most at `speed`: as far as the path goes within the time that counts, if
-/// nothing is accelerated by more than `steepest`. It is the same whatever the override is, so that what the machine is
-/// told to do stays possible when it is turned.
-inline Zone zone_of_jump(Jump jump, double speed, double steepest, double time_s) noexcept {
-  return {static_cast<double>(jump), time_s * (speed + 0.5 * steepest * time_s)};
-}
 
 /// How far before and behind a slow position the smoothing by the jerk time wants its speed.
 inline double slow_reach(double speed, double jerk_s) noexcept { return 0.5 * speed * jerk_s; }
@@ -74,7 +65,6 @@ inline ZoneSet junction_zones(const JunctionSpeeds& at, const MotionLimits& limi
   if (limits.feed_spread_s > 0.0 && at.from_feed * (1.0 + limits.feed_excess_ratio) < at.into) {
     zones[feed_zone] = {at.from_feed, at.from_feed * (limits.feed_spread_s + 0.5 * jerk_s)};
   }
-  zones[jump_zone] = at.jump;
   return zones;
 }
 
@@ -88,33 +78,17 @@ inline ZoneSet beyond(const ZoneSet& zones, double length) noexcept {
   return left;
 }
 
-/// Largest acceleration along any path of X, Y and Z.
-inline double steepest_of(const MotionLimits& limits) noexcept { return limits.max_acceleration_mm_per_s2.norm(); }
-
-/// Speed at the end of a segment that is entered at a speed, whatever the override is.
-inline double attainable(double speed, double length, double steepest) noexcept {
-  return std::sqrt(speed * speed + 2.0 * steepest * length);
-}
-
-/// A zone as far as it reaches into a segment that is never run faster than `fastest`: no farther than the time that
-/// counts lets it.
-inline void cut_to(ZoneSet& zones, double fastest, double time_s) noexcept {
-  zones[jump_zone].reach = std::min(zones[jump_zone].reach, fastest * time_s);
-}
-
 /// Of a segment: a border on each side of each zone, at most.
 inline constexpr std::size_t max_pieces = 2 * zone_kinds + 1;
 
 struct Section {
   double length = 0.0;
   double limit = 0.0;
-  bool reduced = false;
 };
 
 /// The sections between the borders of a segment's zones; their number is returned.
-/// `beside_turn`: limit beside a jump of direction.
 inline std::size_t split_segment(const ZoneSet& at_start, const ZoneSet& at_end, double length, double limit,
-                                 double beside_turn, std::array<Section, max_pieces>& sections) noexcept {
+                                 std::array<Section, max_pieces>& sections) noexcept {
   std::array<double, max_pieces + 1> marks{0.0, length};
   std::size_t count = 2;
   const auto mark = [&](double at) {  // in their order
@@ -128,22 +102,14 @@ inline std::size_t split_segment(const ZoneSet& at_start, const ZoneSet& at_end,
     if (from_start > 0.0 && from_start < length) mark(from_start);
     if (from_end > 0.0 && from_end < length) mark(length - from_end);
   }
-  const auto keep = [&](Section& section, std::size_t kind, double of_zone) {
-    if (kind == jump_zone) {
-      section.reduced = true;
-      if (of_zone == static_cast<double>(Jump::turn)) section.limit = std::min(section.limit, beside_turn);
-    } else {
-      section.limit = std::min(section.limit, of_zone);
-    }
-  };
   std::size_t made = 0;
   for (std::size_t k = 0; k + 1 < count; ++k) {
     if (marks[k + 1] <= marks[k]) continue;
     const double middle = 0.5 * (marks[k] + marks[k + 1]);
-    Section section{marks[k + 1] - marks[k], limit, false};
+    Section section{marks[k + 1] - marks[k], limit};
     for (std::size_t kind = 0; kind < zone_kinds; ++kind) {
-      if (middle < at_start[kind].reach) keep(section, kind, at_start[kind].limit);
-      if (middle > length - at_end[kind].reach) keep(section, kind, at_end[kind].limit);
+      if (middle < at_start[kind].reach) section.limit = std::min(section.limit, at_start[kind].limit);
+      if (middle > length - at_end[kind].reach) section.limit = std::min(section.limit, at_end[kind].limit);
     }
     sections[made++] = section;
   }

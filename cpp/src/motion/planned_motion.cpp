@@ -11,7 +11,7 @@
 namespace shapegcode {
 
 bool PlainPlan::serves(const MotionLimits& limits) noexcept {
-  return !looks_at_jumps(limits) && limits.feed_spread_s <= 0.0 && !(jerk_time(limits, MotionLimits::none) > 0.0) &&
+  return limits.feed_spread_s <= 0.0 && !(jerk_time(limits, MotionLimits::none) > 0.0) &&
          !limits.max_jerk_mm_per_s3.array().isFinite().any();
 }
 

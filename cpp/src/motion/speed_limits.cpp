@@ -15,11 +15,10 @@ constexpr double standstill_mm_per_s = 1e-3;
 // A tangent junction to within what the least increment lets a program say (1 um over 1 mm).
 constexpr double tangent_change = 1e-6;
 
-// Shares of acceleration and jerk. Beside a jump, half is the jump's. On an arc a quarter of the jerk is that of the
-// turn itself; what is left along and across the path adds up, as vectors, to less than the whole (beside a jump:
-// half).
-constexpr double jump_share = 0.5;
-constexpr double turning_share = 0.25;
+// Share of the acceleration of an axis that is that of the turn on an arc, at most; what is left along the path is at
+// least the root of what the square of that leaves.
+constexpr double turning_share = 0.9;
+constexpr double left_squared = 0.19;
 
 // Infinity switches a limit off.
 void require_limit(double value, const char* name, const char* unit) { require(value > 0.0, name, value, unit, "> 0"); }
@@ -52,7 +51,8 @@ double arc_centripetal_limit(const Segment& segment, const MotionLimits& limits)
   double limit = limits.centripetal_acceleration_mm_per_s2;
   for (int i = 0; i < axis_count; ++i) {
     if (i != segment.normal) {
-      limit = std::min({limit, 0.9 * limits.max_acceleration_mm_per_s2[i], limits.contour_acceleration_mm_per_s2[i]});
+      limit = std::min(
+          {limit, turning_share * limits.max_acceleration_mm_per_s2[i], limits.contour_acceleration_mm_per_s2[i]});
     }
   }
   return limit;
@@ -65,9 +65,6 @@ double arc_jerk_speed(const Segment& segment, const MotionLimits& limits) noexce
     if (i != segment.normal) {
       jerk = std::min(jerk, limits.max_jerk_mm_per_s3[i]);
     }
-  }
-  if (looks_at_jumps(limits)) {
-    jerk *= turning_share;
   }
   const double bend = curvature(segment);
   return std::isfinite(jerk) && bend > 0.0 ? std::cbrt(jerk / (bend * bend)) : MotionLimits::none;
@@ -132,24 +129,11 @@ void check_limits(const MotionLimits& limits, const FilterTolerance& filter) {
   }
 }
 
-double segment_acceleration(const Segment& segment, double speed_limit, const MotionLimits& limits,
-                            bool reduced) noexcept {
-  const double whole = tangential_limit(axis_share(segment), limits.max_acceleration_mm_per_s2);
-  double axes = whole;
-  const bool turns = segment.kind == SegmentKind::arc && std::isfinite(axes);
-  if (turns) {
+double segment_acceleration(const Segment& segment, double speed_limit, const MotionLimits& limits) noexcept {
+  double axes = tangential_limit(axis_share(segment), limits.max_acceleration_mm_per_s2);
+  if (segment.kind == SegmentKind::arc && std::isfinite(axes)) {
     const double turning = speed_limit * speed_limit * curvature(segment);
-    axes = std::sqrt(std::max(0.19 * axes * axes, axes * axes - turning * turning));
-  }
-  if (looks_at_jumps(limits)) {
-    const double jerk = limits.max_jerk_mm_per_s3.minCoeff();
-    if (!turns || !std::isfinite(jerk)) {
-      axes = std::min(axes, reduced ? reduced_share * whole : whole);
-    } else {
-      // What is left of the jerk beside that of the turn itself, along the path and (3 v a / r) across it.
-      const double across = (reduced ? 0.1 : 0.5 / 3.0) * jerk / (speed_limit * curvature(segment));
-      axes = std::min({axes, (reduced ? 0.15 : 0.6) * whole, across});
-    }
+    axes = std::sqrt(std::max(left_squared * axes * axes, axes * axes - turning * turning));
   }
   if (limits.law == AccelerationLaw::constant_time) {
     return std::min(axes, segment.feed_mm_per_s * limits.feed_override / limits.time_constant_s);
@@ -167,70 +151,6 @@ double jerk_time(const MotionLimits& limits, double fastest) noexcept {
     }
   }
   return longest;
-}
-
-double jump_speed(const AxisJump& jump, const JunctionShape& shape, const JumpResponse& response) noexcept {
-  const bool jumps = jump.speed > tangent_change;
-  const auto within = [&](double v) {
-    const double travel = 2.0 * v * response.duration_s;
-    const double share = jump_share * (travel > shape.shortest_mm ? shape.shortest_mm / travel : 1.0);
-    const double acceleration = jumps ? v * jump.speed * response.acceleration_per_s : 0.0;
-    const double jerk =
-        v * jump.speed * response.jerk_per_s2 + v * v * jump.acceleration_per_mm * response.acceleration_per_s;
-    return acceleration <= share * jump.max_acceleration && jerk <= share * jump.max_jerk;
-  };
-  if (!std::isfinite(jump.max_acceleration) && !std::isfinite(jump.max_jerk)) {
-    return MotionLimits::none;
-  }
-  if (within(shape.speed_mm_per_s)) {
-    return MotionLimits::none;
-  }
-  double low = 0.0;
-  double high = shape.speed_mm_per_s;
-  for (int halvings = 0; halvings < 48; ++halvings) {
-    const double middle = 0.5 * (low + high);
-    (within(middle) ? low : high) = middle;
-  }
-  return low;
-}
-
-double limit_beside_turn(const Segment& segment, const MotionLimits& limits) noexcept {
-  double acceleration = MotionLimits::none;
-  for (int i = 0; i < axis_count; ++i) {
-    if (segment.kind == SegmentKind::arc && i != segment.normal) {
-      acceleration = std::min(acceleration, limits.max_acceleration_mm_per_s2[i]);
-    }
-  }
-  const double bend = curvature(segment);
-  return bend > 0.0 ? std::sqrt(0.45 * acceleration / bend) : MotionLimits::none;
-}
-
-double fastest_speed(const Segment& segment, const MotionLimits& limits, const FilterTolerance& filter) noexcept {
-  Segment fast = segment;
-  fast.feed_mm_per_s *= max_override;
-  return segment_speed_limit(fast, limits, filter);
-}
-
-JunctionJumps junction_jumps(const Segment& before, const Segment& after) noexcept {
-  JunctionJumps jumps;
-  jumps.turn = (tangent_at(after, 0.0) - tangent_at(before, before.length_mm)).cwiseAbs();
-  jumps.bend = (bend_at(after, 0.0) - bend_at(before, before.length_mm)).cwiseAbs();
-  jumps.kind = jumps.turn.maxCoeff() > tangent_change ? Jump::turn
-               : jumps.bend.maxCoeff() > 0.0          ? Jump::bend
-                                                      : Jump::none;
-  return jumps;
-}
-
-double junction_jump_speed(const Segment& before, const Segment& after, const MotionLimits& limits,
-                           const JunctionJumps& jumps, double fastest_mm_per_s) noexcept {
-  const JunctionShape shape{std::min(before.length_mm, after.length_mm), fastest_mm_per_s};
-  double speed = MotionLimits::none;
-  for (int i = 0; i < axis_count; ++i) {
-    speed = std::min(speed, jump_speed({jumps.turn[i], jumps.bend[i], limits.max_acceleration_mm_per_s2[i],
-                                        limits.max_jerk_mm_per_s3[i]},
-                                       shape, limits.jumps));
-  }
-  return speed;
 }
 
 double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexcept {

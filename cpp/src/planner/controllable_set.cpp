@@ -14,6 +14,8 @@ constexpr double at_rest = 1e-12;
 constexpr std::array<double, 2> looked_at{0.15, 0.85};
 // And the acceleration, beside both ends.
 constexpr std::array<double, 2> accelerations_at{0.25, 0.75};
+// Relative, of what bounds of c may leave too little.
+constexpr double bound_rounding = 1e-13;
 // Share of the acceleration that a valley may be passed with.
 constexpr double valley_share = 0.02;
 // Of the hardest braking, where the lower bound of the speed is laid.
@@ -26,24 +28,30 @@ constexpr double stopping_share = 0.85;
 // A polygon while it is cut.
 class Polygon {
  public:
-  void add(double b, double a) noexcept {
+  void add(double b, double a, bool checked = false) noexcept {
     b_[count_] = b;
-    a_[count_++] = a;
+    a_[count_] = a;
+    checked_[count_++] = checked;
   }
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }
+  [[nodiscard]] PathState corner(std::size_t i) const noexcept { return {b_[i], a_[i]}; }
+  // Of a corner, as long as it is one.
+  [[nodiscard]] bool checked(std::size_t i) const noexcept { return checked_[i]; }
+  void check(std::size_t i) noexcept { checked_[i] = true; }
 
-  // Keeps what has on_b b + on_a a <= most.
-  void cut(double on_b, double on_a, double most) noexcept {
+  // Keeps what has on_b b + on_a a <= most; false: that is all of it.
+  bool cut(double on_b, double on_a, double most) noexcept {
     std::array<double, room> beyond;
-    bool cuts = false;
+    double farthest = 0.0;
     for (std::size_t i = 0; i < count_; ++i) {
       beyond[i] = on_b * b_[i] + on_a * a_[i] - most;
-      cuts = cuts || beyond[i] > 0.0;
+      farthest = std::max(farthest, beyond[i]);
     }
-    if (!cuts) return;
+    if (!(farthest > 0.0)) return false;
     Polygon kept;
     for (std::size_t i = 0; i < count_; ++i) {
       const std::size_t next = i + 1 == count_ ? 0 : i + 1;
-      if (beyond[i] <= 0.0) kept.add(b_[i], a_[i]);
+      if (beyond[i] <= 0.0) kept.add(b_[i], a_[i], checked_[i]);
       if ((beyond[i] < 0.0 && beyond[next] > 0.0) || (beyond[i] > 0.0 && beyond[next] < 0.0)) {
         const double share = beyond[i] / (beyond[i] - beyond[next]);
         kept.add(b_[i] + share * (b_[next] - b_[i]), a_[i] + share * (a_[next] - a_[i]));
@@ -51,6 +59,7 @@ class Polygon {
     }
     if (kept.count_ > limit) kept.simplify(limit);
     *this = kept;
+    return true;
   }
 
   // Corners are left out where that costs the least area: what remains lies within.
@@ -61,7 +70,7 @@ class Polygon {
         if (b_[i] > b_[fastest] || (b_[i] == b_[fastest] && a_[i] > a_[fastest])) fastest = i;
       }
       std::size_t least_at = 0;
-      double least = std::numeric_limits<double>::infinity();
+      double least = no_limit;
       for (std::size_t i = 0; i < count_; ++i) {
         // Without these a motion could not begin, or not go on at its highest speed.
         if (b_[i] <= at_rest || i == fastest) continue;
@@ -77,6 +86,7 @@ class Polygon {
       for (std::size_t i = least_at; i + 1 < count_; ++i) {
         b_[i] = b_[i + 1];
         a_[i] = a_[i + 1];
+        checked_[i] = checked_[i + 1];
       }
       --count_;
     }
@@ -96,42 +106,84 @@ class Polygon {
   static constexpr std::size_t room = 2 * limit;
   std::size_t count_ = 0;
   std::array<double, room> b_, a_;
+  std::array<bool, room> checked_;
 };
 
 // Bounds of c that are linear in the state.
-struct Bound {
-  double constant = 0.0, on_b = 0.0, on_a = 0.0;
-};
-
 class Bounds {
  public:
   // A row either bounds c or cuts the polygon itself.
   void add(const Row& row, double none, Polygon& polygon) noexcept {
     if (std::abs(row.on_c) <= none) {
       polygon.cut(row.on_b, row.on_a, row.most);
-      return;
-    }
-    const Bound bound{row.most / row.on_c, -row.on_b / row.on_c, -row.on_a / row.on_c};
-    if (row.on_c > 0.0) {
-      upper_[n_upper_++] = bound;
     } else {
-      lower_[n_lower_++] = bound;
+      (row.on_c > 0.0 ? upper_ : lower_).add(row);
     }
   }
-  // States for which some c is left.
+
+  // States for which some c is left: corner by corner with the two bounds that leave the least there.
   void cut(Polygon& polygon) const noexcept {
-    for (std::size_t u = 0; u < n_upper_; ++u) {
-      for (std::size_t l = 0; l < n_lower_; ++l) {
-        polygon.cut(lower_[l].on_b - upper_[u].on_b, lower_[l].on_a - upper_[u].on_a,
-                    upper_[u].constant - lower_[l].constant);
+    if (upper_.count == 0 || lower_.count == 0) return;
+    int cuts = 0;
+    for (std::size_t i = 0; i < polygon.count();) {
+      if (polygon.checked(i)) {
+        ++i;
+        continue;
+      }
+      const PathState corner = polygon.corner(i);
+      const std::size_t u = upper_.least(corner, 1.0);
+      const std::size_t l = lower_.least(corner, -1.0);
+      if (leaves_some(corner, u, l) || !cut(polygon, u, l)) {
+        polygon.check(i);
+      } else if (++cuts < most_cuts) {
+        i = 0;
+      } else {
+        // Whatever rounding does: all of them.
+        for (std::size_t upper = 0; upper < upper_.count; ++upper) {
+          for (std::size_t lower = 0; lower < lower_.count; ++lower) cut(polygon, upper, lower);
+        }
+        return;
       }
     }
   }
 
  private:
   static constexpr std::size_t most = Rows::most + ControllableSet::max_corners;
-  std::array<Bound, most> upper_, lower_;
-  std::size_t n_upper_ = 0, n_lower_ = 0;
+  static constexpr int most_cuts = 100;
+
+  struct Side {
+    std::size_t count = 0;
+    std::array<double, most> constant, on_b, on_a;
+
+    void add(const Row& row) noexcept {
+      constant[count] = row.most / row.on_c;
+      on_b[count] = -row.on_b / row.on_c;
+      on_a[count++] = -row.on_a / row.on_c;
+    }
+    // The bound that is least at a state, times `sign`.
+    [[nodiscard]] std::size_t least(PathState state, double sign) const noexcept {
+      std::array<double, most> bound;
+      const double b = state.speed_squared;
+      const double a = state.acceleration;
+      for (std::size_t i = 0; i < count; ++i) bound[i] = sign * (constant[i] + on_b[i] * b + on_a[i] * a);
+      const auto end = bound.begin() + static_cast<std::ptrdiff_t>(count);
+      return static_cast<std::size_t>(std::min_element(bound.begin(), end) - bound.begin());
+    }
+  };
+
+  // Up to rounding.
+  [[nodiscard]] bool leaves_some(PathState state, std::size_t u, std::size_t l) const noexcept {
+    const double on_b = (upper_.on_b[u] - lower_.on_b[l]) * state.speed_squared;
+    const double on_a = (upper_.on_a[u] - lower_.on_a[l]) * state.acceleration;
+    const double constant = upper_.constant[u] - lower_.constant[l];
+    return constant + on_b + on_a >= -bound_rounding * (std::abs(constant) + std::abs(on_b) + std::abs(on_a));
+  }
+  bool cut(Polygon& polygon, std::size_t u, std::size_t l) const noexcept {
+    return polygon.cut(lower_.on_b[l] - upper_.on_b[u], lower_.on_a[l] - upper_.on_a[u],
+                       upper_.constant[u] - lower_.constant[l]);
+  }
+
+  Side upper_, lower_;
 };
 
 // An edge of a set as a row at the begin of an interval of this length.
@@ -140,6 +192,21 @@ Row edge_row(const ControllableSet& set, std::size_t i, double length) noexcept 
   const double on_b = set.a[next] - set.a[i];
   const double on_a = set.b[i] - set.b[next];
   return {on_b * length * length + on_a * length, on_b, 2.0 * length * on_b + on_a, on_b * set.b[i] + on_a * set.a[i]};
+}
+
+// What acceleration and jerk along the path may be at a station, as far as the path does not turn.
+struct AlongLimits {
+  double acceleration, jerk;
+};
+AlongLimits limits_along(const Station& station, const PlannedSegment& segment, const AxisLimits& limits) noexcept {
+  // Where an axis turns back and no other moves there is no direction: that of the end.
+  for (const double x : {0.0, station.length}) {
+    const Derivatives path = derivatives_at(station, segment, x, limits.axes);
+    const AlongLimits found{std::min(station.max_acceleration, along(path.first, limits.acceleration, limits.axes)),
+                            std::min(station.max_jerk, along(path.first, limits.jerk, limits.axes))};
+    if (std::isfinite(found.acceleration) && std::isfinite(found.jerk)) return found;
+  }
+  return {limits.acceleration[0], limits.jerk[0]};
 }
 
 // 1 / sqrt(b) is above its tangent: a bound of the jerk that is linear in b, and safe wherever it is laid.
@@ -174,12 +241,10 @@ void ControllableSets::rows_of(const Station& station, const PlannedSegment& seg
   for (const double share : looked_at) {
     const double at = share * length;
     const Tangent tangent(b_begin + share * (b_end - b_begin));
-    if (station.straight) {
-      add_jerk({1.0, 0.0, 0.0}, station.straight_jerk, tangent, at, rows);
-      continue;
-    }
-    const Derivatives path = derivatives_at(station, segment, x + at);
-    for (std::size_t i = 0; i < axis_count; ++i) {
+    if (station.max_jerk < no_limit) add_jerk({1.0, 0.0, 0.0}, station.max_jerk, tangent, at, rows);
+    if (station.straight) continue;
+    const Derivatives path = derivatives_at(station, segment, x + at, limits.axes);
+    for (std::size_t i = 0; i < limits.axes; ++i) {
       if (path.first[i] == 0.0 && path.second[i] == 0.0 && path.third[i] == 0.0) continue;
       add_jerk({path.first[i], path.second[i], path.third[i]}, limits.jerk[i], tangent, at, rows);
     }
@@ -189,8 +254,11 @@ void ControllableSets::rows_of(const Station& station, const PlannedSegment& seg
   if (station.straight) return;
   for (const double share : accelerations_at) {
     const double at = share * length;
-    const Derivatives path = derivatives_at(station, segment, x + at);
-    for (std::size_t i = 0; i < axis_count; ++i) {
+    if (station.max_acceleration < no_limit) {
+      for (const double sign : {-1.0, 1.0}) rows.add({sign * at, 0.0, sign, station.max_acceleration});
+    }
+    const Derivatives path = derivatives_at(station, segment, x + at, limits.axes);
+    for (std::size_t i = 0; i < limits.axes; ++i) {
       if (path.first[i] == 0.0 && path.second[i] == 0.0) continue;
       for (const double sign : {-1.0, 1.0}) {
         const double on_b = sign * path.second[i];
@@ -226,7 +294,7 @@ Range ControllableSets::leading_to(const ControllableSet& next, PathState state,
 
 Range ControllableSets::within(const Rows& rows, PathState state, Range range) noexcept {
   for (std::size_t i = 0; i < rows.count; ++i) {
-    if (narrow(rows.rows[i], state, no_coefficient, range) < 0.0) range.low = std::numeric_limits<double>::infinity();
+    if (narrow(rows.rows[i], state, no_coefficient, range) < 0.0) range.low = no_limit;
   }
   return range;
 }
@@ -237,7 +305,7 @@ PathState ControllableSets::hardest_before(const Station& station, const Planned
   const double b = end.speed_squared - 2.0 * end.acceleration * h;  // with c = 0
   Rows rows;
   rows_of(station, segment, {0.0, h, b, end.speed_squared, std::max(cap, b)}, rows);
-  double c = std::numeric_limits<double>::infinity();
+  double c = no_limit;
   for (std::size_t i = 0; i < rows.count; ++i) {
     const Row& row = rows.rows[i];
     const double on_c = row.on_c + h * (h * row.on_b - row.on_a);
@@ -275,7 +343,7 @@ ControllableSet ControllableSets::before(const Station& station, const PlannedSe
   const AxisLimits limits = limits_at(station);
   const double cap = making.cap;
   const double length = station.length;
-  const Derivatives path = derivatives_at(station, segment, 0.0);
+  const Derivatives path = derivatives_at(station, segment, 0.0, limits.axes);
   double b_most = 0.0;   // at the begin, with c = 0
   double b_after = 0.0;  // at the end
   for (std::size_t i = 0; i < next.count; ++i) {
@@ -284,9 +352,9 @@ ControllableSet ControllableSets::before(const Station& station, const PlannedSe
   }
   b_most = std::min(b_most, cap);
   Polygon polygon;
-  const double steepest = along(path.first, limits.acceleration);
+  const auto [steepest, jerk] = limits_along(station, segment, limits);
   // On a curve what turns the path may leave more; the cuts below say how much.
-  const double widest = station.straight ? steepest : 4.0 * steepest;
+  const double widest = station.straight ? steepest : std::min(station.max_acceleration, 4.0 * steepest);
   polygon.add(0.0, -widest);
   polygon.add(cap, -widest);
   polygon.add(cap, widest);
@@ -294,14 +362,13 @@ ControllableSet ControllableSets::before(const Station& station, const PlannedSe
   if (std::isfinite(making.least_acceleration)) polygon.cut(0.0, -1.0, -making.least_acceleration);
   if (station.valley) polygon.cut(0.0, 1.0, valley_share * steepest);
   if (!station.straight) {
-    for (std::size_t i = 0; i < axis_count; ++i) {
+    for (std::size_t i = 0; i < limits.axes; ++i) {
       if (path.first[i] == 0.0 && path.second[i] == 0.0) continue;
       polygon.cut(path.second[i], path.first[i], limits.acceleration[i]);
       polygon.cut(-path.second[i], -path.first[i], limits.acceleration[i]);
     }
   }
   // Braking must end before the motion does: v >= a^2 / 2 j, so b >= a^4 / 4 j^2, by its tangents.
-  const double jerk = along(path.first, limits.jerk);
   for (const double share : braking_tangents) {
     const double a = -share * steepest;
     const double v = a * a / (2.0 * jerk);
@@ -324,9 +391,9 @@ ControllableSet ControllableSets::before_stop(const Station& station, const Plan
                                               double cap) const noexcept {
   const AxisLimits limits = limits_at(station);
   const double length = station.length;
-  const Derivatives path = derivatives_at(station, segment, 0.0);
-  const double steepest = along(path.first, limits.acceleration);
-  double jerk = stopping_share * along(path.first, limits.jerk);
+  const Derivatives path = derivatives_at(station, segment, 0.0, limits.axes);
+  const auto [steepest, most_jerk] = limits_along(station, segment, limits);
+  double jerk = stopping_share * most_jerk;
   // No steeper and no faster than may be: a^3 = 6 length j^2, v^3 = 4.5 j length^2.
   jerk = std::min(jerk, std::sqrt(std::pow(stopping_share * steepest, 3.0) / (6.0 * length)));
   jerk = std::min(jerk, std::pow(cap, 1.5) / (4.5 * length * length));

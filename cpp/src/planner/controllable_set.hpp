@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 #include "planner/stations.hpp"
 
@@ -36,8 +35,8 @@ struct Row {
 
 /// Everything that the limits ask of c within an interval.
 struct Rows {
-  // Of each axis: jerk and acceleration at two places each, both signs; and the feed.
-  static constexpr std::size_t most = 8 * axis_count + 1;
+  // Of each axis and along the path: jerk and acceleration at two places each, both signs; and the feed.
+  static constexpr std::size_t most = 8 * max_path_axes + 7;
   std::array<Row, most> rows;
   std::size_t count = 0;
   void add(const Row& row) noexcept { rows[count++] = row; }
@@ -45,8 +44,8 @@ struct Rows {
 
 /// Values of c.
 struct Range {
-  double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
+  double low = -no_limit;
+  double high = no_limit;
   /// Whether nothing is left, beyond rounding.
   [[nodiscard]] bool empty() const noexcept { return low > high + 1e-6 * (std::abs(low) + std::abs(high)); }
 };
@@ -61,7 +60,7 @@ struct Stretch {
 /// 0: nothing), and the least acceleration.
 struct Making {
   double cap = 0.0, b_begin = 0.0, b_end = 0.0;
-  double least_acceleration = -std::numeric_limits<double>::infinity();
+  double least_acceleration = -no_limit;
 };
 
 class ControllableSets {
@@ -91,6 +90,7 @@ class ControllableSets {
 
   /// What is planned on an interval.
   [[nodiscard]] AxisLimits limits_at(const Station& station) const noexcept { return limits_.share(station.share); }
+  [[nodiscard]] std::size_t axes() const noexcept { return limits_.axes; }
 
  private:
   AxisLimits limits_;

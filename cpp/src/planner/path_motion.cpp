@@ -16,6 +16,13 @@ constexpr int halvings = 14;
 // So many landings are tried, each a little longer, and within so many stopping lengths.
 constexpr int landings = 96;
 constexpr double landing_lengths = 40.0;
+constexpr double longest_landing = 1e6;
+// A landing wherever it ends is tried when so much braking is ahead, as a multiple of what ends with the jerk limit.
+constexpr double most_ahead = 4.0;
+constexpr double shortest_share = 1.2;
+constexpr int landings_anywhere = 24;
+// Of the jerk, with which a speed is approached: what is left is for the landing.
+constexpr double approach_share = 0.8;
 // What a landing may be beyond the limits.
 constexpr double landing_rounding = 5e-4;
 // What is tried where no landing keeps them.
@@ -26,6 +33,8 @@ constexpr double last_excess = 16.0;
 constexpr std::array<double, 4> jerk_looked_at{0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0};
 // How near an end is it.
 constexpr double at_end_mm = 1e-9;
+// A speed, and what a period makes of it, that is none, mm/s.
+constexpr double no_speed = 1e-10;
 
 // Where nothing is left by a little, what is too slow is taken: it is the upper bound that leads beyond the limits.
 double nearest(const Range& range, double value) noexcept { return std::min(range.high, std::max(range.low, value)); }
@@ -53,7 +62,16 @@ void go(PathState state, double c, double t, double& travel, double& speed) noex
 AxisValues PathMotion::position() const noexcept {
   const std::size_t at = at_end() ? station_ - 1 : station_;
   const Station& station = plan_->station(at);
-  return position_at(station, plan_->segment_of(station), at_end() ? station.length : offset_);
+  return position_at(station, plan_->segment_of(station), at_end() ? station.length : offset_, plan_->axes());
+}
+
+PathPoint PathMotion::point() const noexcept {
+  if (at_end()) {
+    const Station& last = plan_->station(station_ - 1);
+    return {last.segment, last.offset + last.length, state_};
+  }
+  const Station& here = plan_->station(station_);
+  return {here.segment, here.offset + offset_, state_};
 }
 
 // Where the motion is so many mm on; not planned: at a stop or beyond it.
@@ -73,21 +91,22 @@ double PathMotion::to_stop(double most) const noexcept {
     travel += plan_->station(k).length;
     if (plan_->ends_in_stop(k)) return travel;
   }
-  return std::numeric_limits<double>::infinity();
+  return no_limit;
 }
 
 // The path where the motion is after so much time, as far as its jerk does not matter.
 Derivatives PathMotion::derivatives_after(double time_s) const noexcept {
   const Place place = place_at(std::max(0.0, time_s * (state_.speed + 0.5 * state_.acceleration * time_s)));
   const Station& there = plan_->station(place.station);
-  return derivatives_at(there, plan_->segment_of(there), place.offset);
+  return derivatives_at(there, plan_->segment_of(there), place.offset, plan_->axes());
 }
 
 // The jerks with which all limits are kept until the end of the period.
 PathMotion::Jerks PathMotion::allowed() const noexcept {
-  const AxisLimits limits = plan_->limits_at(plan_->station(station_));
+  const Station& here = plan_->station(station_);
+  const AxisLimits limits = plan_->limits_at(here);
   const double t = period_s_;
-  Jerks jerks{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+  Jerks jerks{-no_limit, no_limit};
   const auto keep = [&](double on_jerk, double rest, double most) {
     if (std::abs(on_jerk) < rounding * t) return;
     const double first = (most - rest) / on_jerk;
@@ -95,11 +114,13 @@ PathMotion::Jerks PathMotion::allowed() const noexcept {
     jerks.high = std::min(jerks.high, std::max(first, second));
     jerks.low = std::max(jerks.low, std::min(first, second));
   };
+  keep(1.0, 0.0, here.max_jerk);
+  keep(t, state_.acceleration, here.max_acceleration);
   for (const double share : jerk_looked_at) {
     const double x = share * t;
     const Derivatives path = share < 1.0 ? derivatives_after(x) : after_period_;
     const double v = std::max(0.0, state_.speed + state_.acceleration * x);
-    for (std::size_t i = 0; i < axis_count; ++i) {
+    for (std::size_t i = 0; i < limits.axes; ++i) {
       keep(path.first[i] + 3.0 * path.second[i] * v * x,
            v * (3.0 * path.second[i] * state_.acceleration + path.third[i] * v * v), limits.jerk[i]);
       if (share < 1.0) continue;
@@ -123,12 +144,15 @@ bool PathMotion::controllable(double jerk, double time_s, const Derivatives& pat
   if (state.speed_squared > cap * (1.0 + rounding)) return false;
   const AxisLimits limits = plan_->limits_at(station);
   // Braking must be over before the motion is.
-  if (a < 0.0 && 2.0 * along(path.first, limits.jerk) * v < a * a) return false;
-  for (std::size_t i = 0; i < axis_count; ++i) {
+  if (a < 0.0 && 2.0 * plan_->highest_jerk(station, path) * v < a * a) return false;
+  if (std::abs(a) > station.max_acceleration * (1.0 + rounding)) return false;
+  for (std::size_t i = 0; i < limits.axes; ++i) {
     const double acceleration = path.first[i] * a + path.second[i] * state.speed_squared;
     if (std::abs(acceleration) > limits.acceleration[i] * (1.0 + rounding)) return false;
   }
-  const Range range = ControllableSets::leading_to(plan_->set(place.station + 1), state, left);
+  // It may come to rest within the interval: after no more than v^2 / -a, wherever the braking begins to end.
+  if (stops_ && state.speed_squared < -a * left) return true;
+  const Range range = ControllableSets::leading_to(set(place.station + 1), state, left);
   if (range.empty()) return false;
   Rows rows;
   plan_->rules().rows_of(station, plan_->segment_of(station),
@@ -141,25 +165,29 @@ bool PathMotion::controllable(double jerk) const noexcept {
   return controllable(jerk, period_s_, after_period_) && controllable(jerk, 2.0 * period_s_, after_two_);
 }
 
-// The highest jerk that is allowed.
-bool PathMotion::choose(double& jerk) const noexcept {
-  if (controllable(jerks_.high)) {
-    jerk = jerks_.high;
-    return true;
-  }
-  double wrong = jerks_.high;
-  double right = jerks_.high;
+// The jerk nearest to the one wished for, looked for towards `end` first.
+bool PathMotion::choose(double wish, double end, double& jerk) const noexcept {
+  jerk = wish;
+  if (controllable(wish)) return true;
+  double wrong = wish;
+  double right = wish;
   bool found = false;
-  for (int n = 1; n <= candidates && !found; ++n) {
-    right = jerks_.high + (jerks_.low - jerks_.high) * n / candidates;
-    found = controllable(right);
-    if (!found) wrong = right;
-  }
-  if (!found && jerk_ >= jerks_.low && jerk_ <= jerks_.high) {
-    right = jerk_;
-    wrong = jerks_.high;
-    found = controllable(right);
-  }
+  const auto look = [&](double candidate) {
+    if (found || candidate < jerks_.low || candidate > jerks_.high) return;
+    right = candidate;
+    found = controllable(candidate);
+  };
+  const auto look_towards = [&](double far) {
+    for (int n = 1; n <= candidates && !found; ++n) {
+      look(wish + (far - wish) * n / candidates);
+      if (!found) wrong = right;
+    }
+    if (!found) wrong = wish;
+  };
+  look_towards(end);
+  // Where the limit of the jerk is far beyond what so slow a motion can do.
+  for (const double candidate : {jerk_, -state_.acceleration / period_s_, 0.0}) look(candidate);
+  if (!found) look_towards(end == jerks_.low ? jerks_.high : jerks_.low);
   if (!found) return false;
   for (int n = 0; n < halvings; ++n) {
     const double middle = 0.5 * (wrong + right);
@@ -167,6 +195,26 @@ bool PathMotion::choose(double& jerk) const noexcept {
   }
   jerk = right;
   return true;
+}
+
+// The jerk after which the acceleration can end at a speed, and not below it.
+double PathMotion::wished(double max_speed) const noexcept {
+  const Station& here = plan_->station(station_);
+  const double most_jerk =
+      approach_share * plan_->highest_jerk(here, derivatives_at(here, plan_->segment_of(here), offset_, plan_->axes()));
+  const auto ends_above = [&](double jerk) {
+    const AlongPath then = state_.after(jerk, period_s_);
+    return then.speed + then.acceleration * std::abs(then.acceleration) / (2.0 * most_jerk) >= max_speed;
+  };
+  double low = jerks_.low;
+  double high = jerks_.high;
+  if (ends_above(low)) return low;
+  if (!ends_above(high)) return high;
+  for (int n = 0; n < 2 * halvings; ++n) {
+    const double middle = 0.5 * (low + high);
+    (ends_above(middle) ? high : low) = middle;
+  }
+  return high;
 }
 
 // Whether a landing keeps the limits where the path turns.
@@ -182,51 +230,81 @@ bool PathMotion::keeps_limits(const Landing& landing, double excess) const noexc
       if (!place.planned) return true;  // the last of it is slow
       const Station& station = plan_->station(place.station);
       if (state.speed > state_.speed && state.speed * state.speed > station.squared_limit()) return false;
-      const Derivatives path = derivatives_at(station, plan_->segment_of(station), place.offset);
-      if (!keeps(plan_->limits_at(station).share(excess * (1.0 + landing_rounding)), path, state, jerk)) return false;
+      const AxisLimits limits = plan_->limits_at(station).share(excess * (1.0 + landing_rounding));
+      const Derivatives path = derivatives_at(station, plan_->segment_of(station), place.offset, limits.axes);
+      if (!keeps(limits, path, state, jerk)) return false;
     }
   }
   return true;
 }
 
+// Whether its three parts do not go back and keep these limits along the path, and those of the axes.
+bool PathMotion::holds(const Landing& landing, double most_jerk, double steepest, double excess) const noexcept {
+  AlongPath state = state_;
+  for (std::size_t i = 0; i < landing.jerk.size(); ++i) {
+    if (std::abs(landing.jerk[i]) > most_jerk) return false;
+    state = state.after(landing.jerk[i], landing.periods[i] * period_s_);
+    if (state.speed < -rounding || std::abs(state.acceleration) > steepest) return false;
+  }
+  return keeps_limits(landing, excess);
+}
+
 // The shortest landing after `travel` mm within the limits times `excess`.
 bool PathMotion::land(double travel, double excess) noexcept {
   const Station& here = plan_->station(station_);
-  const AxisLimits limits = plan_->limits_at(here);
-  const Derivatives path = derivatives_at(here, plan_->segment_of(here), offset_);
-  const double most_jerk = excess * (1.0 + landing_rounding) * along(path.first, limits.jerk);
+  const Derivatives path = derivatives_at(here, plan_->segment_of(here), offset_, plan_->axes());
+  const double most_jerk = excess * (1.0 + landing_rounding) * plan_->highest_jerk(here, path);
   const double steepest =
-      excess * (1.0 + rounding) * std::max(along(path.first, limits.acceleration), std::abs(state_.acceleration));
+      excess * (1.0 + rounding) * std::max(plan_->steepest(here, path), std::abs(state_.acceleration));
   const double a = state_.acceleration;
   const double v = state_.speed;
   // No shorter than with a jerk that is constant.
   const double shortest_s = 0.5 * std::max(std::abs(a) / most_jerk, std::cbrt(6.0 * travel / most_jerk));
-  int periods = std::max(3, static_cast<int>(shortest_s / period_s_));
+  int periods = std::max(3, static_cast<int>(std::min(shortest_s / period_s_, longest_landing)));
   for (int n = 0; n < landings; ++n, periods += 1 + periods / (n < landings / 3 ? 32 : 8)) {
     Landing found;
     found.periods = {periods / 3, periods - 2 * (periods / 3), periods / 3};
-    std::array<double, 3> time{};
-    for (std::size_t i = 0; i < 3; ++i) time[i] = found.periods[i] * period_s_;
-    const double whole = time[0] + time[1] + time[2];
+    const double whole = periods * period_s_;
     // What a jerk of 1 in each part makes of acceleration, speed and distance at the end.
     Eigen::Matrix3d effect;
     double after = whole;
     for (Eigen::Index i = 0; i < 3; ++i) {
-      const double t = time[static_cast<std::size_t>(i)];
+      const double t = found.periods[static_cast<std::size_t>(i)] * period_s_;
       after -= t;
       effect(0, i) = t;
       effect(1, i) = t * (0.5 * t + after);
       effect(2, i) = t * (t * t / 6.0 + after * 0.5 * (t + after));
     }
     const Vector3 jerk = effect.inverse() * Vector3(-a, -v - a * whole, travel - whole * (v + 0.5 * a * whole));
-    AlongPath state = state_;
-    bool keeps_most = jerk.cwiseAbs().maxCoeff() <= most_jerk;
-    for (std::size_t i = 0; i < 3 && keeps_most; ++i) {
-      found.jerk[i] = jerk[static_cast<Eigen::Index>(i)];
-      state = state.after(found.jerk[i], time[i]);
-      keeps_most = state.speed >= -rounding && std::abs(state.acceleration) <= steepest;
-    }
-    if (!keeps_most || !keeps_limits(found, excess)) continue;
+    std::copy_n(jerk.data(), 3, found.jerk.begin());
+    if (!holds(found, most_jerk, steepest, excess)) continue;
+    landing_ = found;
+    return true;
+  }
+  return false;
+}
+
+// A landing of two jerks wherever it ends, before the next stop. Near the end of the braking.
+bool PathMotion::land_anywhere() noexcept {
+  const Station& here = plan_->station(station_);
+  const Derivatives path = derivatives_at(here, plan_->segment_of(here), offset_, plan_->axes());
+  const double most_jerk = (1.0 + landing_rounding) * plan_->highest_jerk(here, path);
+  const double a = state_.acceleration;
+  const double v = state_.speed;
+  if (!(a < 0.0) || 2.0 * most_jerk * v > most_ahead * a * a) return false;
+  const double steepest = (1.0 + rounding) * std::max(plan_->steepest(here, path), -a);
+  const int shortest = std::max(2, static_cast<int>(std::min(-shortest_share * v / (a * period_s_), longest_landing)));
+  for (int n = 0, periods = shortest; n < landings_anywhere; ++n, periods += 1 + periods / 16) {
+    Landing found;
+    found.periods = {periods / 2, periods - periods / 2, 0};
+    const double t = found.periods[0] * period_s_;
+    const double u = found.periods[1] * period_s_;
+    // a + j t + k u = 0 and v + a (t + u) + j t (t / 2 + u) + k u^2 / 2 = 0.
+    found.jerk[0] = -(v + a * (t + 0.5 * u)) / (0.5 * t * (t + u));
+    found.jerk[1] = -(a + found.jerk[0] * t) / u;
+    const AlongPath middle = state_.after(found.jerk[0], t);
+    if (!place_at(state_.travel(found.jerk[0], t) + middle.travel(found.jerk[1], u)).planned) continue;
+    if (!holds(found, most_jerk, steepest, 1.0)) continue;
     landing_ = found;
     return true;
   }
@@ -265,7 +343,8 @@ void PathMotion::move(double jerk, double time_s) noexcept {
   state_.speed = std::max(0.0, state_.speed);
   jerk_ = jerk;
   pass(travel);
-  if (t < time_s || (state_.speed <= 0.0 && state_.acceleration < 0.0)) come_to_standstill();
+  const bool is_slow = state_.speed < no_speed && std::abs(state_.acceleration) * period_s_ < no_speed;
+  if (t < time_s || is_slow || (state_.speed <= 0.0 && state_.acceleration < 0.0)) come_to_standstill();
 }
 
 void PathMotion::come_to_standstill() noexcept {
@@ -284,7 +363,7 @@ void PathMotion::come_to_rest() noexcept {
 // The choice of c for the rest of an interval.
 double PathMotion::course(double left, PathState state) noexcept {
   const Station& here = plan_->station(station_);
-  const Range leading = ControllableSets::leading_to(plan_->set(station_ + 1), state, left);
+  const Range leading = ControllableSets::leading_to(set(station_ + 1), state, left);
   Rows rows;
   plan_->rules().rows_of(here, plan_->segment_of(here),
                          {offset_, left, state.speed_squared, state.squared_after(left),
@@ -294,7 +373,7 @@ double PathMotion::course(double left, PathState state) noexcept {
   double c = leading.high;
   if (range.low <= range.high) {
     // What the limits allow at once, if the rest lets it.
-    c = nearest(range, state_.speed > 0.0 ? jerks_.high / state_.speed : range.high);
+    c = nearest(range, state_.speed > 0.0 ? wish_ / state_.speed : range.high);
   } else if (leading.low <= leading.high) {
     // Between the places that were looked at: as it was begun, which misses the least.
     c = nearest(leading, course_station_ == station_ ? course_ : 0.5 * (range.low + range.high));
@@ -346,7 +425,7 @@ void PathMotion::follow() noexcept {
   }
 }
 
-void PathMotion::advance() noexcept {
+void PathMotion::advance(double max_speed) noexcept {
   if (landing_.runs()) return fly_on();
   if (at_end()) return;
   const double near = landing_lengths * plan_->stopping_length();
@@ -355,11 +434,22 @@ void PathMotion::advance() noexcept {
   if (last || (travel <= near && state_.acceleration < 0.0)) {
     if (land(travel, 1.0)) return fly_on();
   }
+  stops_ = max_speed <= 0.0;
+  if (stops_ && land_anywhere()) return fly_on();
   after_period_ = derivatives_after(period_s_);
   after_two_ = derivatives_after(2.0 * period_s_);
   jerks_ = allowed();
-  double jerk = 0.0;
-  if (jerks_.low <= jerks_.high && choose(jerk)) return move(jerk, period_s_);
+  wish_ = jerks_.high;
+  if (jerks_.low <= jerks_.high) {
+    double jerk = 0.0;
+    const bool slower = max_speed < no_limit;
+    if (slower) wish_ = wished(max_speed);
+    is_slow_ = slower;
+    if (choose(wish_, slower ? jerks_.high : jerks_.low, jerk)) return move(jerk, period_s_);
+    // After a slow motion.
+    is_slow_ = plan_->has_slow_sets();
+    if (!slower && is_slow_ && choose(wish_, jerks_.low, jerk)) return move(jerk, period_s_);
+  }
   if (last) {
     // Whatever the limits are, not past the stop.
     for (double excess = first_excess; excess < last_excess; excess *= next_excess) {

@@ -3,22 +3,48 @@
 
 #include <array>
 #include <cstddef>
-#include <limits>
+#include <cstdint>
 
 #include "planner/path_plan.hpp"
 
 namespace shapegcode {
 
+/// Where a motion is: so many mm behind the start of a segment.
+struct PathPoint {
+  std::uint64_t segment = 0;
+  double offset = 0.0;
+  AlongPath state;
+};
+
 class PathMotion {
  public:
-  /// At rest at the start. The plan must outlive it.
-  PathMotion(const PathPlan& plan, double period_s) : plan_(&plan), period_s_(period_s) {}
+  /// In a state at the start of the plan, which must outlive it.
+  PathMotion(const PathPlan& plan, double period_s, const AlongPath& state = {})
+      : plan_(&plan), period_s_(period_s), state_(state) {}
 
-  /// One period on, as fast as the plan allows.
-  void advance() noexcept;
+  /// One period on: as fast as the plan allows, or, below `max_speed`, slowed down to that as soon as the limits allow;
+  /// 0: to rest, wherever that is.
+  void advance(double max_speed = no_limit) noexcept;
   [[nodiscard]] bool at_end() const noexcept { return station_ == plan_->end(); }
+  [[nodiscard]] bool at_rest() const noexcept {
+    return state_.speed <= 0.0 && state_.acceleration == 0.0 && !landing_.runs();
+  }
+  /// At rest where the path has a stop.
+  [[nodiscard]] bool at_stop() const noexcept {
+    return at_rest() && (at_end() || (offset_ <= 0.0 && plan_->station(station_).stop));
+  }
+  [[nodiscard]] PathPoint point() const noexcept;
+  /// Stations of the plan that are behind it.
+  [[nodiscard]] std::size_t passed() const noexcept { return station_; }
+  [[nodiscard]] const AlongPath& state() const noexcept { return state_; }
+  /// The highest speed that the segment and its axes allow there.
+  [[nodiscard]] double speed_limit() const noexcept {
+    return plan_->station(at_end() ? station_ - 1 : station_).speed_limit;
+  }
+  /// Distance to the next stop of the plan, infinite beyond `most`.
+  [[nodiscard]] double to_stop(double most) const noexcept;
   /// The segment that it is in.
-  [[nodiscard]] std::size_t segment() const noexcept {
+  [[nodiscard]] std::uint64_t segment() const noexcept {
     return plan_->station(at_end() ? station_ - 1 : station_).segment;
   }
   /// Position of every axis.
@@ -41,14 +67,19 @@ class PathMotion {
   };
 
   [[nodiscard]] Place place_at(double travel) const noexcept;
-  [[nodiscard]] double to_stop(double most) const noexcept;
   [[nodiscard]] Derivatives derivatives_after(double time_s) const noexcept;
   [[nodiscard]] Jerks allowed() const noexcept;
   [[nodiscard]] bool controllable(double jerk, double time_s, const Derivatives& path) const noexcept;
   [[nodiscard]] bool controllable(double jerk) const noexcept;
-  [[nodiscard]] bool choose(double& jerk) const noexcept;
+  [[nodiscard]] bool choose(double wish, double end, double& jerk) const noexcept;
+  [[nodiscard]] const ControllableSet& set(std::size_t index) const noexcept {
+    return is_slow_ ? plan_->slow_set(index) : plan_->set(index);
+  }
+  [[nodiscard]] double wished(double max_speed) const noexcept;
   [[nodiscard]] bool keeps_limits(const Landing& landing, double excess) const noexcept;
+  [[nodiscard]] bool holds(const Landing& landing, double most_jerk, double steepest, double excess) const noexcept;
   bool land(double travel, double excess) noexcept;
+  bool land_anywhere() noexcept;
   void fly_on() noexcept;
   void move(double jerk, double time_s) noexcept;
   void pass(double travel) noexcept;
@@ -65,10 +96,13 @@ class PathMotion {
   double jerk_ = 0.0;  // of the last period
   Landing landing_;
   double course_ = 0.0;  // the last choice of c, and the interval that it was made for
-  std::size_t course_station_ = std::numeric_limits<std::size_t>::max();
+  std::size_t course_station_ = static_cast<std::size_t>(-1);
   // Of this period.
   Derivatives after_period_{}, after_two_{};
   Jerks jerks_{};
+  double wish_ = 0.0;  // the jerk that would be best
+  bool stops_ = false;
+  bool is_slow_ = false;  // keeps to the sets of slow motions
 };
 
 }  // namespace shapegcode

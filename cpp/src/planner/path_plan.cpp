@@ -3,62 +3,88 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <utility>
 
 namespace shapegcode {
 namespace {
 
 // Rounds of the plan after the first; more change nothing that counts.
 constexpr int rounds = 4;
+// Stations that are made room for at first, where they may become more.
+constexpr std::size_t first_capacity = 1024;
 // The jerk limit is J / sqrt(b), of which a set has a tangent. It may lie too high better than too low: there its bound
 // comes down to nothing at three times the square of the speed where it was laid.
 constexpr double tangent_on_lines = 1.1;
 constexpr double tangent_on_curves = 1.3;
+// A motion is as good as at rest whose square of the speed is less than this, of what rest becomes on the interval.
+constexpr double slow_share = 0.01;
 // Behind a valley, over which the time is compared, and shares of the square of its highest speed that are tried.
 constexpr int passing_stations = 64;
 constexpr std::array<double, 5> passings{1.0, 0.85, 0.7, 0.55, 0.4};
 
 }  // namespace
 
-PathPlan::PathPlan(std::vector<PlannedSegment> segments, const AxisLimits& limits, double period_s)
-    : path_(std::move(segments), limits, period_s), rules_(limits) {
+PathPlan::PathPlan(SegmentRing& ring, const AxisLimits& limits, double period_s, std::size_t capacity,
+                   double max_across)
+    : path_(ring, limits, period_s), rules_(limits), max_across_(max_across), grows_(capacity == 0) {
+  resize(grows_ ? first_capacity : capacity);
+}
+
+void PathPlan::resize(std::size_t capacity) {
+  stations_.resize(capacity);
+  sets_.resize(capacity);
+  if (!grows_) slow_sets_.resize(capacity);
+  expected_.resize(capacity);
+}
+
+void PathPlan::make(const PathStart& start, const AlongPath& state, std::uint64_t end, double ratio) {
+  path_.start(start, end, ratio);
+  begin_ = {state.speed * state.speed, state.acceleration};
   make_stations();
-  sets_.resize(stations_.size());
-  expected_.resize(stations_.size());
-  make_sets(true);
+  make_sets(Round::first);
   for (int round = 0; round < rounds; ++round) {
     expect();
-    make_sets(false);
+    make_sets(Round::exact);
   }
+  if (!grows_) make_sets(Round::slow);
 }
 
 void PathPlan::make_stations() {
+  count_ = 0;
   Station station;
-  while (path_.next(station)) {
-    // What the axes allow.
+  while ((grows_ || count_ + 1 < stations_.size()) && path_.next(station)) {
+    if (count_ + 1 == stations_.size()) resize(2 * stations_.size());
+    // What the axes and the filters behind allow.
     for (const double x : {0.0, station.length}) {
-      const Derivatives path = derivatives_at(station, segment_of(station), x);
-      station.speed_limit = std::min(station.speed_limit, along(path.first, limits_at(station).speed));
+      const Derivatives path = derivatives_at(station, segment_of(station), x, axes());
+      station.speed_limit = std::min(station.speed_limit, along(path.first, limits_at(station).speed, axes()));
+      if (max_across_ < no_limit) {
+        const double bend = Vector3(path.second[0], path.second[1], path.second[2]).norm();
+        if (bend > 0.0) station.speed_limit = std::min(station.speed_limit, std::sqrt(max_across_ / bend));
+      }
     }
     if (station.straight) {
-      station.straight_acceleration = along(station.first, limits_at(station).acceleration);
-      station.straight_jerk = along(station.first, limits_at(station).jerk);
+      const Derivatives path = derivatives_at(station, segment_of(station), 0.0, axes());
+      station.max_acceleration = steepest(station, path);
+      station.max_jerk = highest_jerk(station, path);
     }
-    stations_.push_back(station);
+    stations_[count_++] = station;
   }
-  Station end = stations_.back();
-  end.stop = true;
-  end.valley = false;
-  stations_.push_back(end);
+  Station& last = stations_[count_];
+  last = stations_[count_ - 1];
+  last.stop = true;
+  last.valley = false;
+  ++count_;
+  is_cut_ = path_.next(station);
 }
 
 double PathPlan::cap_at(std::size_t index) const noexcept {
   const double cap = stations_[index].squared_limit();
-  return stations_[index].stop ? cap : std::min(cap, stations_[index - 1].squared_limit());
+  return stations_[index].stop || index == 0 ? cap : std::min(cap, stations_[index - 1].squared_limit());
 }
 
-void PathPlan::make_sets(bool first) noexcept {
+void PathPlan::make_sets(Round round) noexcept {
+  std::vector<ControllableSet>& sets = round == Round::slow ? slow_sets_ : sets_;
+  const bool approaches_valleys = round != Round::slow;
   // How a valley is approached: no harder than so that it is passed as fast as it can be.
   bool approaches = false;
   PathState approach;
@@ -69,26 +95,26 @@ void PathPlan::make_sets(bool first) noexcept {
     double cap = cap_at(k);
     if (ends_in_stop(k)) {
       approaches = false;
-      sets_[k] = rules_.before_stop(here, segment, cap);
+      sets[k] = rules_.before_stop(here, segment, cap);
       continue;
     }
-    if (here.valley) cap = std::min(cap, best_passing(k));
-    double least = -std::numeric_limits<double>::infinity();
+    if (here.valley && approaches_valleys) cap = std::min(cap, best_passing(k));
+    double least = -no_limit;
     approaches = approaches && here.distance > approach_begin;
     if (approaches) {
       approach = rules_.hardest_before(here, segment, cap, approach);
       least = approach.acceleration;
       approaches = approach.speed_squared < cap;
     }
-    if (here.valley) least = 0.0;
+    if (here.valley && approaches_valleys) least = 0.0;
     const double higher = here.straight ? tangent_on_lines : tangent_on_curves;
     Making making{cap, -1.0, -1.0, least};
-    if (!first) {
+    if (round != Round::first) {
       making.b_begin = higher * expected_[k].speed_squared;
       making.b_end = higher * expected_[k + 1].speed_squared;
     }
-    sets_[k] = rules_.before(here, segment, making, sets_[k + 1]);
-    if (here.valley) {
+    sets[k] = rules_.before(here, segment, making, sets[k + 1]);
+    if (here.valley && approaches_valleys) {
       approaches = true;
       approach = {ControllableSets::steady(sets_[k]), 0.0};
       approach_begin = here.distance - segment.half_width;
@@ -102,10 +128,12 @@ PathState PathPlan::fastest_after(std::size_t index, PathState state) const noex
   const double h = here.length;
   const Range leading = ControllableSets::leading_to(sets_[index + 1], state, h);
   double c = leading.high;
-  if (state.speed_squared <= 0.0) {
-    // From rest with a constant jerk.
-    const double jerk = along(derivatives_at(here, segment_of(here), 0.0).first, limits_at(here).jerk);
-    c = std::min(c, std::cbrt(jerk * jerk * 4.5 / (h * h)));
+  // From rest with a constant jerk, which from rest on an interval is one of b^3 = (4.5 j h^2)^2.
+  const double jerk = highest_jerk(here, derivatives_at(here, segment_of(here), 0.0, axes()));
+  const double from_rest = std::cbrt(jerk * jerk * 4.5 / (h * h));
+  const bool is_slow = state.acceleration >= 0.0 && state.speed_squared <= slow_share * from_rest * h * h;
+  if (is_slow) {
+    c = std::min(c, from_rest);
   } else {
     Rows rows;
     rules_.rows_of(
@@ -124,7 +152,7 @@ PathState PathPlan::fastest_after(std::size_t index, PathState state) const noex
 double PathPlan::best_passing(std::size_t index) const noexcept {
   const double most = segment_of(stations_[index]).passed;
   double best = most;
-  double least_s = std::numeric_limits<double>::infinity();
+  double least_s = no_limit;
   for (const double share : passings) {
     PathState state{most * share, 0.0};
     double time_s = 0.0;
@@ -145,13 +173,13 @@ double PathPlan::best_passing(std::size_t index) const noexcept {
 
 // How a motion goes: where the next round lays the tangents of the jerk limit.
 void PathPlan::expect() noexcept {
-  PathState state;
+  PathState state = begin_;
   for (std::size_t k = 0; k < end(); ++k) {
     if (stations_[k].stop) state = {};
     expected_[k] = state;
     state = ends_in_stop(k) ? PathState{} : fastest_after(k, state);
   }
-  expected_.back() = {};
+  expected_[end()] = {};
 }
 
 }  // namespace shapegcode

@@ -1,7 +1,9 @@
 // The look-ahead over a whole path: intervals, and for every station the states from which a stop is certain.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "planner/controllable_set.hpp"
@@ -14,24 +16,55 @@ namespace shapegcode {
 /// can be for that motion: some rounds of it.
 class PathPlan {
  public:
-  PathPlan(std::vector<PlannedSegment> segments, const AxisLimits& limits, double period_s);
+  /// At most so many stations are planned; 0: as many as there are, with memory allocated for them. `max_across`:
+  /// acceleration across the path that the motion may have. The ring must outlive it.
+  PathPlan(SegmentRing& ring, const AxisLimits& limits, double period_s, std::size_t capacity,
+           double max_across = no_limit);
 
-  /// Index of the last station, where the path ends.
-  [[nodiscard]] std::size_t end() const noexcept { return stations_.size() - 1; }
+  /// Plans from a position on, where the motion is in a state, to the end of what is known, or as far as the stations
+  /// reach.
+  void make(const PathStart& start, const AlongPath& state, std::uint64_t end, double ratio);
+
+  /// Whether it ends before the end of what is known.
+  [[nodiscard]] bool is_cut() const noexcept { return is_cut_; }
+  /// Motion was planned up to a position: the roundings that it has begun stay as they are. The last one of them.
+  std::uint64_t fix(std::uint64_t from, std::uint64_t segment, double offset) noexcept {
+    return path_.fix(from, segment, offset);
+  }
+
+  /// Whether a rounding that stays reaches over a junction: no stop is possible there.
+  [[nodiscard]] bool is_covered(std::uint64_t junction) const noexcept { return path_.is_covered(junction); }
+
+  /// Index of the last station, where what is planned ends.
+  [[nodiscard]] std::size_t end() const noexcept { return count_ - 1; }
   [[nodiscard]] const Station& station(std::size_t index) const noexcept { return stations_[index]; }
+  /// States that lead on as fast as can be.
   [[nodiscard]] const ControllableSet& set(std::size_t index) const noexcept { return sets_[index]; }
+  /// All states from which a stop is certain, however slowly that leads through the valleys.
+  [[nodiscard]] const ControllableSet& slow_set(std::size_t index) const noexcept { return slow_sets_[index]; }
   [[nodiscard]] const PlannedSegment& segment_of(const Station& station) const noexcept {
-    return path_.segments()[station.segment];
+    return path_.segment(station.segment);
   }
   [[nodiscard]] const ControllableSets& rules() const noexcept { return rules_; }
   [[nodiscard]] AxisLimits limits_at(const Station& station) const noexcept { return rules_.limits_at(station); }
   [[nodiscard]] double stopping_length() const noexcept { return path_.stopping_length(); }
+  [[nodiscard]] std::size_t axes() const noexcept { return rules_.axes(); }
+  [[nodiscard]] bool has_slow_sets() const noexcept { return !grows_; }
   /// Whether the motion rests at the end of an interval.
   [[nodiscard]] bool ends_in_stop(std::size_t index) const noexcept { return stations_[index + 1].stop; }
+  /// The limits of a motion along a station's direction.
+  [[nodiscard]] double steepest(const Station& station, const Derivatives& path) const noexcept {
+    return std::min(station.max_acceleration, along(path.first, limits_at(station).acceleration, axes()));
+  }
+  [[nodiscard]] double highest_jerk(const Station& station, const Derivatives& path) const noexcept {
+    return std::min(station.max_jerk, along(path.first, limits_at(station).jerk, axes()));
+  }
 
  private:
+  void resize(std::size_t capacity);
   void make_stations();
-  void make_sets(bool first) noexcept;
+  enum class Round : std::uint8_t { first, exact, slow };
+  void make_sets(Round round) noexcept;
   void expect() noexcept;
   [[nodiscard]] double cap_at(std::size_t index) const noexcept;
   [[nodiscard]] PathState fastest_after(std::size_t index, PathState state) const noexcept;
@@ -39,9 +72,14 @@ class PathPlan {
 
   RoundedPath path_;
   ControllableSets rules_;
+  double max_across_;
+  bool grows_;
+  bool is_cut_ = false;
+  std::size_t count_ = 0;
   std::vector<Station> stations_;
-  std::vector<ControllableSet> sets_;
+  std::vector<ControllableSet> sets_, slow_sets_;
   std::vector<PathState> expected_;
+  PathState begin_;
 };
 
 }  // namespace shapegcode

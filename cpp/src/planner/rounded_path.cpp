@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <utility>
 
 namespace shapegcode {
 namespace {
@@ -14,7 +12,7 @@ constexpr double widest_mm = 3.0;
 constexpr double narrowest_mm = 2e-4;
 // Intervals within a rounding: so many on its half-width. Closer breaks are passed over.
 constexpr double intervals_on_half = 8.0;
-constexpr double closest_on_half = 300.0;
+constexpr double closest_on_half = 30000.0;
 // An interval turns by no more on an arc.
 constexpr double radians_of_arc = 0.1;
 // Periods that an interval lasts at the programmed feed.
@@ -22,8 +20,10 @@ constexpr double periods_of_interval = 4.0;
 // Towards a stop intervals shrink with the distance to it, down to what the jerk travels in so many periods.
 constexpr double share_before_stop = 0.4;
 constexpr double stopping_periods = 5.0;
+constexpr double longest_stopping_mm = 0.5;
 // Junctions that are looked at to each side.
-constexpr std::size_t lookahead = 16;
+constexpr std::size_t lookahead = RoundedPath::lookback - 2;
+constexpr std::uint64_t everything = static_cast<std::uint64_t>(-1);
 // Nothing is shorter, mm.
 constexpr double shortest_mm = 1e-9;
 
@@ -60,52 +60,93 @@ double width_within(double turn, double bend) noexcept {
 
 }  // namespace
 
-RoundedPath::RoundedPath(std::vector<PlannedSegment> segments, const AxisLimits& limits, double period_s)
-    : segments_(std::move(segments)), limits_(limits), period_s_(period_s) {
-  const double jerk = *std::ranges::min_element(limits.jerk);
+RoundedPath::RoundedPath(SegmentRing& ring, const AxisLimits& limits, double period_s)
+    : ring_(&ring), limits_(limits), period_s_(period_s) {
+  const auto end = static_cast<std::ptrdiff_t>(limits.axes);
+  least_acceleration_ = *std::min_element(limits.acceleration.begin(), limits.acceleration.begin() + end);
+  highest_acceleration_ = *std::max_element(limits.acceleration.begin(), limits.acceleration.begin() + end);
+  const double jerk = *std::min_element(limits.jerk.begin(), limits.jerk.begin() + end);
   const double time_s = stopping_periods * period_s;
-  stopping_length_ = jerk * time_s * time_s * time_s / 6.0;
-  for (std::size_t i = 0; i < segments_.size(); ++i) segments_[i].distance = starts_anew(i) ? 0.0 : end_of(i - 1);
-  for (std::size_t i = 0; i < segments_.size(); ++i) choose(i);
+  stopping_length_ = std::min(longest_stopping_mm, jerk * time_s * time_s * time_s / 6.0);
 }
 
-bool RoundedPath::starts_anew(std::size_t segment) const noexcept { return segment == 0 || segments_[segment].stop; }
+void RoundedPath::start(const PathStart& start, std::uint64_t end, double ratio) noexcept {
+  start_ = start;
+  end_ = end;
+  ratio_ = ratio;
+  segment_ = start.segment;
+  PlannedSegment& at = (*ring_)[start.segment];
+  if (starts_anew(start.segment)) at.distance = 0.0;
+  x_ = start_x_ = at.distance + start.offset;
+  for (std::uint64_t i = start.segment; i < end; ++i) {
+    PlannedSegment& entry = (*ring_)[i];
+    entry.is_fixed = entry.is_fixed || i == start.segment;
+    if (entry.is_fixed) continue;
+    entry.is_narrow = false;
+  }
+  for (std::uint64_t i = start.segment + 1; i < end; ++i) {
+    (*ring_)[i].distance = starts_anew(i) ? 0.0 : end_of(i - 1);
+  }
+  bool same = true;  // no stop since the start
+  for (std::uint64_t i = start.segment + 1; i < end; ++i) {
+    if (!(*ring_)[i].is_fixed) choose(i);
+    same = same && !starts_anew(i);
+    if (!same) start_x_ = 0.0;
+  }
+}
 
-double RoundedPath::end_of(std::size_t segment) const noexcept {
-  const PlannedSegment& entry = segments_[segment];
+bool RoundedPath::starts_anew(std::uint64_t segment) const noexcept {
+  const PlannedSegment& entry = (*ring_)[segment];
+  return segment == start_.first || entry.stop || entry.is_narrow;
+}
+
+double RoundedPath::end_of(std::uint64_t segment) const noexcept {
+  const PlannedSegment& entry = (*ring_)[segment];
   return entry.distance + entry.segment.length_mm;
 }
 
 // As wide as a rounding may be whatever follows.
-double RoundedPath::widest(std::size_t junction) const noexcept {
-  const PlannedSegment& entry = segments_[junction];
-  double width = std::min(widest_mm, entry.distance);
-  std::size_t before = junction;
-  for (std::size_t n = 0; n < lookahead && !starts_anew(before); ++n) --before;
-  if (!starts_anew(before)) width = std::min(width, 0.5 * (entry.distance - segments_[before].distance));
+double RoundedPath::widest(std::uint64_t junction) const noexcept {
+  const PlannedSegment& entry = (*ring_)[junction];
+  double width = std::min(widest_mm, entry.distance - start_x_);
+  std::uint64_t before = junction;
+  for (std::size_t n = 0; n < lookahead && !starts_anew(before); ++n) {
+    const PlannedSegment& earlier = (*ring_)[--before];
+    // One that was chosen before this junction was known has not left it anything.
+    if (earlier.is_fixed && junction >= earlier.saw_until && earlier.half_width > 0.0) {
+      width = std::min(width, entry.distance - earlier.distance - earlier.half_width);
+    }
+  }
+  if (!starts_anew(before)) width = std::min(width, 0.5 * (entry.distance - (*ring_)[before].distance));
   return std::min(width, width_within(entry.turn_share, entry.bend_share));
 }
 
 // The largest half-width d for which the junctions within 2 d, rounded as widely, stay within the tolerance together:
 // whoever reaches a place is within 2 d of the widest that does.
-void RoundedPath::choose(std::size_t junction) noexcept {
-  PlannedSegment& entry = segments_[junction];
+void RoundedPath::choose(std::uint64_t junction) noexcept {
+  PlannedSegment& entry = (*ring_)[junction];
+  const double width_before = entry.half_width;
+  const std::uint64_t saw_before = entry.saw_until;
   entry.half_width = 0.0;
-  entry.passed = starts_anew(junction) ? 0.0 : std::numeric_limits<double>::infinity();
+  entry.passed = starts_anew(junction) ? 0.0 : no_limit;
+  entry.saw_until = everything;
   if (starts_anew(junction) || (entry.turn_share <= 0.0 && entry.bend_share <= 0.0)) return;
   double width = widest(junction);
   double turn = entry.turn_share;
   double bend = entry.bend_share;
-  std::size_t left = junction;
-  std::size_t right = junction;
+  std::uint64_t left = junction;
+  std::uint64_t right = junction;
   while (true) {
     // The nearest junction that has not been counted.
-    double to_left = std::numeric_limits<double>::infinity();
-    double to_right = to_left;
-    if (!starts_anew(left)) to_left = entry.distance - segments_[left - 1].distance;
+    double to_left = no_limit;
+    double to_right = no_limit;
+    if (!starts_anew(left)) to_left = entry.distance - (*ring_)[left - 1].distance;
     const double end = end_of(right) - entry.distance;
     if (ends_in_stop(right)) {
-      width = std::min(width, end);
+      // Where more may follow, half of what is left is that of the junction there.
+      const bool is_open = right + 1 == end_ && !(*ring_)[right].segment.stop_at_end;
+      if (is_open && end < 2.0 * width) entry.saw_until = end_;
+      width = std::min(width, is_open ? 0.5 * end : end);
     } else if (right - junction >= lookahead) {
       width = std::min(width, 0.5 * end);
     } else {
@@ -114,17 +155,23 @@ void RoundedPath::choose(std::size_t junction) noexcept {
     const double nearest = std::min(to_left, to_right);
     if (nearest >= 2.0 * width) break;
     const bool is_left = to_left <= to_right;
-    const std::size_t next = is_left ? --left : ++right;
+    const std::uint64_t next = is_left ? --left : ++right;
     if (starts_anew(next)) continue;  // at a stop nothing jumps that counts
-    turn += segments_[next].turn_share;
-    bend += segments_[next].bend_share;
+    turn += (*ring_)[next].turn_share;
+    bend += (*ring_)[next].bend_share;
     const double within = width_within(turn, bend);
     if (within < width) width = std::max(within, 0.5 * nearest);
     if (width <= 0.5 * nearest) break;
   }
-  if (width < narrowest_mm) return stop_at(junction);
+  if (width < narrowest_mm) {
+    if (!is_covered(junction)) return stop_at(junction);
+    // The motion is in a rounding that goes on beyond this junction: no stop is possible there.
+    width = std::max(width_before, narrowest_mm);
+    entry.saw_until = saw_before;
+    entry.is_fixed = true;
+  }
   entry.half_width = width;
-  for (std::size_t i = 0; i < axis_count; ++i) {
+  for (std::size_t i = 0; i < limits_.axes; ++i) {
     const double jump = std::abs(entry.turn[i]) / width + std::abs(entry.bend[i]);
     if (jump <= 0.0) continue;
     entry.passed =
@@ -132,55 +179,94 @@ void RoundedPath::choose(std::size_t junction) noexcept {
   }
 }
 
+bool RoundedPath::is_covered(std::uint64_t junction) const noexcept {
+  const double x = (*ring_)[junction].distance;
+  std::uint64_t before = junction;
+  for (std::size_t n = 0; n < lookahead && !starts_anew(before); ++n) {
+    const PlannedSegment& earlier = (*ring_)[--before];
+    if (earlier.is_fixed && earlier.distance + earlier.half_width > x) return true;
+  }
+  const std::uint64_t last = std::min(end_, junction + lookahead);
+  for (std::uint64_t i = junction + 1; i < last && !starts_anew(i); ++i) {
+    const PlannedSegment& later = (*ring_)[i];
+    if (later.is_fixed && later.distance - later.half_width < x) return true;
+  }
+  return false;
+}
+
 // Distances count from there.
-void RoundedPath::stop_at(std::size_t junction) noexcept {
-  segments_[junction].stop = true;
-  segments_[junction].passed = 0.0;
+void RoundedPath::stop_at(std::uint64_t junction) noexcept {
+  const double x = (*ring_)[junction].distance;
+  (*ring_)[junction].is_narrow = true;
+  (*ring_)[junction].passed = 0.0;
   double distance = 0.0;
-  for (std::size_t i = junction; i < segments_.size(); ++i) {
+  for (std::uint64_t i = junction; i < end_; ++i) {
     if (i > junction && starts_anew(i)) break;
-    segments_[i].distance = distance;
-    distance += segments_[i].segment.length_mm;
+    (*ring_)[i].distance = distance;
+    distance += (*ring_)[i].segment.length_mm;
+  }
+  // What was chosen before this stop was known.
+  std::uint64_t before = junction;
+  for (std::size_t n = 0; n < lookahead && before > start_.first && !starts_anew(before - 1); ++n) {
+    const PlannedSegment& earlier = (*ring_)[--before];
+    if (before > start_.segment && !earlier.is_fixed && earlier.distance + earlier.half_width > x) choose(before);
   }
 }
 
-bool RoundedPath::ends_in_stop(std::size_t segment) const noexcept {
-  return segment + 1 == segments_.size() || starts_anew(segment + 1);
+std::uint64_t RoundedPath::fix(std::uint64_t from, std::uint64_t segment, double offset) noexcept {
+  std::uint64_t fixed = segment;
+  for (std::uint64_t i = from; i <= segment; ++i) (*ring_)[i].is_fixed = true;
+  const double x = (*ring_)[segment].distance + offset;
+  const std::uint64_t last = std::min(end_, segment + lookback);
+  for (std::uint64_t i = segment + 1; i < last && !starts_anew(i); ++i) {
+    PlannedSegment& entry = (*ring_)[i];
+    entry.is_fixed = entry.is_fixed || (entry.half_width > 0.0 && entry.distance - entry.half_width < x);
+    if (entry.is_fixed) fixed = i;
+  }
+  return fixed;
+}
+
+bool RoundedPath::ends_in_stop(std::uint64_t segment) const noexcept {
+  return segment + 1 == end_ || starts_anew(segment + 1);
+}
+
+double RoundedPath::feed_of(const PlannedSegment& entry) const noexcept {
+  return std::min(entry.programmed * entry.feed_share * ratio_, entry.max_speed);
 }
 
 // How far it is to the next stop, as far as that matters.
 double RoundedPath::to_stop() const noexcept {
-  for (std::size_t i = segment_; segments_[i].distance <= x_ + 4.0 * widest_mm; ++i) {
+  for (std::uint64_t i = segment_; (*ring_)[i].distance <= x_ + 4.0 * widest_mm; ++i) {
     if (ends_in_stop(i)) return end_of(i) - x_;
   }
-  return std::numeric_limits<double>::infinity();
+  return no_limit;
 }
 
 // Every junction whose rounding may begin within the segment at hand or reach it.
 template <class See>
 void RoundedPath::see_roundings(const See& see) const noexcept {
-  const std::size_t last = std::min(segments_.size(), segment_ + lookahead + 2);
-  for (std::size_t i = segment_ + 1; i < last && !starts_anew(i); ++i) {
-    if (segments_[i].distance - x_ > 4.0 * widest_mm) break;
-    see(segments_[i], true);
+  const std::uint64_t last = std::min(end_, segment_ + lookahead + 2);
+  for (std::uint64_t i = segment_ + 1; i < last && !starts_anew(i); ++i) {
+    if ((*ring_)[i].distance - x_ > 4.0 * widest_mm) break;
+    see((*ring_)[i], true);
   }
-  std::size_t i = segment_;
+  std::uint64_t i = segment_;
   for (std::size_t n = 0; n <= lookahead && !starts_anew(i); ++n, --i) {
-    if (x_ - segments_[i].distance > widest_mm) break;
-    see(segments_[i], false);
+    if (x_ - (*ring_)[i].distance > widest_mm) break;
+    see((*ring_)[i], false);
   }
 }
 
 // The next place where the third derivative jumps.
 double RoundedPath::next_break() const noexcept {
   double at = end_of(segment_);
-  double close = std::numeric_limits<double>::infinity();
+  double close = no_limit;
   see_roundings([&](const PlannedSegment& junction, bool) {
     if (std::abs(x_ - junction.distance) < junction.half_width) {
       close = std::min(close, junction.half_width / closest_on_half);
     }
   });
-  const double least = x_ + (close < std::numeric_limits<double>::infinity() ? close : shortest_mm);
+  const double least = x_ + (close < no_limit ? close : shortest_mm);
   see_roundings([&](const PlannedSegment& junction, bool) {
     const double d = junction.half_width;
     if (d <= 0.0) return;
@@ -195,7 +281,7 @@ double RoundedPath::next_break() const noexcept {
 
 // The square of the speed that the junctions around let a motion have.
 double RoundedPath::squared_speed() const noexcept {
-  const double gain = 2.0 * *std::ranges::min_element(limits_.acceleration);
+  const double gain = 2.0 * least_acceleration_;
   double squared = gain * x_;
   see_roundings([&](const PlannedSegment& junction, bool) {
     squared = std::min(squared, junction.passed + gain * std::abs(x_ - junction.distance));
@@ -205,17 +291,19 @@ double RoundedPath::squared_speed() const noexcept {
 
 // How long an interval may be here.
 double RoundedPath::step() const noexcept {
-  const PlannedSegment& entry = segments_[segment_];
+  const PlannedSegment& entry = (*ring_)[segment_];
+  AxisValues direction = entry.rate;
   const Vector3 tangent = tangent_at(entry.segment, x_ - entry.distance);
-  double speed = std::min(entry.segment.feed_mm_per_s, along({tangent[0], tangent[1], tangent[2]}, limits_.speed));
+  std::copy_n(tangent.data(), axis_count, direction.begin());
+  double speed = std::min(feed_of(entry), along(direction, limits_.speed, limits_.axes));
   double step = widest_mm;
   if (entry.segment.kind == SegmentKind::arc) {
     const double bend = curvature(entry.segment);
-    speed = std::min(speed, std::sqrt(*std::ranges::max_element(limits_.acceleration) / bend));
+    speed = std::min(speed, std::sqrt(highest_acceleration_ / bend));
     step = std::min(step, radians_of_arc / bend);
   }
   speed = std::min(speed, std::sqrt(squared_speed()));
-  step = std::clamp(periods_of_interval * period_s_ * speed, stopping_length_, step);
+  step = std::min(step, std::max(periods_of_interval * period_s_ * speed, stopping_length_));
   see_roundings([&](const PlannedSegment& junction, bool) {
     const double d = junction.half_width;
     if (d > 0.0 && x_ >= junction.distance - d - shortest_mm && x_ < junction.distance + d - shortest_mm) {
@@ -226,7 +314,7 @@ double RoundedPath::step() const noexcept {
 }
 
 bool RoundedPath::next(Station& station) noexcept {
-  if (segment_ == segments_.size()) return false;
+  if (segment_ == end_) return false;
   double end = next_break();
   double length = step();
   const double left = to_stop();
@@ -239,7 +327,7 @@ bool RoundedPath::next(Station& station) noexcept {
   station = Station{};
   station.distance = x_;
   station.segment = segment_;
-  station.offset = x_ - segments_[segment_].distance;
+  station.offset = x_ - (*ring_)[segment_].distance;
   fill(end - x_, station);
   x_ = end;
   if (x_ >= end_of(segment_) - shortest_mm) {
@@ -258,7 +346,7 @@ Derivatives RoundedPath::roundings_at(double x, AxisValues& position) const noex
     if (std::abs(u) >= 1.0) return;
     const Rounding turn = turn_rounding(u, ahead);
     const Rounding bend = bend_rounding(u, ahead);
-    for (std::size_t i = 0; i < axis_count; ++i) {
+    for (std::size_t i = 0; i < limits_.axes; ++i) {
       position[i] += d * (junction.turn[i] * turn.position + junction.bend[i] * d * bend.position);
       sum.first[i] += junction.turn[i] * turn.first + junction.bend[i] * d * bend.first;
       sum.second[i] += junction.turn[i] * turn.second / d + junction.bend[i] * bend.second;
@@ -269,23 +357,26 @@ Derivatives RoundedPath::roundings_at(double x, AxisValues& position) const noex
 }
 
 void RoundedPath::fill(double length, Station& station) const noexcept {
-  const PlannedSegment& entry = segments_[segment_];
+  const PlannedSegment& entry = (*ring_)[segment_];
   station.length = length;
   station.arc = entry.segment.kind == SegmentKind::arc;
-  station.speed_limit = entry.segment.feed_mm_per_s;
+  station.speed_limit = feed_of(entry);
+  see_roundings([&](const PlannedSegment& junction, bool) {
+    const double from = std::abs(x_ + 0.5 * length - junction.distance) - 0.5 * length;
+    if (from <= junction.half_width) station.speed_limit = std::min(station.speed_limit, junction.corner_speed);
+  });
   station.share = entry.limit_share;
   station.stop = x_ <= 0.0;
   if (station.offset <= shortest_mm) {
-    station.valley = entry.half_width > 0.0 &&
-                     entry.passed < entry.segment.feed_mm_per_s * entry.segment.feed_mm_per_s &&
-                     entry.passed <= squared_speed();
+    station.valley =
+        entry.half_width > 0.0 && entry.passed < feed_of(entry) * feed_of(entry) && entry.passed <= squared_speed();
   }
   AxisValues position{};
   const Derivatives begin = roundings_at(x_, position);
   AxisValues unused{};
   const Derivatives end = roundings_at(x_ + length, unused);
   bool rounded = false;
-  for (std::size_t i = 0; i < axis_count; ++i) {
+  for (std::size_t i = 0; i < limits_.axes; ++i) {
     station.position[i] = position[i];
     station.first[i] = begin.first[i];
     station.second[i] = begin.second[i];
@@ -300,6 +391,12 @@ void RoundedPath::fill(double length, Station& station) const noexcept {
       station.first[i] += tangent[static_cast<Eigen::Index>(i)];
     }
   }
+  for (std::size_t i = axis_count; i < limits_.axes; ++i) {
+    station.position[i] += entry.start[i] + entry.rate[i] * station.offset;
+    station.first[i] += entry.rate[i];
+  }
+  station.max_acceleration = entry.max_acceleration;
+  station.max_jerk = entry.max_jerk;
   station.straight = !station.arc && !rounded;
 }
 

@@ -2,48 +2,71 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
+#include <cstdint>
 
 #include "planner/stations.hpp"
 
 namespace shapegcode {
+
+/// A position on the path, so many mm behind the start of a segment, and the segment with which the path begins.
+struct PathStart {
+  std::uint64_t first = 0, segment = 0;
+  double offset = 0.0;
+};
 
 /// Every junction is rounded by itself: its jump of the direction, or of the second derivative, is spread over the path
 /// by a curve of its own, which is nothing beyond the half-width. Where the curves of several junctions overlap they
 /// add up. Half-widths are so chosen that what adds up stays within the tolerance.
 class RoundedPath {
  public:
-  /// Chooses the half-widths.
-  RoundedPath(std::vector<PlannedSegment> segments, const AxisLimits& limits, double period_s);
+  /// The ring must outlive it.
+  RoundedPath(SegmentRing& ring, const AxisLimits& limits, double period_s);
 
+  /// Chooses the half-widths of what is not fixed yet, from a position on: so many mm behind the start of a segment.
+  /// `first`: the segment with which the path begins; segments before `end` are known. Feeds are run at this ratio.
+  void start(const PathStart& start, std::uint64_t end, double ratio) noexcept;
   /// The next interval; false at the end.
   [[nodiscard]] bool next(Station& station) noexcept;
-  [[nodiscard]] const std::vector<PlannedSegment>& segments() const noexcept { return segments_; }
+
+  /// Motion was planned up to a position: the roundings that it has begun stay as they are. The last one of them.
+  std::uint64_t fix(std::uint64_t from, std::uint64_t segment, double offset) noexcept;
+  /// Whether a rounding that is fixed reaches over a junction.
+  [[nodiscard]] bool is_covered(std::uint64_t junction) const noexcept;
+  [[nodiscard]] const PlannedSegment& segment(std::uint64_t index) const noexcept { return (*ring_)[index]; }
   /// How long the last interval before a stop is, mm.
   [[nodiscard]] double stopping_length() const noexcept { return stopping_length_; }
 
+  /// Segments behind a position that its roundings need.
+  static constexpr std::size_t lookback = 18;
+
  private:
-  void choose(std::size_t junction) noexcept;
-  void stop_at(std::size_t junction) noexcept;
-  [[nodiscard]] double widest(std::size_t junction) const noexcept;
-  [[nodiscard]] double end_of(std::size_t segment) const noexcept;
-  [[nodiscard]] bool starts_anew(std::size_t segment) const noexcept;
-  [[nodiscard]] bool ends_in_stop(std::size_t segment) const noexcept;
+  void choose(std::uint64_t junction) noexcept;
+  void stop_at(std::uint64_t junction) noexcept;
+  [[nodiscard]] double widest(std::uint64_t junction) const noexcept;
+  [[nodiscard]] double end_of(std::uint64_t segment) const noexcept;
+  [[nodiscard]] bool starts_anew(std::uint64_t segment) const noexcept;
+  [[nodiscard]] bool ends_in_stop(std::uint64_t segment) const noexcept;
   [[nodiscard]] double to_stop() const noexcept;
   [[nodiscard]] double next_break() const noexcept;
   [[nodiscard]] double squared_speed() const noexcept;
   [[nodiscard]] double step() const noexcept;
+  [[nodiscard]] double feed_of(const PlannedSegment& entry) const noexcept;
   template <class See>
   void see_roundings(const See& see) const noexcept;
   [[nodiscard]] Derivatives roundings_at(double x, AxisValues& position) const noexcept;
   void fill(double length, Station& station) const noexcept;
 
-  std::vector<PlannedSegment> segments_;
+  SegmentRing* ring_;
   AxisLimits limits_;
   double period_s_;
+  double least_acceleration_, highest_acceleration_;
   double stopping_length_;
-  std::size_t segment_ = 0;  // of the next interval
-  double x_ = 0.0;           // where it begins, since the last stop
+  double ratio_ = 1.0;
+  PathStart start_;
+  double start_x_ = 0.0;
+  std::uint64_t end_ = 0;
+  std::uint64_t segment_ = 0;  // of the next interval
+  double x_ = 0.0;             // where it begins, since the last stop
 };
 
 }  // namespace shapegcode

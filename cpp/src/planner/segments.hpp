@@ -3,27 +3,65 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
 
 #include "shapegcode/path.hpp"
 
 namespace shapegcode {
 
-using AxisValues = std::array<double, axis_count>;
+/// X, Y and Z, and axes that follow the path.
+inline constexpr std::size_t max_path_axes = 9;
+using AxisValues = std::array<double, max_path_axes>;
+
+inline constexpr double no_limit = std::numeric_limits<double>::infinity();
 
 struct PlannedSegment {
   Segment segment;
-  // The junction at its start.
-  bool stop = false;         ///< the motion comes to rest there
-  AxisValues turn{};         ///< jump of the direction, the first derivative by the path length
-  AxisValues bend{};         ///< jump of the second derivative, 1/mm
-  double turn_share = 0.0;   ///< of the tolerance, per mm of the half-width of its rounding
-  double bend_share = 0.0;   ///< the same per mm^2
-  double programmed = 0.0;   ///< feed; that of the segment is the one that is planned, mm/s
-  double limit_share = 1.0;  ///< of acceleration and jerk that is planned on it
+  AxisValues rate{};          ///< of an axis behind Z: its travel per mm of the path
+  AxisValues start{}, end{};  ///< position of such an axis at both ends
 
-  double distance = 0.0;    ///< of its start, since the last stop
-  double half_width = 0.0;  ///< over which the junction is rounded, to both sides
-  double passed = 0.0;      ///< square of the speed at which that can be passed
+  // Of the segment; without the override.
+  double programmed = 0.0;             ///< feed, mm/s
+  double max_speed = no_limit;         ///< whatever the override
+  double max_acceleration = no_limit;  ///< along the path, beside the limits of the axes
+  double max_jerk = no_limit;
+
+  // The junction at its start.
+  bool stop = false;               ///< the motion comes to rest there
+  AxisValues turn{};               ///< jump of the direction, the first derivative by the path length
+  AxisValues bend{};               ///< jump of the second derivative, 1/mm
+  double turn_share = 0.0;         ///< of the tolerance, per mm of the half-width of its rounding
+  double bend_share = 0.0;         ///< the same per mm^2
+  double corner_speed = no_limit;  ///< the fastest that it is passed
+
+  // Of the planner.
+  double feed_share = 1.0;      ///< of the feed that is planned
+  double limit_share = 1.0;     ///< of acceleration and jerk that is planned on it
+  bool is_narrow = false;       ///< the rounding would be too small: a stop
+  double distance = 0.0;        ///< of its start, since the last stop
+  double half_width = 0.0;      ///< over which the junction is rounded, to both sides
+  double passed = 0.0;          ///< square of the speed at which that can be passed
+  bool is_fixed = false;        ///< the motion has been planned into the rounding
+  std::uint64_t saw_until = 0;  ///< segments before this one were considered when the rounding was chosen
+};
+
+/// A ring of segments: segment `index`, counted from the first one ever, is entry `index & mask`.
+class SegmentRing {
+ public:
+  /// `capacity`: a power of two.
+  explicit SegmentRing(std::size_t capacity) : entries_(capacity) {}
+  [[nodiscard]] PlannedSegment& operator[](std::uint64_t index) noexcept {
+    return entries_[index & (entries_.size() - 1)];
+  }
+  [[nodiscard]] const PlannedSegment& operator[](std::uint64_t index) const noexcept {
+    return entries_[index & (entries_.size() - 1)];
+  }
+  [[nodiscard]] std::size_t capacity() const noexcept { return entries_.size(); }
+
+ private:
+  std::vector<PlannedSegment> entries_;
 };
 
 }  // namespace shapegcode

@@ -2,19 +2,20 @@
 #pragma once
 
 #include <cstddef>
-#include <limits>
+#include <cstdint>
 
 #include "planner/segments.hpp"
 
 namespace shapegcode {
 
-/// Limits of every axis, all finite.
+/// Limits of every axis; those of acceleration and jerk are finite.
 struct AxisLimits {
   AxisValues speed{}, acceleration{}, jerk{};
+  std::size_t axes = axis_count;
   /// So much of acceleration and jerk.
   [[nodiscard]] AxisLimits share(double share) const noexcept {
     AxisLimits less = *this;
-    for (std::size_t i = 0; i < axis_count; ++i) {
+    for (std::size_t i = 0; i < axes; ++i) {
       less.acceleration[i] *= share;
       less.jerk[i] *= share;
     }
@@ -23,7 +24,7 @@ struct AxisLimits {
 };
 
 /// The limit of a motion along a direction.
-[[nodiscard]] double along(const AxisValues& direction, const AxisValues& limits) noexcept;
+[[nodiscard]] double along(const AxisValues& direction, const AxisValues& limits, std::size_t axes) noexcept;
 
 /// First to third derivative of the positions by the path parameter, which is the length of the programmed path.
 struct Derivatives {
@@ -53,22 +54,24 @@ struct Station {
   double distance = 0.0;  ///< since the last stop
   double length = 0.0;    ///< of the interval
   double offset = 0.0;    ///< from the start of the segment
-  std::size_t segment = 0;
+  std::uint64_t segment = 0;
   bool stop = false;  ///< the motion comes to rest here
   bool arc = false;
-  bool valley = false;                                      ///< the slowest place around: braking is over here
-  bool straight = false;                                    ///< a line that no rounding reaches
-  double speed_limit = 0.0;                                 ///< of the interval: feed and axes
-  double share = 1.0;                                       ///< of acceleration and jerk that is planned here
-  double straight_acceleration = 0.0, straight_jerk = 0.0;  ///< of a straight one
-  AxisValues position{}, first{}, second{}, third{};        ///< at its begin
+  bool valley = false;                                ///< the slowest place around: braking is over here
+  bool straight = false;                              ///< a line that no rounding reaches
+  double speed_limit = 0.0;                           ///< of the interval: feed and axes
+  double share = 1.0;                                 ///< of acceleration and jerk that is planned here
+  double max_acceleration = 0.0, max_jerk = 0.0;      ///< along the path: of a straight one, or of its segment
+  AxisValues position{}, first{}, second{}, third{};  ///< at its begin
 
   [[nodiscard]] double squared_limit() const noexcept { return speed_limit * speed_limit; }
 };
 
-/// Derivatives at `x` mm behind a station.
-[[nodiscard]] Derivatives derivatives_at(const Station& station, const PlannedSegment& segment, double x) noexcept;
+/// Derivatives of so many axes at `x` mm behind a station.
+[[nodiscard]] Derivatives derivatives_at(const Station& station, const PlannedSegment& segment, double x,
+                                         std::size_t axes) noexcept;
 /// Position there.
-[[nodiscard]] AxisValues position_at(const Station& station, const PlannedSegment& segment, double x) noexcept;
+[[nodiscard]] AxisValues position_at(const Station& station, const PlannedSegment& segment, double x,
+                                     std::size_t axes) noexcept;
 
 }  // namespace shapegcode

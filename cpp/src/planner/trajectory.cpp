@@ -1,6 +1,7 @@
 #include "shapegcode/planner.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "base/checks.hpp"
+#include "planner/junction.hpp"
 #include "planner/path_motion.hpp"
 #include "planner/path_plan.hpp"
 #include "planner/segments.hpp"
@@ -17,16 +19,10 @@
 namespace shapegcode {
 namespace {
 
-// What rounding a jump of a derivative over the half-width d to both sides takes off the path: of the direction, times
-// d, and of the second derivative, times d^2.
-constexpr double turn_deviation = 1.0 / 6.0;
-constexpr double bend_deviation = 1.0 / 120.0;
-// Jumps of a derivative that are rounding of coordinates.
-constexpr double no_jump = 1e-9;
 // Share of acceleration and jerk that is planned. Between the places where an interval is looked at the limits may be
 // passed by a little: then less is planned around there, at least so much of it.
 constexpr double planned_share = 0.9998;
-constexpr double kept = 1.0005;
+constexpr double kept = 1.0009;
 constexpr double kept_feed = 1.0009;
 constexpr double most_less = 0.7;
 constexpr double least_share = 0.3;
@@ -35,16 +31,12 @@ constexpr int most_plans = 24;
 constexpr std::size_t progress_periods = 4096;
 constexpr double progress_mm = 1e-6;
 
-double size_of(const Vector3& jump) noexcept {
-  const double size = jump.norm();
-  return size > no_jump ? size : 0.0;
-}
-
-// `numbers`: of each of them on the path.
-std::vector<PlannedSegment> planned_segments(const Path& path, double tolerance_mm,
-                                             std::vector<std::uint32_t>& numbers) {
-  std::vector<PlannedSegment> segments;
-  segments.reserve(path.size());
+// The segments in a ring, and of each its number on the path.
+SegmentRing ring_of(const Path& path, double tolerance_mm, std::vector<std::uint32_t>& numbers) {
+  SegmentRing ring(std::bit_ceil(path.size() + 1));
+  PathTolerance tolerance;
+  tolerance.contour_mm = tolerance_mm;
+  bool stop = false;
   std::uint32_t number = 0;
   for (const Segment& segment : path.segments()) {
     const std::uint32_t here = number++;
@@ -52,41 +44,35 @@ std::vector<PlannedSegment> planned_segments(const Path& path, double tolerance_
       throw Error(ErrorKind::argument, "segment without a feed greater than zero", segment.line);
     }
     if (!(segment.length_mm > 0.0)) {
-      if (!segments.empty()) segments.back().segment.stop_at_end |= segment.stop_at_end;
+      stop = stop || segment.stop_at_end;
       continue;
     }
-    PlannedSegment planned;
+    PlannedSegment& planned = ring[numbers.size()];
     planned.segment = segment;
     planned.programmed = segment.feed_mm_per_s;
-    if (!segments.empty()) {
-      const Segment& before = segments.back().segment;
-      planned.stop = before.stop_at_end;
-      const Vector3 turn = tangent_at(segment, 0.0) - tangent_at(before, before.length_mm);
-      const Vector3 bend = bend_at(segment, 0.0) - bend_at(before, before.length_mm);
-      std::copy_n(turn.data(), axis_count, planned.turn.begin());
-      std::copy_n(bend.data(), axis_count, planned.bend.begin());
-      const double turned = size_of(turn);
-      const double bent = size_of(bend);
-      if (turned > 0.0) planned.turn_share = turn_deviation * turned / tolerance_mm;
-      if (bent > 0.0) planned.bend_share = bend_deviation * bent / tolerance_mm;
-    }
-    segments.push_back(planned);
+    const std::size_t count = numbers.size();
+    planned.stop = count > 0 && stop;
+    stop = segment.stop_at_end;
+    if (count > 0) look_at_junction(ring[count - 1], tolerance, planned);
     numbers.push_back(here);
   }
-  return segments;
+  if (!numbers.empty()) ring[numbers.size() - 1].segment.stop_at_end = true;
+  return ring;
 }
 
 // Set-points, and the segment of each; `ends`: at the end of the path.
 struct Run {
   std::vector<Vector3> points;
   std::vector<std::size_t> segments;
+  std::size_t count = 0;  // of the segments of the path
   bool ends = true;
 };
 
-Run run(const std::vector<PlannedSegment>& segments, const AxisLimits& limits, double period_s) {
-  const PathPlan plan(segments, limits, period_s);
+Run run(SegmentRing& segments, std::size_t count, const AxisLimits& limits, double period_s) {
+  PathPlan plan(segments, limits, period_s, 0);
+  plan.make({}, {}, count, 1.0);
   PathMotion motion(plan, period_s);
-  Run run{{segments.front().segment.start_mm}, {0}};
+  Run run{{segments[0].segment.start_mm}, {0}, count};
   Vector3 seen = run.points.back();
   while (!motion.at_end()) {
     motion.advance();
@@ -101,7 +87,7 @@ Run run(const std::vector<PlannedSegment>& segments, const AxisLimits& limits, d
     }
     seen = run.points.back();
   }
-  run.points.back() = segments.back().segment.end_mm;
+  run.points.back() = segments[count - 1].segment.end_mm;
   return run;
 }
 
@@ -111,14 +97,15 @@ double largest(const Vector3& value, const Vector3& limit) noexcept {
 
 // Largest differences of the set-points over the limits. Where acceleration or jerk are beyond them, less is planned on
 // the segments around.
-double worst_of(const Run& run, const TrajectoryLimits& limits, double period_s, std::vector<PlannedSegment>& segments,
+double worst_of(const Run& run, const TrajectoryLimits& limits, double period_s, SegmentRing& segments,
                 double& feed_share) {
   const std::ptrdiff_t last = std::ssize(run.points) - 1;
   const auto index = [last](std::ptrdiff_t k) {
     return static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last));
   };
   const auto at = [&](std::ptrdiff_t k) -> const Vector3& { return run.points[index(k)]; };
-  std::vector<double> share(segments.size(), 1.0);
+  const std::size_t count = run.count;
+  std::vector<double> share(count, 1.0);
   std::vector<double> slower = share;
   double fastest = 0.0;
   double worst = 0.0;
@@ -145,7 +132,7 @@ double worst_of(const Run& run, const TrajectoryLimits& limits, double period_s,
     }
     if (beyond <= kept) continue;
     const std::size_t first = run.segments[index(k - 4)];
-    const std::size_t end = std::min(segments.size(), run.segments[index(k + 1)] + 2);
+    const std::size_t end = std::min(count, run.segments[index(k + 1)] + 2);
     for (std::size_t i = first - std::min<std::size_t>(first, 1); i < end; ++i) {
       share[i] = std::min(share[i], std::max(most_less, 1.0 / beyond));
     }
@@ -153,13 +140,13 @@ double worst_of(const Run& run, const TrajectoryLimits& limits, double period_s,
   if (!run.ends) {
     worst = std::numeric_limits<double>::infinity();
     const std::size_t where = run.segments.back();
-    for (std::size_t i = where - std::min<std::size_t>(where, 1); i < std::min(segments.size(), where + 3); ++i) {
+    for (std::size_t i = where - std::min<std::size_t>(where, 1); i < std::min(count, where + 3); ++i) {
       share[i] = most_less;
     }
   }
-  for (std::size_t i = 0; i < segments.size(); ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     segments[i].limit_share *= share[i];
-    segments[i].segment.feed_mm_per_s *= slower[i];
+    segments[i].feed_share *= slower[i];
     // What is still beyond them when little is planned is run from rest to rest.
     if (share[i] < 1.0 && i > 0 && segments[i].limit_share < least_share) segments[i].stop = true;
   }
@@ -182,11 +169,12 @@ void check(const TrajectoryLimits& limits, double period_s) {
 TimeOptimalMotion time_optimal_motion(const Path& path, const TrajectoryLimits& limits, double period_s) {
   check(limits, period_s);
   std::vector<std::uint32_t> numbers;
-  std::vector<PlannedSegment> segments = planned_segments(path, limits.contour_tolerance_mm, numbers);
+  SegmentRing segments = ring_of(path, limits.contour_tolerance_mm, numbers);
+  const std::size_t count = numbers.size();
   TimeOptimalMotion motion;
   Samples& samples = motion.set_points;
   samples.period_s = period_s;
-  if (segments.empty()) {
+  if (count == 0) {
     samples.positions_mm.resize(0, axis_count);
     return motion;
   }
@@ -200,7 +188,7 @@ TimeOptimalMotion time_optimal_motion(const Path& path, const TrajectoryLimits& 
       // No more than what changes the acceleration within a period.
       axes.jerk[i] = std::min(planned_share * limits.max_jerk_mm_per_s3[axis], axes.acceleration[i] / period_s);
     }
-    const Run found = run(segments, axes, period_s);
+    const Run found = run(segments, count, axes, period_s);
     if (worst_of(found, limits, period_s, segments, feed_share) > kept) continue;
     samples.positions_mm.resize(std::ssize(found.points), axis_count);
     for (std::size_t k = 0; k < found.points.size(); ++k) {

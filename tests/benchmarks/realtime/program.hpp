@@ -20,7 +20,8 @@ using shapegcode::Vector3;
 inline constexpr double period_s = 1e-3;
 
 /// Jerk-limited, ZV shaper of 46 Hz, contour correction, X Y Z.
-inline shapegcode::ControllerSettings settings_with(std::size_t window) {
+/// Another thread plans so many periods ahead; 0: step() does.
+inline shapegcode::ControllerSettings settings_with(std::size_t window, int lead_periods = 0) {
   shapegcode::ControllerSettings settings;
   settings.period_s = period_s;
   settings.limits.law = shapegcode::AccelerationLaw::jerk_limited;
@@ -32,6 +33,8 @@ inline shapegcode::ControllerSettings settings_with(std::size_t window) {
   settings.contour_correction = true;
   settings.window = window;
   settings.queue = 1024;
+  settings.plans_in_step = lead_periods == 0;
+  settings.lead_periods = lead_periods;
   return settings;
 }
 

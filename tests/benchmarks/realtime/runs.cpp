@@ -18,7 +18,9 @@ using shapegcode::axis_count;
 using SetPoint = std::array<double, axis_count>;
 
 constexpr std::size_t burst = 500;
-constexpr std::uint64_t enough_waiting = 768;  // of 1024
+// More than a burst; and what a loop of 1 ms has.
+constexpr int free_lead = 800;
+constexpr int periodic_lead = 200;
 constexpr std::int64_t nap_ns = 100'000;
 
 // Keeps the compiler from leaving out or moving what made `values`.
@@ -50,7 +52,6 @@ class Feeder {
   }
   // Where the last of push_last() ends.
   [[nodiscard]] const Vector3& end() const noexcept { return end_; }
-  [[nodiscard]] std::uint64_t pushed() const noexcept { return pushed_.load(std::memory_order_acquire); }
 
  private:
   bool taken(PushResult result) {
@@ -60,7 +61,6 @@ class Feeder {
       std::abort();
     }
     segment_ = program_.next();
-    pushed_.fetch_add(1, std::memory_order_release);
     return true;
   }
 
@@ -68,13 +68,13 @@ class Feeder {
   Program program_;
   Segment segment_;
   Vector3 end_ = Vector3::Zero();
-  std::atomic<std::uint64_t> pushed_ = 0;
 };
 
-// A thread that pushes whenever there is room.
+// A thread that pushes whenever there is room, and plans.
 class Planner {
  public:
-  Planner(Feeder& feeder, Durations& durations) : thread_([&] { run(feeder, durations); }) {}
+  Planner(MotionController& control, Feeder& feeder, Durations& durations)
+      : thread_([&] { run(control, feeder, durations); }) {}
   ~Planner() { stop(); }
   Planner(const Planner&) = delete;
   Planner& operator=(const Planner&) = delete;
@@ -84,29 +84,37 @@ class Planner {
     if (thread_.joinable()) thread_.join();
     return calls_;
   }
+  // How often there was nothing left to plan.
+  [[nodiscard]] std::uint64_t finished() const noexcept { return finished_.load(std::memory_order_acquire); }
 
  private:
-  void run(Feeder& feeder, Durations& durations) {
+  void run(MotionController& control, Feeder& feeder, Durations& durations) {
     const interposer::Calls before = interposer::calls();
     while (!ended_.load(std::memory_order_relaxed)) {
-      if (!feeder.push(durations)) sleep_for(nap_ns);
+      while (feeder.push(durations)) {
+      }
+      if (control.plan()) continue;
+      finished_.fetch_add(1, std::memory_order_release);
+      sleep_for(nap_ns);
     }
     calls_ = interposer::calls() - before;
   }
 
   std::atomic<bool> ended_ = false;
+  std::atomic<std::uint64_t> finished_ = 0;
   interposer::Calls calls_;
   std::thread thread_;
 };
 
-void free_steps(FreeRun& run, MotionController& control, const Feeder& feeder, std::size_t steps) {
+void free_steps(FreeRun& run, MotionController& control, const Planner& planner, std::size_t steps) {
   run.thread = become_real_time();
   SetPoint set_point{};
   Operator panel;
   Activity activity = Activity::idle;
   const interposer::Calls before = interposer::calls();
   for (std::size_t done = 0; done < steps; done += burst) {
-    while (feeder.pushed() - control.state().segments_done < enough_waiting) sleep_for(nap_ns);
+    const std::uint64_t finished = planner.finished();
+    while (planner.finished() < finished + 2) sleep_for(nap_ns);
     std::int64_t left = 0;  // of the time that the clock is read for
     for (std::size_t i = 0; i < burst; ++i) {
       const bool changes = panel.act(control, activity);
@@ -134,13 +142,17 @@ void free_steps(FreeRun& run, MotionController& control, const Feeder& feeder, s
 // Steps a fresh control, fed every 64 steps; `each(i, changes, ns)` has the time of step i.
 template <class Each>
 void steps_of_one_thread(std::size_t steps, Each&& each) {
-  MotionController control(settings_with(128));
+  MotionController control(settings_with(128, free_lead));
   Feeder feeder(control);
   Operator panel;
   SetPoint set_point{};
   Activity activity = Activity::idle;
   for (std::size_t i = 0; i < steps; ++i) {
-    if (i % 64 == 0) feeder.fill();
+    if (i % 64 == 0) {
+      feeder.fill();
+      while (control.plan()) {
+      }
+    }
     const bool changes = panel.act(control, activity);
     const std::int64_t begin = now_ns();
     activity = control.step(set_point);
@@ -154,12 +166,12 @@ void steps_of_one_thread(std::size_t steps, Each&& each) {
 FreeRun free_running(std::size_t steps, std::size_t window) {
   steps = (steps + burst - 1) / burst * burst;
   FreeRun run(steps, steps);
-  MotionController control(settings_with(window));
+  MotionController control(settings_with(window, free_lead));
   Feeder feeder(control);
-  Planner planner(feeder, run.push);
+  Planner planner(control, feeder, run.push);
   std::atomic<bool> ended = false;
   std::thread stepping([&] {
-    free_steps(run, control, feeder, steps);
+    free_steps(run, control, planner, steps);
     ended = true;
   });
   // Somebody looks at the state, as a user interface does.
@@ -203,12 +215,12 @@ Periodic periodic(double minutes) {
   constexpr auto period_ns = static_cast<std::int64_t>(period_s * 1e9);
   const auto periods = static_cast<std::size_t>(minutes * 60e9 / static_cast<double>(period_ns));
   Periodic found(periods);
-  MotionController control(settings_with(128));
+  MotionController control(settings_with(128, periodic_lead));
   Feeder feeder(control);
   Durations pushes(1);
   const OthersLoad load;
   auto busy = std::make_unique<BusyProcess>();
-  Planner planner(feeder, pushes);
+  Planner planner(control, feeder, pushes);
   sleep_for(ns_per_s / 2);
   const std::int64_t start = now_ns() + ns_per_s / 10;
 

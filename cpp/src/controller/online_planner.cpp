@@ -1,0 +1,367 @@
+#include "controller/online_planner.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace shapegcode {
+namespace {
+
+// Of acceleration and jerk that is planned, and by how much set-points may exceed what is asked for.
+constexpr double planned_share = 0.9998;
+constexpr double kept = 1.0009;
+constexpr double kept_feed = 1.0009;
+// Periods of a section, by the stop behind it: what it costs to plan that is spread over them.
+constexpr double periods_share = 0.125;
+constexpr std::size_t shortest_section = 8;
+constexpr std::size_t longest_section = 32;
+// The lead is made of so many sections; besides there is the one that is run, and one that is planned.
+constexpr std::size_t sections_ahead = 8;
+constexpr std::size_t spare_sections = 3;
+// A running motion is planned on from so many periods ahead where another thread steps.
+constexpr std::size_t margin_periods = 2;
+// So many of the longest stops are planned ahead, and another plan is made when so many are left.
+constexpr double stops_planned = 8.0;
+constexpr double stops_ahead = 2.0;
+// Of the window, or of the stations, where they do not reach so far.
+constexpr double renewed_share = 0.25;
+// What is tried while the motion is under way, by its speed; and how often from rest, with less each time.
+constexpr std::array<double, 4> slower{no_limit, 0.9, 0.6, 0.0};
+constexpr int attempts_at_rest = 12;
+// Plans that are made at once, with less each time where limits would be passed.
+constexpr int plans = 4;
+constexpr double most_less = 0.7;
+constexpr double least_share = 0.3;
+// A lower override is approached from above.
+constexpr double below_feed = 0.9995;
+// As near as that to the end of a segment is its end, mm.
+constexpr double at_end_mm = 1e-9;
+// Stations for each segment of the window, and at least.
+constexpr std::size_t stations_of_segment = 16;
+constexpr std::size_t least_stations = 2048;
+// Points of a section: those of the longest stop, twice, within these bounds; and the speed where none is limited.
+constexpr double stop_room = 2.0;
+constexpr double least_points = 512.0;
+constexpr double most_points = 16384.0;
+constexpr double highest_speed = 1000.0;
+
+AxisLimits planned(const PlanningRules& rules) noexcept {
+  AxisLimits limits = rules.limits.share(planned_share);
+  for (std::size_t i = 0; i < limits.axes; ++i) {
+    // No more than what changes the acceleration within a period.
+    limits.jerk[i] = std::min(limits.jerk[i], limits.acceleration[i] / rules.period_s);
+  }
+  return limits;
+}
+
+std::size_t points_of(const PlanningRules& rules) noexcept {
+  double longest_s = 0.0;
+  for (std::size_t i = 0; i < rules.limits.axes; ++i) {
+    const double speed = std::min(rules.limits.speed[i], highest_speed);
+    const double acceleration = rules.limits.acceleration[i];
+    longest_s = std::max(longest_s, speed / acceleration + acceleration / rules.limits.jerk[i]);
+  }
+  const double points = stop_room * longest_s / rules.period_s;
+  return std::max(longest_section, static_cast<std::size_t>(rules.lead_periods) / sections_ahead) +
+         static_cast<std::size_t>(std::clamp(points, least_points, most_points));
+}
+
+}  // namespace
+
+OnlinePlanner::OnlinePlanner(SegmentRing& ring, const PlanningRules& rules)
+    : ring_(&ring),
+      rules_(rules),
+      sections_(points_of(rules), rules.lead_periods > 0 ? sections_ahead + spare_sections : spare_sections + 1),
+      plan_(ring, planned(rules), rules.period_s, std::max(least_stations, stations_of_segment * rules.window),
+            rules.max_across),
+      motion_(plan_, rules.period_s) {
+  const auto end = static_cast<std::ptrdiff_t>(rules.limits.axes);
+  const AxisLimits limits = planned(rules);
+  least_acceleration_ = *std::min_element(limits.acceleration.begin(), limits.acceleration.begin() + end);
+  least_jerk_ = *std::min_element(limits.jerk.begin(), limits.jerk.begin() + end);
+  restart(0, {});
+}
+
+void OnlinePlanner::restart(std::uint64_t first, const AxisValues& position) noexcept {
+  PlannedPoint point;
+  point.position = position;
+  point.point.segment = first;
+  sections_.restart(point);
+  last_ = &sections_.current();
+  last_number_ = 0;
+  start_ = 0;
+  length_ = shortest_section;
+  has_motion_ = false;
+  settle_ = 0;
+  failed_ = 0;
+  first_ = planned_ = fixed_ = first;
+  ratio_ = 1.0;
+  running_.store(first, std::memory_order_release);
+}
+
+// Where the next section has to go on: behind the last one, or on the stop of one whose successors came too late.
+void OnlinePlanner::follow_reader() noexcept {
+  const Sections::Reader reader = sections_.reader();
+  const Section& current = sections_.section_of(reader);
+  const bool rests = reader.index == current.whole_count;
+  running_.store(rests ? current.done : current.before[0].point.segment, std::memory_order_release);
+  if (reader.section != last_number_) {
+    const bool pending = reader.next != sections_.next_number();
+    const Section* next = pending ? &sections_.section(reader.next) : nullptr;
+    if (next != nullptr && next->after == reader.section && next->start >= reader.index) return;
+    last_ = &current;
+    last_number_ = reader.section;
+    has_motion_ = false;
+  }
+  const std::size_t margin = rules_.lead_periods > 0 ? margin_periods : 0;
+  const std::size_t start = std::min(std::max(last_->count, reader.index + margin), last_->whole_count);
+  if (start != last_->count) has_motion_ = false;
+  start_ = start;
+}
+
+std::ptrdiff_t OnlinePlanner::periods_ahead() const noexcept {
+  const Sections::Reader reader = sections_.reader();
+  const Section& current = sections_.section_of(reader);
+  return static_cast<std::ptrdiff_t>(last_->first_period + start_) -
+         static_cast<std::ptrdiff_t>(current.first_period + reader.index);
+}
+
+bool OnlinePlanner::plan(std::uint64_t pushed, double ratio, bool settled) {
+  bool has_worked = false;
+  settled_ = settled;
+  while (true) {
+    follow_reader();
+    if (periods_ahead() > rules_.lead_periods) return has_worked;
+    // On a stop from which no motion was found, it is looked for once in a while.
+    if (failed_ == last_number_ + 1 && start_ < retry_ && start_ < last_->whole_count) return has_worked;
+    Section* const section = sections_.free_section();
+    if (section == nullptr || !next_section(*section, pushed, ratio)) return has_worked;
+    has_worked = true;
+  }
+}
+
+bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept {
+  const std::uint64_t end = std::min(pushed, from.segment + rules_.window);
+  if (!plan_.is_cut() && planned_ >= end) return false;
+  if (motion_.at_end()) return true;
+  // Where no more can be planned than that, another plan has to be worth its work.
+  if (plan_.is_cut()) {
+    return static_cast<double>(motion_.passed()) >= renewed_share * static_cast<double>(plan_.end());
+  }
+  if (is_full_ && static_cast<double>(end - planned_) < renewed_share * static_cast<double>(rules_.window))
+    return false;
+  // Before the motion has to brake for what is only the end of the plan.
+  return std::isfinite(motion_.to_stop(stops_ahead * longest_stop_mm_));
+}
+
+// How far is planned: as many of the longest stops ahead as make it worth while, and the segments that this takes.
+std::uint64_t OnlinePlanner::look_ahead(const PathPoint& from, std::uint64_t pushed, double ratio) noexcept {
+  const std::uint64_t last = std::max(std::min(pushed, from.segment + rules_.window), fixed_ + 1);
+  longest_stop_mm_ = 0.0;
+  double ahead = -from.offset;
+  std::uint64_t end = from.segment;
+  // Not without a rounding that the motion has entered.
+  while (end < last && (end <= std::max(fixed_, from.segment) || ahead < stops_planned * longest_stop_mm_)) {
+    const PlannedSegment& entry = (*ring_)[end++];
+    const double v = std::max(from.state.speed, std::min(entry.max_speed, entry.programmed * ratio));
+    double a = least_acceleration_;
+    double jerk = least_jerk_;
+    if (std::isfinite(entry.max_acceleration)) a = std::min(a, entry.max_acceleration);
+    if (std::isfinite(entry.max_jerk)) jerk = std::min(jerk, entry.max_jerk);
+    // At most: with the acceleration as if it were there at once, and what building it up and down takes.
+    const double stop_s = v / a + std::min(2.0 * std::sqrt(v / jerk), 2.0 * a / jerk);
+    const double sections_s = rules_.period_s * static_cast<double>(longest_section + margin_periods);
+    longest_stop_mm_ = std::max(longest_stop_mm_, v * (0.5 * stop_s + sections_s));
+    ahead += entry.segment.length_mm;
+  }
+  is_full_ = end == from.segment + rules_.window;
+  return end;
+}
+
+bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double ratio) {
+  PathPoint from = last_->at(static_cast<std::ptrdiff_t>(start_)).point;
+  const bool rests = from.state.speed <= 0.0;
+  if (from.segment >= pushed) return false;
+  if (from.offset >= (*ring_)[from.segment].segment.length_mm - at_end_mm) {
+    if (from.segment + 1 >= pushed) return false;
+    from.offset = std::max(0.0, from.offset - (*ring_)[from.segment].segment.length_mm);
+    PlannedSegment& next = (*ring_)[++from.segment];
+    // There was nothing behind it, or a stop.
+    if (rests) {
+      next.stop = true;
+      from.offset = 0.0;
+    }
+  }
+  const PlannedSegment& here = (*ring_)[from.segment];
+  if (settled_) {
+    settle_ = 0;
+  } else if (rests && !has_motion_ && here.stop && from.offset <= 0.0) {
+    settle_ = rules_.settling_periods;
+  }
+  const bool is_faster =
+      from.state.speed > std::min(here.max_speed, here.programmed * here.feed_share * ratio) * kept_feed;
+  const double planned_ratio = is_faster ? std::max(ratio, ratio_) : ratio;
+  bool makes_plan = !has_motion_ || planned_ratio != ratio_ || wants_plan(from, pushed);
+  section.after = last_number_;
+  section.start = start_;
+  section.first_period = last_->first_period + start_;
+  for (std::size_t i = 0; i < section.before.size(); ++i) {
+    section.before[i] = last_->at(static_cast<std::ptrdiff_t>(start_) - static_cast<std::ptrdiff_t>(i));
+  }
+  const int attempts = rests ? attempts_at_rest : static_cast<int>(slower.size());
+  PathMotion begin = motion_;
+  for (int n = 0; n < attempts; ++n) {
+    if (makes_plan) {
+      planned_ = look_ahead(from, pushed, planned_ratio);
+      ratio_ = planned_ratio;
+      has_motion_ = false;
+      for (int k = 0; k < plans; ++k) {
+        plan_.make({first_, from.segment, from.offset}, from.state, planned_, ratio_);
+        begin = PathMotion(plan_, rules_.period_s, from.state);
+        if (is_faster || keeps_ahead(section, begin)) break;
+      }
+    }
+    motion_ = begin;
+    double max_speed = rests ? no_limit : slower[static_cast<std::size_t>(n)] * from.state.speed;
+    if (is_faster) max_speed = std::min(max_speed, below_feed * here.programmed * here.feed_share * ratio);
+    int settle = settle_;
+    const bool is_whole = fill(section, max_speed, settle);
+    if (is_whole && section.count == 0) return false;
+    if (is_whole && keeps(section, rests)) {
+      settle_ = settle;
+      give_out(section, from, pushed);
+      return true;
+    }
+    makes_plan = rests;
+  }
+  has_motion_ = false;
+  failed_ = last_number_ + 1;
+  retry_ = start_ + shortest_section;
+  return false;
+}
+
+// Whether a motion keeps the limits as far as the plan will be followed; where it does not, less is planned there.
+bool OnlinePlanner::keeps_ahead(Section& section, PathMotion motion) noexcept {
+  std::size_t n = 0;
+  while (n < sections_.capacity() && !motion.at_end()) {
+    if (n % shortest_section == 0 && n > 0 && std::isfinite(motion.to_stop(longest_stop_mm_))) break;
+    motion.advance();
+    add(section, n++, motion);
+  }
+  section.count = section.whole_count = n;
+  return keeps(section, true);
+}
+
+// Runs the motion on, and to a stop; false: it does not begin, or that takes too long.
+bool OnlinePlanner::fill(Section& section, double max_speed, int& settle) noexcept {
+  section.count = section.whole_count = 0;
+  std::size_t n = 0;
+  while (n < length_ && !motion_.at_end()) {
+    const bool waits = settle > 0 && motion_.at_stop();
+    if (waits) {
+      --settle;
+    } else {
+      const bool rested = motion_.at_rest();
+      motion_.advance(max_speed);
+      if (rested && motion_.at_rest()) return false;
+      if (motion_.at_stop()) settle = rules_.settling_periods;
+    }
+    add(section, n++, motion_);
+  }
+  section.count = n;
+  PathMotion stop = motion_;
+  while (!stop.at_rest()) {
+    if (n == sections_.capacity()) return false;
+    stop.advance(0.0);
+    add(section, n++, stop);
+  }
+  section.whole_count = n;
+  return true;
+}
+
+void OnlinePlanner::add(Section& section, std::size_t index, const PathMotion& motion) const noexcept {
+  const PlannedPoint& before = section.at(static_cast<std::ptrdiff_t>(index));
+  PlannedPoint& now = section.points[index];
+  now.point = motion.point();
+  const PlannedSegment& entry = (*ring_)[now.point.segment];
+  now.position = motion.position();
+  now.line = entry.segment.line;
+  const double length = entry.segment.length_mm;
+  if (motion.at_end() && now.point.offset >= length - at_end_mm) {
+    // To the last bit, whatever distances round to.
+    std::copy_n(entry.segment.end_mm.data(), axis_count, now.position.begin());
+    for (std::size_t i = axis_count; i < plan_.axes(); ++i) now.position[i] = entry.end[i];
+  }
+  double travel = now.point.offset - before.point.offset;
+  for (std::uint64_t i = before.point.segment; i < now.point.segment; ++i) travel += (*ring_)[i].segment.length_mm;
+  now.distance = (before.point.state.speed > 0.0 ? before.distance : 0.0) + travel;
+}
+
+// Whether all set-points keep the limits; where they do not, and the motion begins at rest, less is planned there.
+bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
+  const double t = rules_.period_s;
+  const auto last = static_cast<std::ptrdiff_t>(section.whole_count);
+  bool keeps = true;
+  const auto at = [&](std::ptrdiff_t k) -> const PlannedPoint& { return section.at(std::min(k, last)); };
+  // A motion under way is in the middle of what it does at first.
+  const PlannedPoint& begin = section.before[0];
+  const bool is_moving = begin.point.state.speed > 0.0;
+  const std::ptrdiff_t reduced_from = is_moving ? static_cast<std::ptrdiff_t>(shortest_section * length_) : 0;
+  const std::ptrdiff_t end = last + (at(last).point.state.speed > 0.0 ? 0 : 3);
+  for (std::ptrdiff_t k = 1; k <= end; ++k) {
+    double beyond = 0.0;
+    const PlannedPoint& now = at(k);
+    const PlannedPoint& before = at(k - 1);
+    for (std::size_t i = 0; i < rules_.limits.axes; ++i) {
+      const double p0 = now.position[i];
+      const double p1 = before.position[i];
+      const double p2 = at(k - 2).position[i];
+      const double p3 = at(k - 3).position[i];
+      // A coordinate is rounded: what its last bits do to a difference is no motion.
+      const double noise = 8.0 * std::abs(p0) * std::numeric_limits<double>::epsilon() / (t * t * t);
+      beyond = std::max({beyond, std::abs(p0 - p1) / (t * rules_.limits.speed[i]),
+                         std::abs(p0 - 2.0 * p1 + p2) / (t * t * rules_.limits.acceleration[i]),
+                         (std::abs(p0 - 3.0 * p1 + 3.0 * p2 - p3) / (t * t * t) - noise) / rules_.limits.jerk[i]});
+    }
+    const PlannedSegment& entry = (*ring_)[now.point.segment];
+    const double feed = ratio_ * std::max(entry.programmed, (*ring_)[before.point.segment].programmed);
+    const double speed = now.point.state.speed;
+    const bool is_faster = speed > before.point.state.speed && speed > kept_feed * feed;
+    if (beyond <= kept && !is_faster) continue;
+    if (!reduces) return false;
+    keeps = false;
+    if (k <= reduced_from) continue;
+    const std::uint64_t from = at(std::max<std::ptrdiff_t>(k - 4, 0)).point.segment;
+    const std::uint64_t behind = std::min(planned_, at(k + 1).point.segment + 2);
+    const std::uint64_t least = is_moving ? begin.point.segment + 1 : first_;
+    for (std::uint64_t i = std::max(least, from - std::min<std::uint64_t>(from, 1)); i < behind; ++i) {
+      PlannedSegment& less = (*ring_)[i];
+      if (is_faster) less.feed_share = std::min(less.feed_share, feed / speed);
+      if (beyond > kept) less.limit_share *= std::max(most_less, 1.0 / beyond);
+      // What is still beyond them when little is planned is run from rest to rest.
+      if (less.limit_share < least_share && !less.is_fixed && !plan_.is_covered(i)) less.stop = true;
+    }
+    k += 4;
+  }
+  return keeps;
+}
+
+void OnlinePlanner::give_out(Section& section, const PathPoint& from, std::uint64_t pushed) noexcept {
+  const PlannedPoint& rest = section.at(static_cast<std::ptrdiff_t>(section.whole_count));
+  const PlannedSegment& entry = (*ring_)[rest.point.segment];
+  const bool at_end = rest.point.offset >= entry.segment.length_mm - at_end_mm;
+  section.done = rest.point.segment + (at_end ? 1 : 0);
+  section.runs_out = motion_.at_end() && at_end && section.done == pushed && !entry.segment.stop_at_end;
+  fixed_ = std::max(fixed_, plan_.fix(from.segment, rest.point.segment, rest.point.offset));
+  const double periods = periods_share * static_cast<double>(section.whole_count - section.count);
+  const std::size_t shortest =
+      std::max(shortest_section, static_cast<std::size_t>(rules_.lead_periods) / sections_ahead);
+  length_ = std::clamp(static_cast<std::size_t>(periods), shortest, std::max(shortest, longest_section));
+  last_ = &section;
+  last_number_ = sections_.next_number();
+  start_ = section.count;
+  has_motion_ = true;
+  sections_.publish();
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,76 @@
+// The look-ahead of a control: sections of motion, each with a stop behind it, one after another.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/sections.hpp"
+#include "planner/path_motion.hpp"
+#include "planner/path_plan.hpp"
+
+namespace shapegcode {
+
+/// What a control plans with.
+struct PlanningRules {
+  double period_s = 0.001;
+  AxisLimits limits;             ///< that the set-points keep
+  double max_across = no_limit;  ///< acceleration across the path
+  std::size_t window = 128;      ///< segments that are planned ahead
+  int lead_periods = 0;          ///< that are planned before they are run
+  int settling_periods = 0;      ///< rest at a stop: what the filters behind hold
+};
+
+/// Plans the motion over a ring of segments. A section that does not keep the limits at every set-point is never given
+/// out: it is planned once more with less, and until that succeeds the stop behind the last one stands.
+class OnlinePlanner {
+ public:
+  OnlinePlanner(SegmentRing& ring, const PlanningRules& rules);
+
+  /// At rest at the start of segment `first`, the next one that will be pushed.
+  void restart(std::uint64_t first, const AxisValues& position) noexcept;
+
+  /// Plans until enough periods lie ahead. `pushed`: segments that are known; `ratio`: of the feeds, above 0;
+  /// `settled`: the filters behind have come to rest. Does not allocate. False: there was nothing to do.
+  bool plan(std::uint64_t pushed, double ratio, bool settled);
+
+  [[nodiscard]] Sections& sections() noexcept { return sections_; }
+  /// The segment that is being run; of those before it as many are needed as RoundedPath looks back.
+  [[nodiscard]] std::uint64_t running() const noexcept { return running_.load(std::memory_order_acquire); }
+
+ private:
+  void follow_reader() noexcept;
+  [[nodiscard]] std::ptrdiff_t periods_ahead() const noexcept;
+  [[nodiscard]] bool wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept;
+  std::uint64_t look_ahead(const PathPoint& from, std::uint64_t pushed, double ratio) noexcept;
+  bool next_section(Section& section, std::uint64_t pushed, double ratio);
+  bool keeps_ahead(Section& section, PathMotion motion) noexcept;
+  bool fill(Section& section, double max_speed, int& settle) noexcept;
+  void add(Section& section, std::size_t index, const PathMotion& motion) const noexcept;
+  bool keeps(const Section& section, bool reduces) noexcept;
+  void give_out(Section& section, const PathPoint& from, std::uint64_t pushed) noexcept;
+
+  SegmentRing* ring_;
+  PlanningRules rules_;
+  Sections sections_;
+  PathPlan plan_;
+  PathMotion motion_;                      // on the plan, at the end of the last section
+  bool has_motion_ = false;                // whether that is where the next one goes on
+  double ratio_ = 1.0;                     // of the plan
+  std::uint64_t first_ = 0, planned_ = 0;  // segments: the begin of the path, and the end of what is planned
+  std::uint64_t fixed_ = 0;                // the last one whose rounding at its start is fixed
+  int settle_ = 0;                         // periods of rest that are left at a stop
+  const Section* last_ = nullptr;
+  std::uint32_t last_number_ = 0;
+  std::size_t start_ = 0;     // behind how many of its points the next one goes on
+  std::size_t length_ = 1;    // periods of the next one
+  bool settled_ = true;       // the filters behind
+  std::uint32_t failed_ = 0;  // the section behind which no motion was found, plus 1
+  std::size_t retry_ = 0;
+  double least_acceleration_ = 0.0, least_jerk_ = 0.0;
+  bool is_full_ = false;          // the plan reaches as far as the window
+  double longest_stop_mm_ = 0.0;  // of the segments that are planned
+  std::atomic<std::uint64_t> running_{0};
+};
+
+}  // namespace shapegcode
