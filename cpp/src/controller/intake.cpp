@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "motion/speed_limits.hpp"
 #include "path/arc_end.hpp"
 
 namespace shapegcode {
@@ -18,7 +17,6 @@ Intake::Intake(const ControllerSettings& settings, double tolerance_mm, double c
     : rules_(settings.limits),
       corners_(settings.limits),
       n_following_(settings.following.size()),
-      tolerance_mm_(tolerance_mm),
       corner_time_s_(corner_time_s) {
   rules_.feed_override = corners_.feed_override = 1.0;
   rules_.max_feed_mm_per_s.setConstant(MotionLimits::none);
@@ -98,8 +96,9 @@ void Intake::look_at(PlannedSegment& entry) const noexcept {
   if (entry.stop) return;
   entry.corner_speed = corner_speed_limit(last_.segment, entry.segment, corners_, {});
   const double turned = Vector3(entry.turn[0], entry.turn[1], entry.turn[2]).norm();
-  if (corner_time_s_ * turned > 0.0)
-    entry.corner_speed = std::min(entry.corner_speed, tolerance_mm_ / (corner_time_s_ * turned));
+  if (corner_time_s_ * turned > 0.0) {
+    entry.corner_speed = std::min(entry.corner_speed, tolerance_.contour_mm / (corner_time_s_ * turned));
+  }
   entry.stop = entry.corner_speed <= crawl_mm_per_s;
 }
 

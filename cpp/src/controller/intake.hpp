@@ -2,7 +2,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "planner/junction.hpp"
 #include "planner/segments.hpp"
@@ -29,7 +28,7 @@ class Intake {
   MotionLimits corners_;
   std::size_t n_following_;
   PathTolerance tolerance_;
-  double tolerance_mm_, corner_time_s_;
+  double corner_time_s_;
   PlannedSegment last_;
   bool has_last_ = false;
 };

@@ -4,13 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "planner/planned_limits.hpp"
+
 namespace shapegcode {
 namespace {
 
-// Of acceleration and jerk that is planned, and by how much set-points may exceed what is asked for.
-constexpr double planned_share = 0.9998;
-constexpr double kept = 1.0009;
-constexpr double kept_feed = 1.0009;
 // Periods of a section, by the stop behind it: what it costs to plan that is spread over them.
 constexpr double periods_share = 0.125;
 constexpr std::size_t shortest_section = 8;
@@ -30,8 +28,6 @@ constexpr std::array<double, 4> slower{no_limit, 0.9, 0.6, 0.0};
 constexpr int attempts_at_rest = 12;
 // Plans that are made at once, with less each time where limits would be passed.
 constexpr int plans = 4;
-constexpr double most_less = 0.7;
-constexpr double least_share = 0.3;
 // A lower override is approached from above.
 constexpr double below_feed = 0.9995;
 // As near as that to the end of a segment is its end, mm.
@@ -44,15 +40,6 @@ constexpr double stop_room = 2.0;
 constexpr double least_points = 512.0;
 constexpr double most_points = 16384.0;
 constexpr double highest_speed = 1000.0;
-
-AxisLimits planned(const PlanningRules& rules) noexcept {
-  AxisLimits limits = rules.limits.share(planned_share);
-  for (std::size_t i = 0; i < limits.axes; ++i) {
-    // No more than what changes the acceleration within a period.
-    limits.jerk[i] = std::min(limits.jerk[i], limits.acceleration[i] / rules.period_s);
-  }
-  return limits;
-}
 
 std::size_t points_of(const PlanningRules& rules) noexcept {
   double longest_s = 0.0;
@@ -72,11 +59,11 @@ OnlinePlanner::OnlinePlanner(SegmentRing& ring, const PlanningRules& rules)
     : ring_(&ring),
       rules_(rules),
       sections_(points_of(rules), rules.lead_periods > 0 ? sections_ahead + spare_sections : spare_sections + 1),
-      plan_(ring, planned(rules), rules.period_s, std::max(least_stations, stations_of_segment * rules.window),
-            rules.max_across),
+      plan_(ring, planned_limits(rules.limits, rules.period_s), rules.period_s,
+            std::max(least_stations, stations_of_segment * rules.window), rules.max_across),
       motion_(plan_, rules.period_s) {
   const auto end = static_cast<std::ptrdiff_t>(rules.limits.axes);
-  const AxisLimits limits = planned(rules);
+  const AxisLimits limits = planned_limits(rules.limits, rules.period_s);
   least_acceleration_ = *std::min_element(limits.acceleration.begin(), limits.acceleration.begin() + end);
   least_jerk_ = *std::min_element(limits.jerk.begin(), limits.jerk.begin() + end);
   restart(0, {});
@@ -198,8 +185,8 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double 
   } else if (rests && !has_motion_ && here.stop && from.offset <= 0.0) {
     settle_ = rules_.settling_periods;
   }
-  const bool is_faster =
-      from.state.speed > std::min(here.max_speed, here.programmed * here.feed_share * ratio) * kept_feed;
+  const double feed = here.programmed * here.feed_share * ratio;
+  const bool is_faster = from.state.speed > std::min(here.max_speed, feed) * kept_feed;
   const double planned_ratio = is_faster ? std::max(ratio, ratio_) : ratio;
   bool makes_plan = !has_motion_ || planned_ratio != ratio_ || wants_plan(from, pushed);
   section.after = last_number_;
@@ -223,7 +210,7 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double 
     }
     motion_ = begin;
     double max_speed = rests ? no_limit : slower[static_cast<std::size_t>(n)] * from.state.speed;
-    if (is_faster) max_speed = std::min(max_speed, below_feed * here.programmed * here.feed_share * ratio);
+    if (is_faster) max_speed = std::min(max_speed, below_feed * feed);
     int settle = settle_;
     const bool is_whole = fill(section, max_speed, settle);
     if (is_whole && section.count == 0) return false;

@@ -90,7 +90,6 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
     }
     chain_.emplace_back(corrections, n_axes);
   }
-  tolerance_.contour_tolerance_mm = settings.contour_tolerance_mm;
   for (const Fir& chain : chains) measure(chain, settings.period_s);
   if (length > 1) {
     chain_.emplace_back(std::vector{average}, n_axes);

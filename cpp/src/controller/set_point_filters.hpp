@@ -28,7 +28,7 @@ class SetPointFilters {
   [[nodiscard]] double gain() const noexcept { return gain_; }
   /// What a shaper costs while it follows a position.
   [[nodiscard]] const ChangeCost& change() const noexcept { return change_; }
-  /// What it may cut off, and the moments that look-ahead wants for that.
+  /// The moments that say what it cuts off.
   [[nodiscard]] const FilterTolerance& tolerance() const noexcept { return tolerance_; }
 
  private:

@@ -202,8 +202,7 @@ AlongLimits limits_along(const Station& station, const PlannedSegment& segment, 
   // Where an axis turns back and no other moves there is no direction: that of the end.
   for (const double x : {0.0, station.length}) {
     const Derivatives path = derivatives_at(station, segment, x, limits.axes);
-    const AlongLimits found{std::min(station.max_acceleration, along(path.first, limits.acceleration, limits.axes)),
-                            std::min(station.max_jerk, along(path.first, limits.jerk, limits.axes))};
+    const AlongLimits found{steepest(station, path, limits), highest_jerk(station, path, limits)};
     if (std::isfinite(found.acceleration) && std::isfinite(found.jerk)) return found;
   }
   return {limits.acceleration[0], limits.jerk[0]};

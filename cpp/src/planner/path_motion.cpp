@@ -98,7 +98,7 @@ double PathMotion::to_stop(double most) const noexcept {
 Derivatives PathMotion::derivatives_after(double time_s) const noexcept {
   const Place place = place_at(std::max(0.0, time_s * (state_.speed + 0.5 * state_.acceleration * time_s)));
   const Station& there = plan_->station(place.station);
-  return derivatives_at(there, plan_->segment_of(there), place.offset, plan_->axes());
+  return plan_->derivatives(there, place.offset);
 }
 
 // The jerks with which all limits are kept until the end of the period.
@@ -200,8 +200,7 @@ bool PathMotion::choose(double wish, double end, double& jerk) const noexcept {
 // The jerk after which the acceleration can end at a speed, and not below it.
 double PathMotion::wished(double max_speed) const noexcept {
   const Station& here = plan_->station(station_);
-  const double most_jerk =
-      approach_share * plan_->highest_jerk(here, derivatives_at(here, plan_->segment_of(here), offset_, plan_->axes()));
+  const double most_jerk = approach_share * plan_->highest_jerk(here, path_here());
   const auto ends_above = [&](double jerk) {
     const AlongPath then = state_.after(jerk, period_s_);
     return then.speed + then.acceleration * std::abs(then.acceleration) / (2.0 * most_jerk) >= max_speed;
@@ -231,7 +230,7 @@ bool PathMotion::keeps_limits(const Landing& landing, double excess) const noexc
       const Station& station = plan_->station(place.station);
       if (state.speed > state_.speed && state.speed * state.speed > station.squared_limit()) return false;
       const AxisLimits limits = plan_->limits_at(station).share(excess * (1.0 + landing_rounding));
-      const Derivatives path = derivatives_at(station, plan_->segment_of(station), place.offset, limits.axes);
+      const Derivatives path = plan_->derivatives(station, place.offset);
       if (!keeps(limits, path, state, jerk)) return false;
     }
   }
@@ -252,7 +251,7 @@ bool PathMotion::holds(const Landing& landing, double most_jerk, double steepest
 // The shortest landing after `travel` mm within the limits times `excess`.
 bool PathMotion::land(double travel, double excess) noexcept {
   const Station& here = plan_->station(station_);
-  const Derivatives path = derivatives_at(here, plan_->segment_of(here), offset_, plan_->axes());
+  const Derivatives path = path_here();
   const double most_jerk = excess * (1.0 + landing_rounding) * plan_->highest_jerk(here, path);
   const double steepest =
       excess * (1.0 + rounding) * std::max(plan_->steepest(here, path), std::abs(state_.acceleration));
@@ -287,7 +286,7 @@ bool PathMotion::land(double travel, double excess) noexcept {
 // A landing of two jerks wherever it ends, before the next stop. Near the end of the braking.
 bool PathMotion::land_anywhere() noexcept {
   const Station& here = plan_->station(station_);
-  const Derivatives path = derivatives_at(here, plan_->segment_of(here), offset_, plan_->axes());
+  const Derivatives path = path_here();
   const double most_jerk = (1.0 + landing_rounding) * plan_->highest_jerk(here, path);
   const double a = state_.acceleration;
   const double v = state_.speed;

@@ -37,16 +37,8 @@ class PathMotion {
   /// Stations of the plan that are behind it.
   [[nodiscard]] std::size_t passed() const noexcept { return station_; }
   [[nodiscard]] const AlongPath& state() const noexcept { return state_; }
-  /// The highest speed that the segment and its axes allow there.
-  [[nodiscard]] double speed_limit() const noexcept {
-    return plan_->station(at_end() ? station_ - 1 : station_).speed_limit;
-  }
   /// Distance to the next stop of the plan, infinite beyond `most`.
   [[nodiscard]] double to_stop(double most) const noexcept;
-  /// The segment that it is in.
-  [[nodiscard]] std::uint64_t segment() const noexcept {
-    return plan_->station(at_end() ? station_ - 1 : station_).segment;
-  }
   /// Position of every axis.
   [[nodiscard]] AxisValues position() const noexcept;
 
@@ -67,6 +59,7 @@ class PathMotion {
   };
 
   [[nodiscard]] Place place_at(double travel) const noexcept;
+  [[nodiscard]] Derivatives path_here() const noexcept { return plan_->derivatives(plan_->station(station_), offset_); }
   [[nodiscard]] Derivatives derivatives_after(double time_s) const noexcept;
   [[nodiscard]] Jerks allowed() const noexcept;
   [[nodiscard]] bool controllable(double jerk, double time_s, const Derivatives& path) const noexcept;

@@ -55,7 +55,7 @@ void PathPlan::make_stations() {
     if (count_ + 1 == stations_.size()) resize(2 * stations_.size());
     // What the axes and the filters behind allow.
     for (const double x : {0.0, station.length}) {
-      const Derivatives path = derivatives_at(station, segment_of(station), x, axes());
+      const Derivatives path = derivatives(station, x);
       station.speed_limit = std::min(station.speed_limit, along(path.first, limits_at(station).speed, axes()));
       if (max_across_ < no_limit) {
         const double bend = Vector3(path.second[0], path.second[1], path.second[2]).norm();
@@ -63,7 +63,7 @@ void PathPlan::make_stations() {
       }
     }
     if (station.straight) {
-      const Derivatives path = derivatives_at(station, segment_of(station), 0.0, axes());
+      const Derivatives path = derivatives(station, 0.0);
       station.max_acceleration = steepest(station, path);
       station.max_jerk = highest_jerk(station, path);
     }
@@ -129,10 +129,12 @@ PathState PathPlan::fastest_after(std::size_t index, PathState state) const noex
   const Range leading = ControllableSets::leading_to(sets_[index + 1], state, h);
   double c = leading.high;
   // From rest with a constant jerk, which from rest on an interval is one of b^3 = (4.5 j h^2)^2.
-  const double jerk = highest_jerk(here, derivatives_at(here, segment_of(here), 0.0, axes()));
-  const double from_rest = std::cbrt(jerk * jerk * 4.5 / (h * h));
-  const bool is_slow = state.acceleration >= 0.0 && state.speed_squared <= slow_share * from_rest * h * h;
-  if (is_slow) {
+  double from_rest = -1.0;
+  if (state.acceleration >= 0.0) {
+    const double jerk = highest_jerk(here, derivatives(here, 0.0));
+    from_rest = std::cbrt(jerk * jerk * 4.5 / (h * h));
+  }
+  if (state.speed_squared <= slow_share * from_rest * h * h) {
     c = std::min(c, from_rest);
   } else {
     Rows rows;

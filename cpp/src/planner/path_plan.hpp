@@ -45,6 +45,10 @@ class PathPlan {
   [[nodiscard]] const PlannedSegment& segment_of(const Station& station) const noexcept {
     return path_.segment(station.segment);
   }
+  /// At `x` mm behind a station.
+  [[nodiscard]] Derivatives derivatives(const Station& station, double x) const noexcept {
+    return derivatives_at(station, segment_of(station), x, axes());
+  }
   [[nodiscard]] const ControllableSets& rules() const noexcept { return rules_; }
   [[nodiscard]] AxisLimits limits_at(const Station& station) const noexcept { return rules_.limits_at(station); }
   [[nodiscard]] double stopping_length() const noexcept { return path_.stopping_length(); }
@@ -54,10 +58,10 @@ class PathPlan {
   [[nodiscard]] bool ends_in_stop(std::size_t index) const noexcept { return stations_[index + 1].stop; }
   /// The limits of a motion along a station's direction.
   [[nodiscard]] double steepest(const Station& station, const Derivatives& path) const noexcept {
-    return std::min(station.max_acceleration, along(path.first, limits_at(station).acceleration, axes()));
+    return shapegcode::steepest(station, path, limits_at(station));
   }
   [[nodiscard]] double highest_jerk(const Station& station, const Derivatives& path) const noexcept {
-    return std::min(station.max_jerk, along(path.first, limits_at(station).jerk, axes()));
+    return shapegcode::highest_jerk(station, path, limits_at(station));
   }
 
  private:

@@ -1,6 +1,7 @@
 // The path as the planner has it: intervals between stations, with all derivatives by the path parameter.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
@@ -66,6 +67,16 @@ struct Station {
 
   [[nodiscard]] double squared_limit() const noexcept { return speed_limit * speed_limit; }
 };
+
+/// Acceleration and jerk of a motion along a station's direction.
+[[nodiscard]] inline double steepest(const Station& station, const Derivatives& path,
+                                     const AxisLimits& limits) noexcept {
+  return std::min(station.max_acceleration, along(path.first, limits.acceleration, limits.axes));
+}
+[[nodiscard]] inline double highest_jerk(const Station& station, const Derivatives& path,
+                                         const AxisLimits& limits) noexcept {
+  return std::min(station.max_jerk, along(path.first, limits.jerk, limits.axes));
+}
 
 /// Derivatives of so many axes at `x` mm behind a station.
 [[nodiscard]] Derivatives derivatives_at(const Station& station, const PlannedSegment& segment, double x,

@@ -13,19 +13,13 @@
 #include "planner/junction.hpp"
 #include "planner/path_motion.hpp"
 #include "planner/path_plan.hpp"
+#include "planner/planned_limits.hpp"
 #include "planner/segments.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
 
-// Share of acceleration and jerk that is planned. Between the places where an interval is looked at the limits may be
-// passed by a little: then less is planned around there, at least so much of it.
-constexpr double planned_share = 0.9998;
-constexpr double kept = 1.0009;
-constexpr double kept_feed = 1.0009;
-constexpr double most_less = 0.7;
-constexpr double least_share = 0.3;
 constexpr int most_plans = 24;
 // A motion that gets on by less in so many periods does not end.
 constexpr std::size_t progress_periods = 4096;
@@ -78,7 +72,7 @@ Run run(SegmentRing& segments, std::size_t count, const AxisLimits& limits, doub
     motion.advance();
     const AxisValues position = motion.position();
     run.points.emplace_back(position[0], position[1], position[2]);
-    run.segments.push_back(motion.segment());
+    run.segments.push_back(motion.point().segment);
     static_cast<void>(require_count(static_cast<double>(run.points.size()), max_set_points, "a path", "set-points"));
     if (run.points.size() % progress_periods != 0) continue;
     if ((run.points.back() - seen).norm() < progress_mm) {
@@ -180,15 +174,14 @@ TimeOptimalMotion time_optimal_motion(const Path& path, const TrajectoryLimits& 
   }
   double feed_share = 1.0;
   for (int n = 0; n < most_plans; ++n) {
-    AxisLimits axes;
+    AxisLimits asked;
     for (std::size_t i = 0; i < axis_count; ++i) {
       const auto axis = static_cast<Eigen::Index>(i);
-      axes.speed[i] = feed_share * limits.max_feed_mm_per_s[axis];
-      axes.acceleration[i] = planned_share * limits.max_acceleration_mm_per_s2[axis];
-      // No more than what changes the acceleration within a period.
-      axes.jerk[i] = std::min(planned_share * limits.max_jerk_mm_per_s3[axis], axes.acceleration[i] / period_s);
+      asked.speed[i] = feed_share * limits.max_feed_mm_per_s[axis];
+      asked.acceleration[i] = limits.max_acceleration_mm_per_s2[axis];
+      asked.jerk[i] = limits.max_jerk_mm_per_s3[axis];
     }
-    const Run found = run(segments, count, axes, period_s);
+    const Run found = run(segments, count, planned_limits(asked, period_s), period_s);
     if (worst_of(found, limits, period_s, segments, feed_share) > kept) continue;
     samples.positions_mm.resize(std::ssize(found.points), axis_count);
     for (std::size_t k = 0; k < found.points.size(); ++k) {

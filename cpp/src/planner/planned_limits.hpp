@@ -1,0 +1,28 @@
+// How much of the limits is planned, and what is done where set-points pass them nevertheless: limits are looked at in
+// some places of an interval only.
+#pragma once
+
+#include <algorithm>
+
+#include "planner/stations.hpp"
+
+namespace shapegcode {
+
+/// Share of acceleration and jerk that is planned, and by how much set-points may exceed what is asked for.
+inline constexpr double planned_share = 0.9998;
+inline constexpr double kept = 1.0009;
+inline constexpr double kept_feed = 1.0009;
+/// Beyond that less is planned around there, at least so much of it at once; below the second from rest to rest.
+inline constexpr double most_less = 0.7;
+inline constexpr double least_share = 0.3;
+
+[[nodiscard]] inline AxisLimits planned_limits(const AxisLimits& asked, double period_s) noexcept {
+  AxisLimits limits = asked.share(planned_share);
+  for (std::size_t i = 0; i < limits.axes; ++i) {
+    // No more than what changes the acceleration within a period.
+    limits.jerk[i] = std::min(limits.jerk[i], limits.acceleration[i] / period_s);
+  }
+  return limits;
+}
+
+}  // namespace shapegcode
