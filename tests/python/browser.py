@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 from selenium import webdriver
+from selenium.common.exceptions import StaleElementReferenceException
 from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.ui import WebDriverWait
 
@@ -82,6 +83,17 @@ class Browser:
 
     def one(self, selector: str) -> WebElement:
         return self.driver.find_element("css selector", selector)
+
+    def click_line(self, program: str, line: int) -> None:
+        """On a line of a program's text, whose rows are built anew in a later frame where the text was scrolled."""
+
+        def clicked(_: webdriver.Chrome) -> bool:
+            self.one(f"[data-program={program}] [data-line='{line}']").click()
+            return True
+
+        WebDriverWait(
+            self.driver, _AT_MOST_S, poll_frequency=0.05, ignored_exceptions=[StaleElementReferenceException]
+        ).until(clicked)
 
     def all(self, selector: str) -> list[WebElement]:
         return self.driver.find_elements("css selector", selector)

@@ -127,7 +127,7 @@ def test_a_click_on_the_path_finds_the_line(small: Browser) -> None:
 def test_a_click_on_a_line_finds_its_place(small: Browser) -> None:
     """Of the original and of what was emitted; keys go from line to line."""
     small.one("#magnify").send_keys(Keys.HOME)
-    small.one(f"[data-program=original] [data-line='{DOWN}']").click()
+    small.click_line("original", DOWN)
     assert marked(small, "original") == (DOWN, LINES[DOWN - 1])
     place = reading(small)
     assert (float(place["X mm"]), float(place["Y mm"])) == pytest.approx((30.0, 40.0), abs=0.5)
@@ -141,7 +141,7 @@ def test_a_click_on_a_line_finds_its_place(small: Browser) -> None:
     assert marked(small, "original")[0] == len(LINES)
 
     small.one("[data-show=both]").click()
-    small.one(f"[data-program=original] [data-line='{DOWN}']").click()
+    small.click_line("original", DOWN)
     here, there = reading(small, "original"), reading(small, "emitted")
     for axis in ("X mm", "Y mm"):
         assert float(there[axis]) == pytest.approx(float(here[axis]), abs=0.5)
@@ -212,7 +212,7 @@ def test_amounts_have_colours_units_and_words(small: Browser) -> None:
 
 
 def test_the_slider_of_time_moves_the_marker(small: Browser) -> None:
-    small.one(f"[data-program=original] [data-line='{UP}']").click()
+    small.click_line("original", UP)
     slider = small.one("#clock")
     begin = float(slider.get_attribute("value"))
     slider.send_keys(Keys.ARROW_RIGHT)
