@@ -21,7 +21,9 @@ constexpr std::size_t margin_periods = 2;
 // So many of the longest stops are planned ahead, and another plan is made when so many are left.
 constexpr double stops_planned = 8.0;
 constexpr double stops_ahead = 2.0;
-// Of the window, or of the stations, where they do not reach so far.
+// Where they do not reach so far: stations that are planned for each segment that is new, and the share of all that is
+// behind the motion where they are too few for the window.
+constexpr std::size_t stations_for_new = 16;
 constexpr double renewed_share = 0.25;
 // What is tried while the motion is under way, by its speed; and how often from rest, with less each time.
 constexpr std::array<double, 4> slower{no_limit, 0.9, 0.6, 0.0};
@@ -59,8 +61,7 @@ OnlinePlanner::OnlinePlanner(SegmentRing& ring, const PlanningRules& rules)
     : ring_(&ring),
       rules_(rules),
       sections_(points_of(rules), rules.lead_periods > 0 ? sections_ahead + spare_sections : spare_sections + 1),
-      plan_(ring, planned_limits(rules.limits, rules.period_s), rules.period_s,
-            std::max(least_stations, stations_of_segment * rules.window), rules.max_across),
+      plan_(ring, planned_limits(rules.limits, rules.period_s), rules.period_s, std::max(least_stations, stations_of_segment * rules.window), rules.max_across),
       motion_(plan_, rules.period_s) {
   const auto end = static_cast<std::ptrdiff_t>(rules.limits.axes);
   const AxisLimits limits = planned_limits(rules.limits, rules.period_s);
@@ -81,7 +82,7 @@ void OnlinePlanner::restart(std::uint64_t first, const AxisValues& position) noe
   has_motion_ = false;
   settle_ = 0;
   failed_ = 0;
-  first_ = planned_ = fixed_ = first;
+  first_ = planned_ = fixed_ = pushed_before_ = first;
   ratio_ = 1.0;
   running_.store(first, std::memory_order_release);
 }
@@ -135,8 +136,8 @@ bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) cons
   if (plan_.is_cut()) {
     return static_cast<double>(motion_.passed()) >= renewed_share * static_cast<double>(plan_.end());
   }
-  if (is_full_ && static_cast<double>(end - planned_) < renewed_share * static_cast<double>(rules_.window))
-    return false;
+  const bool has_more = end < pushed || pushed != pushed_before_;
+  if (is_full_ && has_more && stations_for_new * (end - planned_) < plan_.end()) return false;
   // Before the motion has to brake for what is only the end of the plan.
   return std::isfinite(motion_.to_stop(stops_ahead * longest_stop_mm_));
 }
@@ -189,6 +190,7 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double 
   const bool is_faster = from.state.speed > std::min(here.max_speed, feed) * kept_feed;
   const double planned_ratio = is_faster ? std::max(ratio, ratio_) : ratio;
   bool makes_plan = !has_motion_ || planned_ratio != ratio_ || wants_plan(from, pushed);
+  pushed_before_ = pushed;
   section.after = last_number_;
   section.start = start_;
   section.first_period = last_->first_period + start_;
@@ -197,14 +199,18 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double 
   }
   const int attempts = rests ? attempts_at_rest : static_cast<int>(slower.size());
   PathMotion begin = motion_;
+  // Under way on the stations of the plan before: a state that just keeps the limits there keeps them here.
+  const bool goes_on =
+      has_motion_ && !rests && !motion_.at_end() && plan_.station(motion_.passed()).segment == from.segment;
+  const PathStart path_start{first_, from.segment, from.offset, goes_on ? motion_.in_station() : 0.0};
   for (int n = 0; n < attempts; ++n) {
     if (makes_plan) {
       planned_ = look_ahead(from, pushed, planned_ratio);
       ratio_ = planned_ratio;
       has_motion_ = false;
       for (int k = 0; k < plans; ++k) {
-        plan_.make({first_, from.segment, from.offset}, from.state, planned_, ratio_);
-        begin = PathMotion(plan_, rules_.period_s, from.state);
+        plan_.make(path_start, from.state, planned_, ratio_);
+        begin = PathMotion(plan_, rules_.period_s, from.state, path_start.in_station);
         if (is_faster || keeps_ahead(section, begin)) break;
       }
     }
@@ -323,7 +329,7 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
     const std::uint64_t least = is_moving ? begin.point.segment + 1 : first_;
     for (std::uint64_t i = std::max(least, from - std::min<std::uint64_t>(from, 1)); i < behind; ++i) {
       PlannedSegment& less = (*ring_)[i];
-      if (is_faster) less.feed_share = std::min(less.feed_share, feed / speed);
+      if (is_faster) less.feed_share *= feed / speed;
       if (beyond > kept) less.limit_share *= std::max(most_less, 1.0 / beyond);
       // What is still beyond them when little is planned is run from rest to rest.
       if (less.limit_share < least_share && !less.is_fixed && !plan_.is_covered(i)) less.stop = true;

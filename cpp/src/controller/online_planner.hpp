@@ -58,6 +58,7 @@ class OnlinePlanner {
   bool has_motion_ = false;                // whether that is where the next one goes on
   double ratio_ = 1.0;                     // of the plan
   std::uint64_t first_ = 0, planned_ = 0;  // segments: the begin of the path, and the end of what is planned
+  std::uint64_t pushed_before_ = 0;        // when a section was planned last
   std::uint64_t fixed_ = 0;                // the last one whose rounding at its start is fixed
   int settle_ = 0;                         // periods of rest that are left at a stop
   const Section* last_ = nullptr;

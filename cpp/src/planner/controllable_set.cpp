@@ -15,7 +15,7 @@ constexpr std::array<double, 2> looked_at{0.15, 0.85};
 // And the acceleration, beside both ends.
 constexpr std::array<double, 2> accelerations_at{0.25, 0.75};
 // Relative, of what bounds of c may leave too little.
-constexpr double bound_rounding = 1e-13;
+constexpr double bound_rounding = 1e-10;
 // Share of the acceleration that a valley may be passed with.
 constexpr double valley_share = 0.02;
 // Of the hardest braking, where the lower bound of the speed is laid.
@@ -58,7 +58,10 @@ class Polygon {
       }
     }
     if (kept.count_ > limit) kept.simplify(limit);
-    *this = kept;
+    count_ = kept.count_;
+    std::copy_n(kept.b_.begin(), count_, b_.begin());
+    std::copy_n(kept.a_.begin(), count_, a_.begin());
+    std::copy_n(kept.checked_.begin(), count_, checked_.begin());
     return true;
   }
 
@@ -150,6 +153,7 @@ class Bounds {
  private:
   static constexpr std::size_t most = Rows::most + ControllableSet::max_corners;
   static constexpr int most_cuts = 100;
+  static constexpr std::size_t lanes = 4;
 
   struct Side {
     std::size_t count = 0;
@@ -162,12 +166,21 @@ class Bounds {
     }
     // The bound that is least at a state, times `sign`.
     [[nodiscard]] std::size_t least(PathState state, double sign) const noexcept {
-      std::array<double, most> bound;
+      std::array<double, most + lanes> bound;
       const double b = state.speed_squared;
       const double a = state.acceleration;
       for (std::size_t i = 0; i < count; ++i) bound[i] = sign * (constant[i] + on_b[i] * b + on_a[i] * a);
-      const auto end = bound.begin() + static_cast<std::ptrdiff_t>(count);
-      return static_cast<std::size_t>(std::min_element(bound.begin(), end) - bound.begin());
+      std::fill_n(bound.begin() + static_cast<std::ptrdiff_t>(count), lanes, no_limit);
+      // Some at once, which a search that keeps the place cannot do.
+      std::array<double, lanes> lowest;
+      lowest.fill(no_limit);
+      for (std::size_t i = 0; i < count; i += lanes) {
+        for (std::size_t lane = 0; lane < lanes; ++lane) lowest[lane] = std::min(lowest[lane], bound[i + lane]);
+      }
+      const double value = *std::min_element(lowest.begin(), lowest.end());
+      std::size_t i = 0;
+      while (i + 1 < count && bound[i] != value) ++i;
+      return i;
     }
   };
 

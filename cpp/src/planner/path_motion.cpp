@@ -12,7 +12,9 @@ namespace {
 constexpr double rounding = 1e-9;
 // Candidates of the jerk that are tried, and halvings between the best of them and the next.
 constexpr int candidates = 12;
-constexpr int halvings = 14;
+constexpr int halvings = 9;
+// Of the jerk that ends at a speed.
+constexpr int halvings_to_speed = 28;
 // So many landings are tried, each a little longer, and within so many stopping lengths.
 constexpr int landings = 96;
 constexpr double landing_lengths = 40.0;
@@ -209,7 +211,7 @@ double PathMotion::wished(double max_speed) const noexcept {
   double high = jerks_.high;
   if (ends_above(low)) return low;
   if (!ends_above(high)) return high;
-  for (int n = 0; n < 2 * halvings; ++n) {
+  for (int n = 0; n < halvings_to_speed; ++n) {
     const double middle = 0.5 * (low + high);
     (ends_above(middle) ? high : low) = middle;
   }
@@ -424,6 +426,26 @@ void PathMotion::follow() noexcept {
   }
 }
 
+// Within the sets.
+void PathMotion::keep_to(double jerk) noexcept {
+  is_beside_ = false;
+  move(jerk, period_s_);
+}
+
+// A state to which another plan has led may be a little beside the sets of this one: towards them within the limits.
+bool PathMotion::returns() noexcept {
+  if (jerks_.low > jerks_.high || state_.speed <= no_speed) return false;
+  const double left = plan_->station(station_).length - offset_;
+  const double jerk = course(left, {state_.speed * state_.speed, state_.acceleration}) * state_.speed;
+  if (jerk >= jerks_.low && jerk <= jerks_.high) return false;
+  const double nearest = std::clamp(jerk, jerks_.low, jerks_.high);
+  const Place place = place_at(state_.travel(nearest, period_s_));
+  const double speed = state_.after(nearest, period_s_).speed;
+  if (!place.planned || speed < 0.0 || speed > plan_->station(place.station).speed_limit) return false;
+  move(nearest, period_s_);
+  return true;
+}
+
 void PathMotion::advance(double max_speed) noexcept {
   if (landing_.runs()) return fly_on();
   if (at_end()) return;
@@ -444,10 +466,10 @@ void PathMotion::advance(double max_speed) noexcept {
     const bool slower = max_speed < no_limit;
     if (slower) wish_ = wished(max_speed);
     is_slow_ = slower;
-    if (choose(wish_, slower ? jerks_.high : jerks_.low, jerk)) return move(jerk, period_s_);
+    if (choose(wish_, slower ? jerks_.high : jerks_.low, jerk)) return keep_to(jerk);
     // After a slow motion.
     is_slow_ = plan_->has_slow_sets();
-    if (!slower && is_slow_ && choose(wish_, jerks_.low, jerk)) return move(jerk, period_s_);
+    if (!slower && is_slow_ && choose(wish_, jerks_.low, jerk)) return keep_to(jerk);
   }
   if (last) {
     // Whatever the limits are, not past the stop.
@@ -455,6 +477,7 @@ void PathMotion::advance(double max_speed) noexcept {
       if (land(travel, excess)) return fly_on();
     }
   }
+  if (is_beside_ && !last && returns()) return;
   follow();
 }
 

@@ -18,9 +18,9 @@ struct PathPoint {
 
 class PathMotion {
  public:
-  /// In a state at the start of the plan, which must outlive it.
-  PathMotion(const PathPlan& plan, double period_s, const AlongPath& state = {})
-      : plan_(&plan), period_s_(period_s), state_(state) {}
+  /// In a state so many mm behind the first station of the plan, which must outlive it.
+  PathMotion(const PathPlan& plan, double period_s, const AlongPath& state = {}, double in_station = 0.0)
+      : plan_(&plan), period_s_(period_s), offset_(in_station), state_(state), is_beside_(state.speed > 0.0) {}
 
   /// One period on: as fast as the plan allows, or, below `max_speed`, slowed down to that as soon as the limits allow;
   /// 0: to rest, wherever that is.
@@ -34,6 +34,8 @@ class PathMotion {
     return at_rest() && (at_end() || (offset_ <= 0.0 && plan_->station(station_).stop));
   }
   [[nodiscard]] PathPoint point() const noexcept;
+  /// How far behind a station of the plan.
+  [[nodiscard]] double in_station() const noexcept { return offset_; }
   /// Stations of the plan that are behind it.
   [[nodiscard]] std::size_t passed() const noexcept { return station_; }
   [[nodiscard]] const AlongPath& state() const noexcept { return state_; }
@@ -78,6 +80,8 @@ class PathMotion {
   void pass(double travel) noexcept;
   void come_to_standstill() noexcept;
   void come_to_rest() noexcept;
+  void keep_to(double jerk) noexcept;
+  bool returns() noexcept;
   void follow() noexcept;
   [[nodiscard]] double course(double left, PathState state) noexcept;
 
@@ -86,6 +90,7 @@ class PathMotion {
   std::size_t station_ = 0;
   double offset_ = 0.0;
   AlongPath state_;
+  bool is_beside_;     // has not been within the sets yet
   double jerk_ = 0.0;  // of the last period
   Landing landing_;
   double course_ = 0.0;  // the last choice of c, and the interval that it was made for

@@ -15,6 +15,10 @@ constexpr std::size_t first_capacity = 1024;
 // comes down to nothing at three times the square of the speed where it was laid.
 constexpr double tangent_on_lines = 1.1;
 constexpr double tangent_on_curves = 1.3;
+// As near to where the motion is expected as that is near enough: what it costs grows with its square.
+constexpr double near_share = 0.02;
+// Sets that differ by less are the same, as a share of each coordinate.
+constexpr double same_share = 1e-9;
 // A motion is as good as at rest whose square of the speed is less than this, of what rest becomes on the interval.
 constexpr double slow_share = 0.01;
 // Behind a valley, over which the time is compared, and shares of the square of its highest speed that are tried.
@@ -33,16 +37,18 @@ void PathPlan::resize(std::size_t capacity) {
   stations_.resize(capacity);
   sets_.resize(capacity);
   if (!grows_) slow_sets_.resize(capacity);
-  expected_.resize(capacity);
+  courses_.resize(capacity);
 }
 
 void PathPlan::make(const PathStart& start, const AlongPath& state, std::uint64_t end, double ratio) {
   path_.start(start, end, ratio);
   begin_ = {state.speed * state.speed, state.acceleration};
   make_stations();
+  for (std::size_t k = 0; k < count_; ++k) courses_[k] = Course{};
   make_sets(Round::first);
   for (int round = 0; round < rounds; ++round) {
     expect();
+    if (!lay_tangents()) break;
     make_sets(Round::exact);
   }
   if (!grows_) make_sets(Round::slow);
@@ -82,42 +88,68 @@ double PathPlan::cap_at(std::size_t index) const noexcept {
   return stations_[index].stop || index == 0 ? cap : std::min(cap, stations_[index - 1].squared_limit());
 }
 
+namespace {
+
+bool is_same(const ControllableSet& one, const ControllableSet& other) noexcept {
+  if (one.count != other.count) return false;
+  const auto is_near = [](double x, double y) { return std::abs(x - y) <= same_share * std::abs(x); };
+  for (std::size_t i = 0; i < one.count; ++i) {
+    if (!is_near(one.b[i], other.b[i]) || !is_near(one.a[i], other.a[i])) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+// Of an exact round, those that depend on tangents that were laid anew; of the slow one, those that differ from the
+// sets that approach valleys.
 void PathPlan::make_sets(Round round) noexcept {
-  std::vector<ControllableSet>& sets = round == Round::slow ? slow_sets_ : sets_;
-  const bool approaches_valleys = round != Round::slow;
-  // How a valley is approached: no harder than so that it is passed as fast as it can be.
-  bool approaches = false;
-  PathState approach;
-  double approach_begin = 0.0;
+  const bool is_slow = round == Round::slow;
+  std::vector<ControllableSet>& sets = is_slow ? slow_sets_ : sets_;
+  bool differs = false;  // the next one
   for (std::size_t k = end(); k-- > 0;) {
     const Station& here = stations_[k];
     const PlannedSegment& segment = segment_of(here);
+    Course& course = courses_[k];
     double cap = cap_at(k);
     if (ends_in_stop(k)) {
-      approaches = false;
-      sets[k] = rules_.before_stop(here, segment, cap);
+      if (round == Round::first) sets_[k] = rules_.before_stop(here, segment, cap);
+      if (is_slow) slow_sets_[k] = sets_[k];
+      course.approaches = false;
+      differs = false;
       continue;
     }
-    if (here.valley && approaches_valleys) cap = std::min(cap, best_passing(k));
-    double least = -no_limit;
-    approaches = approaches && here.distance > approach_begin;
-    if (approaches) {
-      approach = rules_.hardest_before(here, segment, cap, approach);
-      least = approach.acceleration;
-      approaches = approach.speed_squared < cap;
+    const Course& next = courses_[k + 1];
+    const bool approaches_here = next.approaches && here.distance > next.approach_begin;
+    const bool is_new = is_slow ? here.valley || approaches_here : course.relaid || next.relaid;
+    if (round != Round::first && !is_new && !differs) {
+      if (is_slow) slow_sets_[k] = sets_[k];
+      continue;
     }
-    if (here.valley && approaches_valleys) least = 0.0;
     const double higher = here.straight ? tangent_on_lines : tangent_on_curves;
-    Making making{cap, -1.0, -1.0, least};
+    Making making{cap, -1.0, -1.0, -no_limit};
     if (round != Round::first) {
-      making.b_begin = higher * expected_[k].speed_squared;
-      making.b_end = higher * expected_[k + 1].speed_squared;
+      making.b_begin = higher * course.laid;
+      making.b_end = higher * next.laid;
     }
-    sets[k] = rules_.before(here, segment, making, sets[k + 1]);
-    if (here.valley && approaches_valleys) {
-      approaches = true;
-      approach = {ControllableSets::steady(sets_[k]), 0.0};
-      approach_begin = here.distance - segment.half_width;
+    if (!is_slow) {
+      if (here.valley) making.cap = cap = std::min(cap, best_passing(k));
+      course.approaches = approaches_here;
+      if (approaches_here) {
+        course.approach = rules_.hardest_before(here, segment, cap, next.approach);
+        course.approach_begin = next.approach_begin;
+        making.least_acceleration = course.approach.acceleration;
+        course.approaches = course.approach.speed_squared < cap;
+      }
+      if (here.valley) making.least_acceleration = 0.0;
+    }
+    const ControllableSet set = rules_.before(here, segment, making, sets[k + 1]);
+    differs = !is_same(set, sets_[k]);
+    sets[k] = set;
+    if (here.valley && !is_slow) {
+      course.approaches = true;
+      course.approach = {ControllableSets::steady(set), 0.0};
+      course.approach_begin = here.distance - segment.half_width;
     }
   }
 }
@@ -173,15 +205,29 @@ double PathPlan::best_passing(std::size_t index) const noexcept {
   return best;
 }
 
-// How a motion goes: where the next round lays the tangents of the jerk limit.
+// How a motion goes.
 void PathPlan::expect() noexcept {
   PathState state = begin_;
   for (std::size_t k = 0; k < end(); ++k) {
     if (stations_[k].stop) state = {};
-    expected_[k] = state;
+    courses_[k].expected = state;
     state = ends_in_stop(k) ? PathState{} : fastest_after(k, state);
   }
-  expected_[end()] = {};
+  courses_[end()].expected = {};
+}
+
+// The tangents of the jerk limit, where the motion is expected, unless they lie there as good as they have to; false:
+// all do.
+bool PathPlan::lay_tangents() noexcept {
+  bool is_any = false;
+  for (std::size_t k = 0; k < count_; ++k) {
+    Course& course = courses_[k];
+    const double expected = course.expected.speed_squared;
+    course.relaid = std::abs(expected - course.laid) > near_share * course.laid;
+    if (course.relaid) course.laid = expected;
+    is_any = is_any || course.relaid;
+  }
+  return is_any;
 }
 
 }  // namespace shapegcode

@@ -70,6 +70,7 @@ class PathPlan {
   enum class Round : std::uint8_t { first, exact, slow };
   void make_sets(Round round) noexcept;
   void expect() noexcept;
+  bool lay_tangents() noexcept;
   [[nodiscard]] double cap_at(std::size_t index) const noexcept;
   [[nodiscard]] PathState fastest_after(std::size_t index, PathState state) const noexcept;
   [[nodiscard]] double best_passing(std::size_t index) const noexcept;
@@ -82,7 +83,17 @@ class PathPlan {
   std::size_t count_ = 0;
   std::vector<Station> stations_;
   std::vector<ControllableSet> sets_, slow_sets_;
-  std::vector<PathState> expected_;
+  // Of a station: what is expected there, and how the valley that follows is approached: no harder than so that it is
+  // passed as fast as it can be, from a distance on.
+  struct Course {
+    PathState expected;
+    double laid = -1.0;  // the square of the speed at which its tangents were laid
+    bool relaid = false;
+    bool approaches = false;
+    PathState approach;
+    double approach_begin = 0.0;
+  };
+  std::vector<Course> courses_;
   PathState begin_;
 };
 

@@ -77,7 +77,8 @@ void RoundedPath::start(const PathStart& start, std::uint64_t end, double ratio)
   segment_ = start.segment;
   PlannedSegment& at = (*ring_)[start.segment];
   if (starts_anew(start.segment)) at.distance = 0.0;
-  x_ = start_x_ = at.distance + start.offset;
+  start_x_ = at.distance + start.offset;
+  x_ = start_x_ - start.in_station;
   for (std::uint64_t i = start.segment; i < end; ++i) {
     PlannedSegment& entry = (*ring_)[i];
     entry.is_fixed = entry.is_fixed || i == start.segment;

@@ -12,6 +12,7 @@ namespace shapegcode {
 struct PathStart {
   std::uint64_t first = 0, segment = 0;
   double offset = 0.0;
+  double in_station = 0.0;  ///< mm from the begin of the first station to it
 };
 
 /// Every junction is rounded by itself: its jump of the direction, or of the second derivative, is spread over the path
