@@ -109,6 +109,7 @@ bool read_setting(const std::string& word, std::istream& in, Task& task) {
 struct StepTimes {
   std::vector<std::int64_t> min_ns;
   double push_ns = std::numeric_limits<double>::infinity();  // per segment
+  std::uint64_t late_plans = 0;
 };
 
 std::vector<double> run_once(const Task& task, StepTimes& times) {
@@ -128,7 +129,10 @@ std::vector<double> run_once(const Task& task, StepTimes& times) {
     if (i == times.min_ns.size()) times.min_ns.push_back(spent);
     times.min_ns[i] = std::min(times.min_ns[i], spent);
     set_points.insert(set_points.end(), out.begin(), out.end());
-    if (activity == Activity::idle && fed.all_pushed()) return set_points;
+    if (activity == Activity::idle && fed.all_pushed()) {
+      times.late_plans = fed.control().state().late_plans;
+      return set_points;
+    }
     if (i == max_steps) {
       const ControllerState state = fed.control().state();
       throw std::runtime_error("not at rest after " + std::to_string(i) + " steps: segment " +
@@ -151,8 +155,10 @@ int play(const Task& task, const char* file) {
   const std::size_t steps = times.min_ns.size();
   const double longest = static_cast<double>(*std::max_element(times.min_ns.begin(), times.min_ns.end()));
   const double delay = FedController(task.settings, {}).control().delay_periods();
-  std::printf("{\"steps\": %zu, \"step_us\": %.4f, \"longest_step_us\": %.4f, \"delay_periods\": %.17g", steps,
-              1e-3 * sum / static_cast<double>(steps), 1e-3 * longest, delay);
+  std::printf(
+      "{\"steps\": %zu, \"step_us\": %.4f, \"longest_step_us\": %.4f, \"delay_periods\": %.17g, \"late_plans\": %llu",
+      steps, 1e-3 * sum / static_cast<double>(steps), 1e-3 * longest, delay,
+      static_cast<unsigned long long>(times.late_plans));
   if (times.push_ns < std::numeric_limits<double>::infinity()) std::printf(", \"push_us\": %.4f", 1e-3 * times.push_ns);
   std::printf("}\n");
   return 0;

@@ -225,6 +225,41 @@ def programs(driver: Path, peers: Peers, folder: Path) -> tuple[str, list[float]
     return markdown([*HEAD, "us per move"], lines), kept
 
 
+def short_blocks(curved: bool, block_mm: float, feed: float) -> Route:
+    """Rows of 300 mm, or 600 mm of a curve whose radius is 33 mm and more, in blocks of a length."""
+    if not curved:
+        ways = np.arange(round(300.0 / block_mm) + 1) * block_mm
+        rows = [np.column_stack([ways if n % 2 == 0 else 300.0 - ways, np.full(len(ways), float(n))]) for n in range(4)]
+        points = np.concatenate(rows)[1:]
+    else:
+        along = np.arange(round(600.0 / block_mm)) * block_mm
+        heading = np.cumsum(0.03 * np.sin(along / 15.0)) * block_mm
+        points = np.cumsum(block_mm * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+    return Route([Piece((float(x), float(y), 0.0), feed) for x, y in np.round(points, 4)])
+
+
+def throughput(driver: Path, folder: Path) -> tuple[str, list[float]]:
+    """What planning takes where every period brings new blocks: blocks a second, and of a core as they are run."""
+    limits, feed = Limits.of(250.0, 5000.0, 500_000.0), 250.0
+    lines, kept = [], []
+    for curved in (False, True):
+        for block_mm in (0.2, 0.05):
+            route = short_blocks(curved, block_mm, feed)
+            for window in (128, 512, 2048, 8192):
+                points, told = ours(driver, route, limits, folder / "ours", tolerance=0.05, window=window)
+                found = figures(points, limits, route)
+                kept += [found.speed, found.acceleration, found.jerk]
+                step_us, longest_us = told["step_us"], told["longest_step_us"]
+                spent_us = step_us * told["steps"] / len(route.pieces)
+                lines.append(
+                    ["curve" if curved else "rows", f"{block_mm}", f"{feed / block_mm:.0f}", f"{window}",
+                     f"{found.time_s:.3f}", f"{spent_us:.0f}", f"{1e6 / spent_us:.0f}", f"{0.1 * step_us:.1f} %",
+                     f"{1e-3 * longest_us:.0f}", f"{told['late_plans']}"]
+                )  # fmt: skip
+    head = ["path", "block, mm", "programmed, 1/s", "window", "time, s", "us per segment", "segments/s", "of a core"]
+    return markdown([*head, "longest plan, ms", "late plans"], lines), kept
+
+
 def random_route(seed: int) -> tuple[Route, Limits, float]:
     """A polyline in space, gently bent in a plane, or nearly in a plane, with limits and a tolerance for it."""
     draw = np.random.default_rng(seed)
@@ -372,6 +407,7 @@ def main() -> int:
             "Single moves": lambda: single_moves(driver, peers, folder, 3 if arguments.quick else 20),
             "Small arcs": lambda: small_arcs(driver, peers, folder),
             "Programs": lambda: programs(driver, peers, folder),
+            "Throughput": lambda: throughput(driver, folder),
             "Beside the shortest time": lambda: shortest_time(driver, folder, 20 if arguments.quick else 200),
             "Window of the look-ahead": lambda: windows(driver, folder, arguments.quick),
             "Random paths": lambda: random_paths(driver, 50 if arguments.quick else arguments.paths),
