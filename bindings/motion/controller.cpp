@@ -161,6 +161,11 @@ void register_state(py::module_& module) {
       .def_property_readonly(
           "late_plans", [](const PyState& self) { return self.state.late_plans; },
           "How often the motion slowed down because nothing further was planned in time.")
+      .def_property_readonly(
+          "set_point_distance_mm", [](const PyState& self) { return self.state.set_point_distance_mm; },
+          "`distance_mm` of the set-point that was given: behind smoothing and shaper, `delay_periods` later, rounded.")
+      .def_property_readonly(
+          "set_point_line", [](const PyState& self) { return self.state.set_point_line; }, "Likewise its line.")
       .def("__repr__", [](const PyState& self) {
         const ControllerState& state = self.state;
         return "ControllerState(activity=" + std::string(text_of(state.activity)) +
@@ -170,7 +175,9 @@ void register_state(py::module_& module) {
                ", segments_done=" + std::to_string(state.segments_done) +
                ", segments_waiting=" + std::to_string(state.segments_waiting) +
                ", steps=" + std::to_string(state.steps) + ", starvations=" + std::to_string(state.starvations) +
-               ", late_plans=" + std::to_string(state.late_plans) + ")";
+               ", late_plans=" + std::to_string(state.late_plans) +
+               ", set_point_distance_mm=" + shown(state.set_point_distance_mm) +
+               ", set_point_line=" + std::to_string(state.set_point_line) + ")";
       });
 }
 
@@ -290,6 +297,19 @@ Args:
 
 Returns:
     (periods, n_axes), mm or the unit of a following axis; `state.activity` says what the last one was.
+
+Raises:
+    ArgumentError: Periods below 0.)")
+      .def("step_motion", &PyController::step_motion, py::arg("periods") = 1,
+           R"(The next set-points with what a drive's feed-forward wants.
+
+They leave the same smoothing and shaper as the positions do. What the changes of a shaper that follows an axis add is not in there.
+
+Args:
+    periods: How many, >= 0.
+
+Returns:
+    Positions, velocities (per s) and accelerations (per s^2), each (periods, n_axes), in mm or the unit of a following axis.
 
 Raises:
     ArgumentError: Periods below 0.)")

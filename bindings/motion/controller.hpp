@@ -3,6 +3,7 @@
 
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
+#include <pybind11/typing.h>
 
 #include <algorithm>
 #include <cmath>
@@ -98,6 +99,32 @@ class PyController {
     const std::lock_guard lock(*stepping_);
     for (std::size_t i = 0; i < rows; ++i) control_.step({to + i * axes_, axes_});
     return out;
+  }
+
+  /// Positions, velocities and accelerations.
+  pybind11::typing::Tuple<pybind11::array_t<double>, pybind11::array_t<double>, pybind11::array_t<double>> step_motion(
+      pybind11::ssize_t periods) {
+    using Rows = pybind11::array_t<double>;
+    const std::size_t rows = count_of(periods, "periods");
+    std::array<Rows, 3> out;
+    std::array<double*, 3> to{};
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      out[i] = Rows({static_cast<pybind11::ssize_t>(rows), static_cast<pybind11::ssize_t>(axes_)});
+      to[i] = out[i].mutable_data();
+    }
+    {
+      const pybind11::gil_scoped_release release;
+      const std::lock_guard lock(*stepping_);
+      MotionSetPoint now;
+      for (std::size_t row = 0; row < rows; ++row) {
+        control_.step(now);
+        std::size_t order = 0;
+        for (const auto* values : {&now.position, &now.velocity, &now.acceleration}) {
+          std::copy_n(values->begin(), axes_, to[order++] + row * axes_);
+        }
+      }
+    }
+    return pybind11::make_tuple(out[0], out[1], out[2]);
   }
 
   /// Steps until there is nothing more to do, at most so often.

@@ -1146,6 +1146,16 @@ class ControllerState:
         Set-point last given, (n_axes,), mm or the axis' unit.
         """
     @property
+    def set_point_distance_mm(self) -> float:
+        """
+        `distance_mm` of the set-point that was given: behind smoothing and shaper, `delay_periods` later, rounded.
+        """
+    @property
+    def set_point_line(self) -> int:
+        """
+        Likewise its line.
+        """
+    @property
     def speed_mm_per_s(self) -> float:
         """
         Along the path, before smoothing and shaper.
@@ -1305,6 +1315,21 @@ class MotionController:
         
         Returns:
             (periods, n_axes), mm or the unit of a following axis; `state.activity` says what the last one was.
+        
+        Raises:
+            ArgumentError: Periods below 0.
+        """
+    def step_motion(self, periods: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        The next set-points with what a drive's feed-forward wants.
+        
+        They leave the same smoothing and shaper as the positions do. What the changes of a shaper that follows an axis add is not in there.
+        
+        Args:
+            periods: How many, >= 0.
+        
+        Returns:
+            Positions, velocities (per s) and accelerations (per s^2), each (periods, n_axes), in mm or the unit of a following axis.
         
         Raises:
             ArgumentError: Periods below 0.

@@ -52,7 +52,12 @@ void check_c_interface() {
       if (steps % 50 == 0) refused += push_all(control, taken);
       if (steps == 1000) shapegcode_controller_hold(control);
       if (steps == 1500) shapegcode_controller_resume(control);
-      shapegcode_controller_step(control, set_point, nullptr);
+      double rates[6];
+      if (steps % 2 == 0) {
+        shapegcode_controller_step(control, set_point, nullptr);
+      } else {
+        shapegcode_controller_step_motion(control, set_point, rates, rates + 3, nullptr);
+      }
       shapegcode_controller_state(control, &state, sizeof state);
     }
     return steps;

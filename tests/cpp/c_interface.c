@@ -115,6 +115,31 @@ static void square(void) {
   CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
 }
 
+/* With what a drive's feed-forward wants: the second half of a move mirrors the first. */
+static void feed_forward(void) {
+  const shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control = made(&settings);
+  const double end[3] = {10, 0, 0};
+  double set_point[3];
+  double velocity[3];
+  double acceleration[3];
+  double sum = 0.0;
+  double fastest = 0.0;
+  shapegcode_activity activity = SHAPEGCODE_MOVING;
+  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 7, 1) == SHAPEGCODE_OK);
+  while (activity != SHAPEGCODE_IDLE && state_of(control).steps < 10000) {
+    CHECK(shapegcode_controller_step_motion(control, set_point, velocity, acceleration, &activity) == SHAPEGCODE_OK);
+    sum += velocity[0] * settings.period_s;
+    fastest = fmax(fastest, velocity[0]);
+  }
+  CHECK(fabs(sum - end[0]) < 1e-6 && fastest <= 1.001 * feed_mm_per_s);
+  CHECK(velocity[0] == 0.0 && acceleration[0] == 0.0 && set_point[0] == end[0]);
+  CHECK(state_of(control).set_point_line == 7);
+  CHECK(shapegcode_controller_step_motion(control, set_point, NULL, NULL, NULL) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_step_motion(control, NULL, velocity, acceleration, NULL) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
 static void arcs(void) {
   const double pi = 3.14159265358979323846;
   shapegcode_settings settings = plain_settings();
@@ -281,6 +306,7 @@ int main(void) {
   refused_settings();
   refused_calls();
   square();
+  feed_forward();
   arcs();
   following_axis();
   abort_and_restart();

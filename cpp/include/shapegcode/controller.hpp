@@ -99,6 +99,12 @@ enum class Activity : std::uint8_t {
 };
 [[nodiscard]] const char* text_of(Activity activity) noexcept;
 
+/// What a drive with feed-forward wants in a period: where each axis is at its end, how fast, and how it accelerates,
+/// in mm or the unit of a following axis, and s. All three leave the same filters, so they belong together.
+struct MotionSetPoint {
+  std::array<double, max_controller_axes> position{}, velocity{}, acceleration{};
+};
+
 /// A snapshot for a user interface.
 struct ControllerState {
   Activity activity = Activity::idle;
@@ -106,20 +112,20 @@ struct ControllerState {
   double speed_mm_per_s = 0.0;                          ///< along the path, before smoothing and shaper
   double distance_mm = 0.0;                             ///< since the last rest
   double feed_override = 1.0;
-  std::uint32_t line = 0;           ///< of the segment that is being run
+  std::uint32_t line = 0;           ///< of the segment that is being run, before smoothing and shaper
   std::uint64_t segments_done = 0;  ///< run to their ends
   std::uint64_t segments_waiting = 0;
   std::uint64_t steps = 0;
-  std::uint64_t starvations = 0;  ///< how often the segments ran out
-  std::uint64_t late_plans = 0;   ///< how often the motion slowed down because nothing further was planned in time
+  std::uint64_t starvations = 0;       ///< how often the segments ran out
+  std::uint64_t late_plans = 0;        ///< how often the motion slowed down because nothing further was planned in time
+  double set_point_distance_mm = 0.0;  ///< `distance_mm` and `line` of the set-point that was given, which has come
+  std::uint64_t set_point_line = 0;    ///< through smoothing and shaper: `delay_periods()` later, rounded
 };
 
-/// A path that grows while it is run: look-ahead over a window of segments, a jerk-limited profile, one set-point per
-/// period through contour correction, smoothing and shaper. One thread may push, one may step, any may call the rest.
-///
-/// The profile is that of plan_speed, bit for bit, where the window holds the path and its last segment has
-/// `stop_at_end`; without that the end is approached gently, as what comes may turn. Override, hold and abort act on
-/// the profile, before smoothing and shaper: what these keep they keep at any instant.
+/// A path that grows while it is run: look-ahead over a window of segments, motion nearly as fast as the limits of the
+/// axes let it be, one set-point per period through contour correction, smoothing and shaper. One thread may push, one
+/// may step, one may plan, any may call the rest. Override, hold and abort act before smoothing and shaper: what these
+/// keep they keep at any instant.
 class MotionController {
  public:
   /// Throws Error(argument) on settings that are none, with value and limit.
@@ -138,6 +144,9 @@ class MotionController {
   /// The next set-point into `out` (axes() values), from the real-time thread: no allocation, no lock, no exception. It
   /// takes what is planned, in bounded time; with `plans_in_step` it also plans, every 8 to 32 periods.
   Activity step(std::span<double> out) noexcept;
+  /// The same with velocity and acceleration. A shaper that follows an axis adds to them what its taps' changes do,
+  /// which is not in there.
+  Activity step(MotionSetPoint& out) noexcept;
 
   /// Plans on until enough lies ahead, from one thread, the pushing or another one; not with `plans_in_step`. Does not
   /// allocate. False: there was nothing to do, call it again after some periods.

@@ -145,9 +145,11 @@ typedef struct shapegcode_state {
   uint64_t segments_done;
   uint64_t segments_waiting;
   uint64_t steps;
-  uint64_t starvations;  ///< how often the segments ran out
-  uint32_t line;         ///< of the segment that is being run
-  uint64_t late_plans;   ///< how often the motion slowed down because nothing further was planned in time
+  uint64_t starvations;          ///< how often the segments ran out
+  uint32_t line;                 ///< of the segment that is being run
+  uint64_t late_plans;           ///< how often the motion slowed down because nothing further was planned in time
+  double set_point_distance_mm;  ///< `distance_mm` and `line` of the set-point that was given, which has come through
+  uint64_t set_point_line;       ///< smoothing and shaper: shapegcode_controller_delay() periods later, rounded
 } shapegcode_state;
 
 /// A control. One thread may push, one may step, one may plan, any may call the rest but create, destroy and restart.
@@ -187,6 +189,12 @@ shapegcode_status shapegcode_controller_push_arc(shapegcode_controller* controll
 /// the real-time thread: no allocation, no lock; bounded work, but for the planning with `plans_in_step`.
 shapegcode_status shapegcode_controller_step(shapegcode_controller* controller, double* set_point,
                                              shapegcode_activity* activity);
+
+/// The same with the velocity and acceleration of each axis at the set-point, for a drive's feed-forward (per s and
+/// s^2; each may be NULL): they have come through the same smoothing and shaper.
+shapegcode_status shapegcode_controller_step_motion(shapegcode_controller* controller, double* set_point,
+                                                    double* velocity, double* acceleration,
+                                                    shapegcode_activity* activity);
 
 /// Plans on until enough lies ahead of the motion: from one thread, the pushing or another one, where `plans_in_step`
 /// is 0. Does not allocate. `has_worked` (may be NULL) is 0 if there was nothing to do: call it again after some

@@ -198,6 +198,20 @@ shapegcode_status shapegcode_controller_step(shapegcode_controller* controller, 
   return SHAPEGCODE_OK;
 }
 
+shapegcode_status shapegcode_controller_step_motion(shapegcode_controller* controller, double* set_point,
+                                                    double* velocity, double* acceleration,
+                                                    shapegcode_activity* activity) {
+  if (controller == nullptr || set_point == nullptr) return SHAPEGCODE_ERROR_NULL;
+  shapegcode::MotionSetPoint motion;
+  const Activity now = controller->control.step(motion);
+  const auto axes = static_cast<std::size_t>(controller->control.axes());
+  std::copy_n(motion.position.begin(), axes, set_point);
+  if (velocity != nullptr) std::copy_n(motion.velocity.begin(), axes, velocity);
+  if (acceleration != nullptr) std::copy_n(motion.acceleration.begin(), axes, acceleration);
+  if (activity != nullptr) *activity = activity_of(now);
+  return SHAPEGCODE_OK;
+}
+
 shapegcode_status shapegcode_controller_plan(shapegcode_controller* controller, int* has_worked) {
   if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
   const bool worked = controller->control.plan();
@@ -255,6 +269,8 @@ shapegcode_status shapegcode_controller_state(const shapegcode_controller* contr
   all.starvations = now.starvations;
   all.line = now.line;
   all.late_plans = now.late_plans;
+  all.set_point_distance_mm = now.set_point_distance_mm;
+  all.set_point_line = now.set_point_line;
   std::memcpy(state, &all, struct_size);
   return SHAPEGCODE_OK;
 }

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <vector>
 
 #include "controller/intake.hpp"
 #include "controller/online_planner.hpp"
@@ -61,7 +62,9 @@ class MotionController::Implementation {
         queue_(std::bit_ceil(std::max(settings.queue, settings.window + 2))),
         ring_(std::bit_ceil(queue_ + room_behind)),
         planner_(ring_, planning_rules_of(settings, filters_)),
-        plans_in_step_(settings.plans_in_step) {
+        plans_in_step_(settings.plans_in_step),
+        values_(SetPointFilters::values(axes())),
+        passed_(static_cast<std::size_t>(std::lround(filters_.mean_samples())) + 1) {
     override_.store(settings.limits.feed_override, std::memory_order_relaxed);
     restart(std::array<double, max_controller_axes>{});
   }
@@ -82,7 +85,7 @@ class MotionController::Implementation {
                          settled_.load(std::memory_order_relaxed));
   }
 
-  Activity step(std::span<double> out) noexcept {
+  Activity step() noexcept {
     Sections& sections = planner_.sections();
     if (plans_in_step_ && sections.wants_more()) plan();
     const PlannedPoint& point = sections.step(is_stopping());
@@ -90,15 +93,28 @@ class MotionController::Implementation {
     const bool rests = sections.at_rest();
     rest_periods_ = rests ? std::min(rest_periods_ + 1, settled_periods()) : 0;
     settled_.store(rest_periods_ == settled_periods(), std::memory_order_relaxed);
-    std::copy_n(point.position.begin(), axes(), position_.begin());
-    filters_.step({position_.data(), axes()});
+    const std::size_t n = axes();
+    const auto value = [this, n](std::size_t order) {
+      return values_.begin() + static_cast<std::ptrdiff_t>(order * n);
+    };
+    std::copy_n(point.position.begin(), n, value(0));
+    std::copy_n(point.velocity.begin(), n, value(1));
+    std::copy_n(point.acceleration.begin(), n, value(2));
+    filters_.step(values_);
     const Activity activity = activity_now(sections.current());
     // At rest, to the last bit, whatever taps round to.
-    if (activity == Activity::idle) std::copy_n(point.position.begin(), axes(), position_.begin());
-    std::copy_n(position_.begin(), std::min(out.size(), axes()), out.begin());
+    if (activity == Activity::idle) {
+      std::ranges::fill(values_, 0.0);
+      std::copy_n(point.position.begin(), n, value(0));
+    }
     ++state_.steps;
     publish(activity, point);
     return activity;
+  }
+
+  // Of the set-point that was given last: position, velocity, acceleration.
+  [[nodiscard]] std::span<const double> values(std::size_t order) const noexcept {
+    return std::span(values_).subspan(order * axes(), axes());
   }
 
   void feed_override(double ratio) noexcept {
@@ -114,10 +130,12 @@ class MotionController::Implementation {
     abort_.store(false, std::memory_order_relaxed);
     AxisValues rest{};
     std::copy_n(position.begin(), std::min(position.size(), axes()), rest.begin());
-    std::copy_n(rest.begin(), axes(), position_.begin());
-    intake_.restart({position_.data(), axes()});
+    std::ranges::fill(values_, 0.0);
+    std::copy_n(rest.begin(), axes(), values_.begin());
+    intake_.restart(values(0));
     planner_.restart(head, rest);
-    filters_.reset({position_.data(), axes()});
+    filters_.reset(values(0));
+    std::ranges::fill(passed_, Passed{});
     rest_periods_ = settled_periods();
     settled_.store(true, std::memory_order_relaxed);
     state_ = {};
@@ -157,15 +175,24 @@ class MotionController::Implementation {
     const Section& section = planner_.sections().current();
     const std::uint64_t running = planner_.sections().at_rest() ? section.done : point.point.segment;
     state_.activity = activity;
-    std::copy_n(position_.begin(), axes(), state_.set_point.begin());
+    std::ranges::copy(values(0), state_.set_point.begin());
     state_.speed_mm_per_s = point.point.state.speed;
     state_.distance_mm = point.distance;
     state_.feed_override = override_.load(std::memory_order_relaxed);
     state_.line = point.line;
     state_.segments_done = running - first_;
     state_.segments_waiting = head_.load(std::memory_order_relaxed) - running;
+    passed_[state_.steps % passed_.size()] = {point.distance, point.line};
+    const Passed& behind = passed_[(state_.steps + 1) % passed_.size()];
+    state_.set_point_distance_mm = behind.distance_mm;
+    state_.set_point_line = behind.line;
     shared_.write(state_);
   }
+
+  struct Passed {
+    double distance_mm = 0.0;
+    std::uint32_t line = 0;
+  };
 
   // For segments that are done with, but whose roundings may reach what follows.
   static constexpr std::size_t room_behind = RoundedPath::lookback + 1;
@@ -187,7 +214,8 @@ class MotionController::Implementation {
   std::uint64_t first_ = 0;
   bool runs_out_ = false;
   int rest_periods_ = 0;
-  std::array<double, max_controller_axes> position_{};
+  std::vector<double> values_;  // as the filters have them
+  std::vector<Passed> passed_;  // as many periods back as the filters delay
   ControllerState state_;
   SharedState shared_;
 };
@@ -202,7 +230,19 @@ PushResult MotionController::push(const Segment& segment, std::span<const double
   return implementation_->push(segment, following_end);
 }
 bool MotionController::plan() noexcept { return implementation_->plan(); }
-Activity MotionController::step(std::span<double> out) noexcept { return implementation_->step(out); }
+Activity MotionController::step(std::span<double> out) noexcept {
+  const Activity activity = implementation_->step();
+  const std::span position = implementation_->values(0);
+  std::copy_n(position.begin(), std::min(out.size(), position.size()), out.begin());
+  return activity;
+}
+Activity MotionController::step(MotionSetPoint& out) noexcept {
+  const Activity activity = implementation_->step();
+  std::ranges::copy(implementation_->values(0), out.position.begin());
+  std::ranges::copy(implementation_->values(1), out.velocity.begin());
+  std::ranges::copy(implementation_->values(2), out.acceleration.begin());
+  return activity;
+}
 void MotionController::feed_override(double ratio) noexcept { implementation_->feed_override(ratio); }
 void MotionController::hold() noexcept { implementation_->hold(true); }
 void MotionController::resume() noexcept { implementation_->hold(false); }

@@ -61,7 +61,8 @@ OnlinePlanner::OnlinePlanner(SegmentRing& ring, const PlanningRules& rules)
     : ring_(&ring),
       rules_(rules),
       sections_(points_of(rules), rules.lead_periods > 0 ? sections_ahead + spare_sections : spare_sections + 1),
-      plan_(ring, planned_limits(rules.limits, rules.period_s), rules.period_s, std::max(least_stations, stations_of_segment * rules.window), rules.max_across),
+      plan_(ring, planned_limits(rules.limits, rules.period_s), rules.period_s,
+            std::max(least_stations, stations_of_segment * rules.window), rules.max_across),
       motion_(plan_, rules.period_s) {
   const auto end = static_cast<std::ptrdiff_t>(rules.limits.axes);
   const AxisLimits limits = planned_limits(rules.limits, rules.period_s);
@@ -278,6 +279,7 @@ void OnlinePlanner::add(Section& section, std::size_t index, const PathMotion& m
   now.point = motion.point();
   const PlannedSegment& entry = (*ring_)[now.point.segment];
   now.position = motion.position();
+  motion.rates(now.velocity, now.acceleration);
   now.line = entry.segment.line;
   const double length = entry.segment.length_mm;
   if (motion.at_end() && now.point.offset >= length - at_end_mm) {

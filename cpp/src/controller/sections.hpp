@@ -13,7 +13,7 @@ namespace shapegcode {
 
 /// A period of planned motion: the set-point at its end, before the filters.
 struct PlannedPoint {
-  AxisValues position{};
+  AxisValues position{}, velocity{}, acceleration{};
   PathPoint point;
   double distance = 0.0;  ///< since the last rest, mm
   std::uint32_t line = 0;

@@ -44,24 +44,27 @@ Fir correction(double variance, int delay) {
 }  // namespace
 
 SetPointFilters::AxisFilters::AxisFilters(const std::vector<Fir>& filters, int n_axes) {
-  const int axes_of_each = filters.size() == 1 ? n_axes : 1;
-  for (const Fir& fir : filters) streams_.emplace_back(fir, axes_of_each);
+  const bool is_one = filters.size() == 1;
+  for (std::size_t order = 0; order < (is_one ? 1 : orders); ++order) {
+    for (const Fir& fir : filters) streams_.emplace_back(fir, is_one ? static_cast<int>(orders) * n_axes : 1);
+  }
 }
 
-void SetPointFilters::AxisFilters::reset(std::span<const double> position) noexcept {
-  const std::size_t width = position.size() / streams_.size();
-  for (std::size_t i = 0; i < streams_.size(); ++i) streams_[i].reset(position.subspan(i * width, width));
+void SetPointFilters::AxisFilters::reset(std::span<const double> values) noexcept {
+  const std::size_t width = values.size() / streams_.size();
+  for (std::size_t i = 0; i < streams_.size(); ++i) streams_[i].reset(values.subspan(i * width, width));
 }
 
-void SetPointFilters::AxisFilters::step(std::span<double> position) noexcept {
-  const std::size_t width = position.size() / streams_.size();
+void SetPointFilters::AxisFilters::step(std::span<double> values) noexcept {
+  const std::size_t width = values.size() / streams_.size();
   for (std::size_t i = 0; i < streams_.size(); ++i) {
-    const std::span<double> part = position.subspan(i * width, width);
+    const std::span<double> part = values.subspan(i * width, width);
     streams_[i].step(part, part);
   }
 }
 
-SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes) {
+SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
+    : rest_(values(static_cast<std::size_t>(n_axes))) {
   require_not_below_zero(settings.smoothing_time_s, "smoothing time", "s");
   const double periods = std::round(settings.smoothing_time_s / settings.period_s);
   const auto length =
@@ -77,7 +80,7 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
   }
   if (const auto* following = std::get_if<FollowingFir>(&settings.shaper)) {
     following_ = *following;
-    varying_.emplace_back(following->fir(), n_axes);
+    varying_.emplace_back(following->fir(), static_cast<int>(orders) * n_axes);
   }
   if (settings.contour_correction && variance > 0.0) {
     correction_delay_ = std::max(1, static_cast<int>(std::ceil(2.0 * std::sqrt(variance))));
@@ -123,19 +126,21 @@ void SetPointFilters::measure(const Fir& chain, double period_s) {
 }
 
 void SetPointFilters::reset(std::span<const double> position) noexcept {
-  for (AxisFilters& filters : chain_) filters.reset(position);
-  for (VaryingFirStream& varying : varying_) varying.reset(position);
+  std::ranges::fill(rest_, 0.0);
+  std::ranges::copy(position, rest_.begin());
+  for (AxisFilters& filters : chain_) filters.reset(rest_);
+  for (VaryingFirStream& varying : varying_) varying.reset(rest_);
   if (following_) followed_mm_ = position[static_cast<std::size_t>(following_->axis())];
 }
 
 // A shaper that changes comes first: what its changes do to the motion is smoothed as well.
-void SetPointFilters::step(std::span<double> position) noexcept {
+void SetPointFilters::step(std::span<double> values) noexcept {
   if (following_) {
-    const double now_mm = position[static_cast<std::size_t>(following_->axis())];
-    varying_.front().step(position, position, following_->place(0.5 * (followed_mm_ + now_mm)));
+    const double now_mm = values[static_cast<std::size_t>(following_->axis())];
+    varying_.front().step(values, values, following_->place(0.5 * (followed_mm_ + now_mm)));
     followed_mm_ = now_mm;
   }
-  for (AxisFilters& filters : chain_) filters.step(position);
+  for (AxisFilters& filters : chain_) filters.step(values);
 }
 
 }  // namespace shapegcode

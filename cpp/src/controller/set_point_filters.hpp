@@ -1,5 +1,5 @@
-// What follows the path in a control: contour correction, smoothing and shaper of every axis. A shaper that follows a
-// position is the first of them.
+// What follows the path in a control: contour correction, smoothing and shaper of every axis, and of its velocity and
+// acceleration. A shaper that follows a position is the first of them.
 #pragma once
 
 #include <optional>
@@ -16,9 +16,12 @@ class SetPointFilters {
   /// Throws Error(argument) on times that are none, or as many shapers as there are not axes.
   SetPointFilters(const ControllerSettings& settings, int n_axes);
 
+  /// At rest at a position, n_axes values.
   void reset(std::span<const double> position) noexcept;
-  /// In place.
-  void step(std::span<double> position) noexcept;
+  /// In place: positions of all axes, their velocities, their accelerations. What a change of taps adds to the latter
+  /// two is not in them.
+  void step(std::span<double> values) noexcept;
+  [[nodiscard]] static constexpr std::size_t values(std::size_t n_axes) noexcept { return orders * n_axes; }
 
   /// Of the whole chain: samples that it lasts, its largest mean delay, the correction's share of that.
   [[nodiscard]] int duration_samples() const noexcept { return duration_; }
@@ -32,12 +35,14 @@ class SetPointFilters {
   [[nodiscard]] const FilterTolerance& tolerance() const noexcept { return tolerance_; }
 
  private:
+  static constexpr std::size_t orders = 3;  // position, velocity, acceleration
+
   // One filter for all axes, or one for each.
   class AxisFilters {
    public:
     AxisFilters(const std::vector<Fir>& filters, int n_axes);
-    void reset(std::span<const double> position) noexcept;
-    void step(std::span<double> position) noexcept;
+    void reset(std::span<const double> values) noexcept;
+    void step(std::span<double> values) noexcept;
 
    private:
     std::vector<FirStream> streams_;
@@ -49,6 +54,7 @@ class SetPointFilters {
   std::optional<FollowingFir> following_;
   std::vector<VaryingFirStream> varying_;  // one where the shaper follows an axis
   double followed_mm_ = 0.0;
+  std::vector<double> rest_;  // what the filters rest at
   int duration_ = 0;
   double mean_ = 0.0;
   int correction_delay_ = 0;

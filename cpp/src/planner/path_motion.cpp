@@ -67,6 +67,17 @@ AxisValues PathMotion::position() const noexcept {
   return position_at(station, plan_->segment_of(station), at_end() ? station.length : offset_, plan_->axes());
 }
 
+void PathMotion::rates(AxisValues& velocity, AxisValues& acceleration) const noexcept {
+  velocity = acceleration = {};
+  if (at_end()) return;
+  const Derivatives path = path_here();
+  const double v = state_.speed;
+  for (std::size_t i = 0; i < plan_->axes(); ++i) {
+    velocity[i] = path.first[i] * v;
+    acceleration[i] = path.first[i] * state_.acceleration + path.second[i] * v * v;
+  }
+}
+
 PathPoint PathMotion::point() const noexcept {
   if (at_end()) {
     const Station& last = plan_->station(station_ - 1);

@@ -43,6 +43,8 @@ class PathMotion {
   [[nodiscard]] double to_stop(double most) const noexcept;
   /// Position of every axis.
   [[nodiscard]] AxisValues position() const noexcept;
+  /// Its first and second derivative by time.
+  void rates(AxisValues& velocity, AxisValues& acceleration) const noexcept;
 
  private:
   // Three constant jerks, each for whole periods, that end at rest.
