@@ -98,13 +98,14 @@ void register_answers(py::module_& module) {
       .value("no_feed", PushResult::no_feed, "A feed that is not above zero, or not finite.")
       .value("not_finite", PushResult::not_finite, "A position that is not finite.")
       .value("wrong_axes", PushResult::wrong_axes, "Not as many following axes as the control has.")
-      .value("aborted", PushResult::aborted, "Nothing is taken between abort() and restart().");
+      .value("aborted", PushResult::aborted, "Nothing is taken between abort() and restart().")
+      .value("no_time", PushResult::no_time, "A dwell below zero, above 1e6 s, or no number.");
 
   py::enum_<Activity>(module, "Activity", "What a MotionController does in a period.")
       .value("idle", Activity::idle, "At rest, nothing left to do.")
       .value("moving", Activity::moving, "Along the path, or the shaper is still giving out what it holds.")
       .value("stopping", Activity::stopping, "Decelerating for hold() or abort().")
-      .value("held", Activity::held, "At rest after hold().")
+      .value("held", Activity::held, "At rest after hold(), or at a stop that was pushed.")
       .value("starved", Activity::starved,
              "Coming to rest: the segments ran out before one that stops. At rest it is idle.")
       .value("aborted", Activity::aborted, "At rest after abort(); the path is gone.");
@@ -135,6 +136,17 @@ Args:
 }
 
 void register_state(py::module_& module) {
+  py::class_<PyEvent>(module, "ControllerEvent", "Something that belongs to a place of the path. Immutable.")
+      .def_property_readonly(
+          "id", [](const PyEvent& self) { return self.event.id; }, "As it was pushed.")
+      .def_property_readonly(
+          "word", [](const PyEvent& self) { return self.event.word; }, "The caller's own.")
+      .def_property_readonly(
+          "step", [](const PyEvent& self) { return self.step; }, "The step with which it was reached, from 1.")
+      .def("__repr__", [](const PyEvent& self) {
+        return "ControllerEvent(id=" + std::to_string(self.event.id) + ", word=" + std::to_string(self.event.word) +
+               ", step=" + std::to_string(self.step) + ")";
+      });
   py::class_<PyState>(module, "ControllerState", "A snapshot of a MotionController. Immutable.")
       .def_property_readonly(
           "activity", [](const PyState& self) { return self.state.activity; }, "What it does.")
@@ -290,6 +302,39 @@ void register_controller(py::module_& module) {
                  "ArgumentError if it is not what the class asks for.");
   register_pushes(controller);
   controller
+      .def(
+          "push_event",
+          [](PyController& self, std::uint32_t id, std::uint64_t word) {
+            return self.control().push_event({id, word});
+          },
+          py::arg("id"), py::arg("word") = 0,
+          R"(An event behind the segment that was pushed last: spindle, coolant, an output.
+
+Args:
+    id: What it is, the caller's own, below 2^32.
+    word: What belongs to it, below 2^64.
+
+Returns:
+    `accepted`, `queue_full` (as many may wait as segments), `aborted`.)")
+      .def(
+          "push_dwell", [](PyController& self, double time_s) { return self.control().push_dwell(time_s); },
+          py::arg("time_s"), R"(Rest behind the segment that was pushed last. A hold in it begins it anew.
+
+Args:
+    time_s: For so long the set-points rest, 0 to 1e6.
+
+Returns:
+    `accepted`, `no_time`, `aborted`.)")
+      .def(
+          "push_stop", [](PyController& self) { return self.control().push_stop(); },
+          "A programmed stop (M00) behind the segment that was pushed last: at rest there it is held until resume().")
+      .def("take_events", &PyController::take_events, R"(The events that were reached since they were taken last.
+
+A junction that is passed is reached when its place has come through smoothing and shaper (`delay_periods`, rounded), one at which the
+motion rests when the set-points come to rest.
+
+Returns:
+    In the order of their pushes, each with its step.)")
       .def("step", &PyController::step, py::arg("periods") = 1, R"(The next set-points, one for each period.
 
 Args:

@@ -31,6 +31,12 @@ inline std::size_t count_of(pybind11::ssize_t value, const char* name) {
   throw Error(ErrorKind::argument, std::string(name) + " is " + std::to_string(value) + ", must not be below 0");
 }
 
+/// An event, and with which step it was reached.
+struct PyEvent {
+  ControllerEvent event;
+  std::uint64_t step = 0;
+};
+
 /// A snapshot that knows how many axes there are.
 struct PyState {
   ControllerState state;
@@ -97,7 +103,10 @@ class PyController {
     double* to = out.mutable_data();
     const pybind11::gil_scoped_release release;
     const std::lock_guard lock(*stepping_);
-    for (std::size_t i = 0; i < rows; ++i) control_.step({to + i * axes_, axes_});
+    for (std::size_t i = 0; i < rows; ++i) {
+      control_.step({to + i * axes_, axes_});
+      note_events();
+    }
     return out;
   }
 
@@ -118,6 +127,7 @@ class PyController {
       MotionSetPoint now;
       for (std::size_t row = 0; row < rows; ++row) {
         control_.step(now);
+        note_events();
         std::size_t order = 0;
         for (const auto* values : {&now.position, &now.velocity, &now.acceleration}) {
           std::copy_n(values->begin(), axes_, to[order++] + row * axes_);
@@ -136,11 +146,18 @@ class PyController {
       const std::lock_guard lock(*stepping_);
       for (std::size_t i = 0; i < most; ++i) {
         rows.resize(rows.size() + axes_);
-        if (is_at_rest(control_.step(std::span(rows).last(axes_)))) break;
+        const Activity activity = control_.step(std::span(rows).last(axes_));
+        note_events();
+        if (is_at_rest(activity)) break;
       }
     }
     const auto count = static_cast<pybind11::ssize_t>(rows.size() / axes_);
     return pybind11::array_t<double>({count, static_cast<pybind11::ssize_t>(axes_)}, rows.data());
+  }
+
+  std::vector<PyEvent> take_events() {
+    const std::lock_guard lock(*stepping_);
+    return std::exchange(events_, {});
   }
 
   bool plan() {
@@ -168,8 +185,14 @@ class PyController {
     return activity == Activity::idle || activity == Activity::held || activity == Activity::aborted;
   }
 
+  void note_events() {
+    ControllerEvent event;
+    while (control_.next_event(event)) events_.push_back({event, control_.state().steps});
+  }
+
   MotionController control_;
   std::size_t axes_;
+  std::vector<PyEvent> events_;  // that nobody has taken
   Vector3 end_ = Vector3::Zero();
   std::vector<double> following_;
   std::unique_ptr<std::mutex> stepping_, planning_;

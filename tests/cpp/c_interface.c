@@ -140,6 +140,38 @@ static void feed_forward(void) {
   CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
 }
 
+/* Something at a corner, a dwell there, and a stop that waits. */
+static void events(void) {
+  const shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control = made(&settings);
+  const double corner[3] = {10, 0, 0};
+  const double end[3] = {10, 10, 0};
+  double set_point[3];
+  uint32_t id = 0;
+  uint64_t word = 0;
+  int has_event = 1;
+  int dwelt = 0;
+  CHECK(shapegcode_controller_push_line(control, corner, feed_mm_per_s, 1, 0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_push_event(control, 5, 11) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_push_dwell(control, 0.1) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_push_dwell(control, -0.1) == SHAPEGCODE_NO_TIME);
+  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 2, 0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_push_stop(control) == SHAPEGCODE_OK);
+  while (state_of(control).activity != SHAPEGCODE_HELD && state_of(control).steps < 10000) {
+    CHECK(shapegcode_controller_step(control, set_point, NULL) == SHAPEGCODE_OK);
+    if (distance(set_point, corner) < 1e-9) ++dwelt;
+    CHECK(shapegcode_controller_next_event(control, &id, &word, &has_event) == SHAPEGCODE_OK);
+    if (has_event) CHECK(id == 5 && word == 11 && distance(set_point, corner) < 1e-9 && dwelt < 3);
+  }
+  CHECK(dwelt >= 100 && dwelt < 110);
+  CHECK(id == 0 && !has_event && state_of(control).starvations == 0);
+  CHECK(shapegcode_controller_resume(control) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_IDLE, 10);
+  CHECK(distance(set_point, end) == 0.0);
+  CHECK(shapegcode_controller_next_event(control, NULL, &word, &has_event) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
 static void arcs(void) {
   const double pi = 3.14159265358979323846;
   shapegcode_settings settings = plain_settings();
@@ -293,7 +325,7 @@ static void full_queue(void) {
 static void texts(void) {
   int code;
   CHECK(shapegcode_c_version() == SHAPEGCODE_C_VERSION);
-  for (code = SHAPEGCODE_ERROR_INTERNAL; code <= SHAPEGCODE_NO_ARC; ++code) {
+  for (code = SHAPEGCODE_ERROR_INTERNAL; code <= SHAPEGCODE_NO_TIME; ++code) {
     CHECK(strcmp(shapegcode_status_text(code), shapegcode_status_text(1000)) != 0);
   }
   for (code = SHAPEGCODE_IDLE; code <= SHAPEGCODE_ABORTED; ++code) {
@@ -307,6 +339,7 @@ int main(void) {
   refused_calls();
   square();
   feed_forward();
+  events();
   arcs();
   following_axis();
   abort_and_restart();

@@ -397,6 +397,115 @@ def test_the_line_behind_the_shaper_comes_as_much_later() -> None:
     np.testing.assert_allclose(distance, x, atol=1e-9)
 
 
+@pytest.mark.parametrize("filters", FILTERS.values(), ids=list(FILTERS))
+def test_events_come_where_the_set_points_are(filters: dict[str, Any]) -> None:
+    """At a junction that is passed with a constant feed, and at stops, where the set-points come to rest."""
+    made = control(**filters)
+    answers = [
+        made.push_event(1, 7),
+        made.push_line([40, 0, 0], FEED),
+        made.push_event(2, 2**63),
+        made.push_event(3),
+        made.push_line([80, 0, 0], FEED, stop_at_end=True),
+        made.push_event(4),
+        made.push_line([80, 30, 0], FEED, stop_at_end=True),
+        made.push_event(5),
+    ]
+    assert set(answers) == {sg.PushResult.accepted}
+    rows = made.run()
+    events = made.take_events()
+    assert [each.id for each in events] == [1, 2, 3, 4, 5]
+    assert [each.word for each in events[:2]] == [7, 2**63]
+    at = [each.step - 1 for each in events]
+    assert at[0] <= 1
+    assert at[1] == at[2]
+    # A period is 0.1 mm, and the delay is rounded to periods.
+    assert rows[at[1], 0] == pytest.approx(40.0, abs=0.16)
+    stopped = np.flatnonzero((rows[:, 0] == 80.0) & (rows[:, 1] == 0.0))
+    assert rows[at[3]] == pytest.approx([80, 0, 0], abs=1e-9)
+    assert at[3] - stopped[0] <= 20  # a filter that is not the longest is done before
+    assert at[3] < np.flatnonzero(rows[:, 1] > 1e-9)[0]
+    assert rows[at[4]] == pytest.approx([80, 30, 0], abs=1e-9)
+    assert not made.take_events()
+
+
+@pytest.mark.parametrize("filters", FILTERS.values(), ids=list(FILTERS))
+@pytest.mark.parametrize("dwell_s", [0.0, 0.0004, 0.25])
+def test_a_dwell_is_rest_for_so_long(filters: dict[str, Any], dwell_s: float) -> None:
+    rows = []
+    for dwells in (False, True):
+        made = control(**filters)
+        made.push_line([10, 0, 0], FEED, stop_at_end=True)
+        if dwells:
+            assert made.push_dwell(dwell_s) == sg.PushResult.accepted
+        made.push_line([20, 0, 0], FEED, stop_at_end=True)
+        rows.append(made.run())
+        assert made.state.starvations == 0
+    periods = math.ceil(dwell_s / PERIOD_S)
+    assert len(rows[1]) == len(rows[0]) + periods
+    rest = int((np.abs(rows[1][:, 0] - 10.0) < 1e-12).sum())
+    assert rest >= dwell_s / PERIOD_S
+    for wrong in (-1.0, math.nan, math.inf, 2e6):
+        assert made.push_dwell(wrong) == sg.PushResult.no_time
+
+
+@pytest.mark.parametrize("lead", [None, 40])
+def test_a_programmed_stop_waits_for_the_operator(lead: int | None) -> None:
+    """Also where nothing follows yet, and where the thread that plans is ahead."""
+    made = control(lead_periods=lead, shaper=sg.Fir([0, 11], [0.5, 0.5]))
+
+    def step(periods: int) -> Rows:
+        rows = []
+        for _ in range(periods):
+            if lead is not None:
+                made.plan()
+            rows.append(made.step())
+        return np.concatenate(rows)
+
+    made.push_line([10, 0, 0], FEED)
+    assert made.push_stop() == sg.PushResult.accepted
+    made.push_event(9)
+    made.push_line([20, 0, 0], FEED, stop_at_end=True)
+    rows = step(800)
+    assert made.state.activity == sg.Activity.held
+    np.testing.assert_array_equal(rows[-1], [10.0, 0.0, 0.0])
+    assert made.take_events() == []  # behind the stop
+    made.resume()
+    rows = step(800)
+    assert [each.id for each in made.take_events()] == [9]
+    assert made.state.activity == sg.Activity.idle
+    np.testing.assert_array_equal(rows[-1], [20.0, 0.0, 0.0])
+    made.push_stop()
+    step(5)
+    assert made.state.activity == sg.Activity.held
+    made.push_line([30, 0, 0], FEED, stop_at_end=True)
+    step(300)
+    assert made.state.set_point[0] == 20.0
+    made.resume()
+    step(800)
+    assert (made.state.set_point[0], made.state.activity) == (30.0, sg.Activity.idle)
+    assert made.state.late_plans == 0
+
+
+def test_events_without_room_and_after_an_abort() -> None:
+    made = control(window=8, queue=16)
+    answers = [made.push_event(number) for number in range(100)]
+    taken = answers.index(sg.PushResult.queue_full)
+    assert taken >= 16
+    assert set(answers[taken:]) == {sg.PushResult.queue_full}
+    made.push_line([10, 0, 0], FEED)
+    made.step(3)
+    assert [each.id for each in made.take_events()] == list(range(taken))
+    assert made.push_event(5) == sg.PushResult.accepted
+    made.abort()
+    made.step(500)
+    assert made.push_event(6) == made.push_stop() == made.push_dwell(1.0) == sg.PushResult.aborted
+    made.restart([0, 0, 0])
+    made.push_line([1, 0, 0], FEED, stop_at_end=True)
+    made.run()
+    assert made.take_events() == []  # what was pushed before is gone
+
+
 def test_without_a_tolerance_corners_are_exact_stops() -> None:
     made = control(contour_tolerance_mm=0.0)
     for end in ([10, 0, 0], [10, 10, 0], [20, 20, 0]):

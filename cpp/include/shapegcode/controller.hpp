@@ -85,6 +85,7 @@ enum class PushResult : std::uint8_t {
   not_finite,
   wrong_axes,  ///< not as many following axes as the settings have
   aborted,     ///< after abort() nothing is taken until restart()
+  no_time,     ///< a dwell below zero, above 1e6 s, or no number
 };
 [[nodiscard]] const char* text_of(PushResult result) noexcept;
 
@@ -93,7 +94,7 @@ enum class Activity : std::uint8_t {
   idle,      ///< at rest, nothing left to do
   moving,    ///< along the path, or the shaper is still giving out what it holds
   stopping,  ///< decelerating for hold() or abort()
-  held,      ///< at rest after hold()
+  held,      ///< at rest after hold(), or at a stop that was pushed
   starved,   ///< coming to rest: the segments ran out before one with `stop_at_end`. At rest it is idle
   aborted,   ///< at rest after abort(); the path is gone
 };
@@ -103,6 +104,12 @@ enum class Activity : std::uint8_t {
 /// in mm or the unit of a following axis, and s. All three leave the same filters, so they belong together.
 struct MotionSetPoint {
   std::array<double, max_controller_axes> position{}, velocity{}, acceleration{};
+};
+
+/// Something that belongs to a place of the path: spindle, coolant, an output. The control only says when.
+struct ControllerEvent {
+  std::uint32_t id = 0;
+  std::uint64_t word = 0;  ///< the caller's own
 };
 
 /// A snapshot for a user interface.
@@ -141,12 +148,24 @@ class MotionController {
   /// the following axes alone if they move: its length is then the largest of their ways, its feed that axis'.
   PushResult push(const Segment& segment, std::span<const double> following_end = {}) noexcept;
 
+  /// An event behind the segment that was pushed last, from the planning thread, as a push. As many may wait as
+  /// segments.
+  PushResult push_event(const ControllerEvent& event) noexcept;
+  /// Likewise a dwell: what leaves the control rests there for so long. A hold in it begins it anew.
+  PushResult push_dwell(double time_s) noexcept;
+  /// Likewise a programmed stop (M00): at rest there the control is held until resume().
+  PushResult push_stop() noexcept;
+
   /// The next set-point into `out` (axes() values), from the real-time thread: no allocation, no lock, no exception. It
   /// takes what is planned, in bounded time; with `plans_in_step` it also plans, every 8 to 32 periods.
   Activity step(std::span<double> out) noexcept;
   /// The same with velocity and acceleration. A shaper that follows an axis adds to them what its taps' changes do,
   /// which is not in there.
   Activity step(MotionSetPoint& out) noexcept;
+  /// The events that the motion reached with the last step, one by one, from the same thread; false: no more. A
+  /// junction that is passed is reached when its place has come through the filters (`delay_periods()`, rounded), one
+  /// at which the motion rests with the period in which the set-points come to rest.
+  bool next_event(ControllerEvent& event) noexcept;
 
   /// Plans on until enough lies ahead, from one thread, the pushing or another one; not with `plans_in_step`. Does not
   /// allocate. False: there was nothing to do, call it again after some periods.
@@ -157,7 +176,7 @@ class MotionController {
   void feed_override(double ratio) noexcept;
   /// Come to rest along the path, beginning after 32 periods or an eighth of the lead at the latest; resume() goes on.
   void hold() noexcept;
-  void resume() noexcept;
+  void resume() noexcept;  ///< from a stop that was pushed as well
   /// Come to rest along the path and forget the rest of it.
   void abort() noexcept;
   /// At rest at a position (axes() values), the queue empty. Not while another thread pushes or steps. False, and

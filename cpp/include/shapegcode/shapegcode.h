@@ -50,6 +50,7 @@ typedef enum shapegcode_status {
   SHAPEGCODE_WRONG_AXES = 6,          ///< not as many following axes as the settings have
   SHAPEGCODE_AFTER_ABORT = 7,         ///< nothing is taken between abort and restart
   SHAPEGCODE_NO_ARC = 8,              ///< no radius, no sweep, no such plane, or the sweep does not lead to the end
+  SHAPEGCODE_NO_TIME = 9,             ///< a dwell below zero, above 1e6 s, or no number
   SHAPEGCODE_ERROR_ARGUMENT = -1,     ///< a value is outside its range; create writes which, and the limit
   SHAPEGCODE_ERROR_NULL = -2,         ///< a pointer is NULL that must not be
   SHAPEGCODE_ERROR_STRUCT_SIZE = -3,  ///< a struct that was not initialised, or is of a newer header than the library
@@ -184,6 +185,21 @@ typedef struct shapegcode_arc {
 shapegcode_status shapegcode_controller_push_arc(shapegcode_controller* controller, const double* end,
                                                  const shapegcode_arc* arc, double feed_mm_per_s, uint32_t line,
                                                  int stop_at_end);
+
+/// An event behind the segment that was pushed last, from the planning thread; as many may wait as segments.
+shapegcode_status shapegcode_controller_push_event(shapegcode_controller* controller, uint32_t id, uint64_t word);
+
+/// Likewise a dwell: what leaves the control rests there for so long. A hold in it begins it anew.
+shapegcode_status shapegcode_controller_push_dwell(shapegcode_controller* controller, double time_s);
+
+/// Likewise a programmed stop (M00): at rest there the control is held until resume.
+shapegcode_status shapegcode_controller_push_stop(shapegcode_controller* controller);
+
+/// The events that the motion reached with the last step, one by one, from the thread that steps; `*has_event` is 0 if
+/// there is none more. A junction that is passed is reached when its place has come through smoothing and shaper
+/// (shapegcode_controller_delay(), rounded), one at which the motion rests when the set-points come to rest.
+shapegcode_status shapegcode_controller_next_event(shapegcode_controller* controller, uint32_t* id, uint64_t* word,
+                                                   int* has_event);
 
 /// The next set-point, of as many values as there are axes, and what the control does (`activity` may be NULL). From
 /// the real-time thread: no allocation, no lock; bounded work, but for the planning with `plans_in_step`.

@@ -87,6 +87,8 @@ shapegcode_status status_of(PushResult result) noexcept {
       return SHAPEGCODE_WRONG_AXES;
     case PushResult::aborted:
       return SHAPEGCODE_AFTER_ABORT;
+    case PushResult::no_time:
+      return SHAPEGCODE_NO_TIME;
   }
   return SHAPEGCODE_ERROR_INTERNAL;
 }
@@ -188,6 +190,31 @@ shapegcode_status shapegcode_controller_push_arc(shapegcode_controller* controll
         arc_of(vector_of(controller->end.data()), vector_of(end), *arc, feed_mm_per_s, line, segment);
     return status == SHAPEGCODE_OK ? push(*controller, end, segment, stop_at_end) : status;
   });
+}
+
+shapegcode_status shapegcode_controller_push_event(shapegcode_controller* controller, uint32_t id, uint64_t word) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  return status_of(controller->control.push_event({id, word}));
+}
+
+shapegcode_status shapegcode_controller_push_dwell(shapegcode_controller* controller, double time_s) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  return status_of(controller->control.push_dwell(time_s));
+}
+
+shapegcode_status shapegcode_controller_push_stop(shapegcode_controller* controller) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  return status_of(controller->control.push_stop());
+}
+
+shapegcode_status shapegcode_controller_next_event(shapegcode_controller* controller, uint32_t* id, uint64_t* word,
+                                                   int* has_event) {
+  if (controller == nullptr || id == nullptr || word == nullptr || has_event == nullptr) return SHAPEGCODE_ERROR_NULL;
+  shapegcode::ControllerEvent event;
+  *has_event = controller->control.next_event(event) ? 1 : 0;
+  *id = event.id;
+  *word = event.word;
+  return SHAPEGCODE_OK;
 }
 
 shapegcode_status shapegcode_controller_step(shapegcode_controller* controller, double* set_point,

@@ -8,7 +8,7 @@ const char* shapegcode_status_text(int code) {
     case SHAPEGCODE_OK:
       return "done";
     case SHAPEGCODE_QUEUE_FULL:
-      return "the queue is full: push the segment again later";
+      return "the queue is full: push it again later";
     case SHAPEGCODE_NOT_CONNECTED:
       return "the segment does not start where the one before ended";
     case SHAPEGCODE_NO_LENGTH:
@@ -23,6 +23,8 @@ const char* shapegcode_status_text(int code) {
       return "nothing is taken between abort and restart";
     case SHAPEGCODE_NO_ARC:
       return "the arc has no radius, no sweep or no plane, or its sweep does not lead to its end";
+    case SHAPEGCODE_NO_TIME:
+      return "a dwell takes 0 to 1e6 s";
     case SHAPEGCODE_ERROR_ARGUMENT:
       return "a value is outside its range";
     case SHAPEGCODE_ERROR_NULL:

@@ -31,7 +31,8 @@ void Intake::restart(std::span<const double> position) noexcept {
   last_ = PlannedSegment{};
   for (int i = 0; i < axis_count; ++i) last_.segment.end_mm[i] = position[static_cast<std::size_t>(i)];
   std::copy(position.begin() + axis_count, position.end(), last_.end.begin() + axis_count);
-  has_last_ = false;
+  has_last_ = rests_ = waits_ = false;
+  dwell_ = 0;
 }
 
 PushResult Intake::take(const Segment& segment, std::span<const double> following_end, PlannedSegment& entry) noexcept {
@@ -39,6 +40,11 @@ PushResult Intake::take(const Segment& segment, std::span<const double> followin
   const PushResult result = copy(segment, following_end, entry);
   if (result != PushResult::accepted) return result;
   look_at(entry);
+  entry.stop = entry.stop || rests_;
+  entry.dwell = dwell_;
+  entry.waits = waits_;
+  rests_ = waits_ = false;
+  dwell_ = 0;
   last_ = entry;
   has_last_ = true;
   return PushResult::accepted;

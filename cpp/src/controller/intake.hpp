@@ -18,6 +18,13 @@ class Intake {
   /// The next segment starts at this position, whatever came before.
   void restart(std::span<const double> position) noexcept;
   /// Fills an entry of the queue; unless it says `accepted`, nothing has happened.
+  /// Rest before the next segment.
+  void dwell(std::uint32_t periods) noexcept {
+    dwell_ += periods;
+    rests_ = true;
+  }
+  /// Until the motion is let go.
+  void wait() noexcept { waits_ = rests_ = true; }
   PushResult take(const Segment& segment, std::span<const double> following_end, PlannedSegment& entry) noexcept;
 
  private:
@@ -31,6 +38,8 @@ class Intake {
   double corner_time_s_;
   PlannedSegment last_;
   bool has_last_ = false;
+  std::uint32_t dwell_ = 0;  // before the next one
+  bool rests_ = false, waits_ = false;
 };
 
 }  // namespace shapegcode

@@ -31,6 +31,8 @@ const char* text_of(PushResult result) noexcept {
       return "not as many following axes as the settings have";
     case PushResult::aborted:
       return "aborted: nothing is taken until restart";
+    case PushResult::no_time:
+      return "a dwell takes 0 to 1e6 s";
   }
   return "unknown";
 }
@@ -64,7 +66,10 @@ class MotionController::Implementation {
         planner_(ring_, planning_rules_of(settings, filters_)),
         plans_in_step_(settings.plans_in_step),
         values_(SetPointFilters::values(axes())),
-        passed_(static_cast<std::size_t>(std::lround(filters_.mean_samples())) + 1) {
+        period_s_(settings.period_s),
+        events_(std::bit_ceil(queue_)),
+        delay_(static_cast<std::size_t>(std::lround(filters_.mean_samples()))),
+        passed_(static_cast<std::size_t>(filters_.duration_samples()) + 1) {
     override_.store(settings.limits.feed_override, std::memory_order_relaxed);
     restart(std::array<double, max_controller_axes>{});
   }
@@ -79,10 +84,39 @@ class MotionController::Implementation {
     return PushResult::accepted;
   }
 
+  // Behind the segment that was pushed last.
+  PushResult push_event(const ControllerEvent& event, bool waits) noexcept {
+    if (abort_.load(std::memory_order_relaxed)) return PushResult::aborted;
+    const std::uint64_t end = events_pushed_.load(std::memory_order_relaxed);
+    if (end - events_taken_.load(std::memory_order_acquire) == events_.size()) return PushResult::queue_full;
+    const std::uint64_t head = head_.load(std::memory_order_relaxed);
+    events_[end & (events_.size() - 1)] = {head, event, waits};
+    if (waits) {
+      intake_.wait();
+      rests_at_.store(head, std::memory_order_relaxed);
+    }
+    events_pushed_.store(end + 1, std::memory_order_release);
+    return PushResult::accepted;
+  }
+  PushResult push_dwell(double time_s) noexcept {
+    if (abort_.load(std::memory_order_relaxed)) return PushResult::aborted;
+    if (!(time_s >= 0.0 && time_s <= longest_dwell_s)) return PushResult::no_time;
+    intake_.dwell(static_cast<std::uint32_t>(std::ceil(time_s / period_s_ * (1.0 - dwell_rounding))));
+    rests_at_.store(head_.load(std::memory_order_relaxed), std::memory_order_relaxed);
+    return PushResult::accepted;
+  }
+  bool next_event(ControllerEvent& event) noexcept {
+    const Event* const next = first_event();
+    if (next == nullptr || next->waits || !has_reached(next->segment)) return false;
+    event = next->event;
+    drop_event();
+    return true;
+  }
+
   bool plan() noexcept {
     if (is_stopping()) return false;
     return planner_.plan(head_.load(std::memory_order_acquire), override_.load(std::memory_order_relaxed),
-                         settled_.load(std::memory_order_relaxed));
+                         settled_.load(std::memory_order_relaxed), released_.load(std::memory_order_relaxed));
   }
 
   Activity step() noexcept {
@@ -101,13 +135,15 @@ class MotionController::Implementation {
     std::copy_n(point.velocity.begin(), n, value(1));
     std::copy_n(point.acceleration.begin(), n, value(2));
     filters_.step(values_);
+    ++state_.steps;
+    passed_[state_.steps % passed_.size()] = {point.distance, running(point), point.line,
+                                              rests || point.point.state.speed <= 0.0};
     const Activity activity = activity_now(sections.current());
     // At rest, to the last bit, whatever taps round to.
     if (activity == Activity::idle) {
       std::ranges::fill(values_, 0.0);
       std::copy_n(point.position.begin(), n, value(0));
     }
-    ++state_.steps;
     publish(activity, point);
     return activity;
   }
@@ -120,7 +156,12 @@ class MotionController::Implementation {
   void feed_override(double ratio) noexcept {
     if (!std::isnan(ratio)) override_.store(std::clamp(ratio, 0.0, max_override), std::memory_order_relaxed);
   }
-  void hold(bool held) noexcept { hold_.store(held, std::memory_order_relaxed); }
+  void hold() noexcept { hold_.store(true, std::memory_order_relaxed); }
+  void resume() noexcept {
+    hold_.store(false, std::memory_order_relaxed);
+    const std::uint64_t waits = waits_before_.load(std::memory_order_relaxed);
+    if (waits > released_.load(std::memory_order_relaxed)) released_.store(waits, std::memory_order_relaxed);
+  }
   void abort() noexcept { abort_.store(true, std::memory_order_relaxed); }
 
   bool restart(std::span<const double> position) noexcept {
@@ -135,7 +176,10 @@ class MotionController::Implementation {
     intake_.restart(values(0));
     planner_.restart(head, rest);
     filters_.reset(values(0));
-    std::ranges::fill(passed_, Passed{});
+    std::ranges::fill(passed_, Passed{0.0, head, 0, true});
+    events_taken_.store(events_pushed_.load(std::memory_order_relaxed), std::memory_order_release);
+    rests_at_.store(head, std::memory_order_relaxed);
+    waits_before_.store(0, std::memory_order_relaxed);
     rest_periods_ = settled_periods();
     settled_.store(true, std::memory_order_relaxed);
     state_ = {};
@@ -163,17 +207,63 @@ class MotionController::Implementation {
     const bool settled = rests && rest_periods_ == settled_periods();
     if (abort_.load(std::memory_order_relaxed)) return settled ? Activity::aborted : Activity::stopping;
     if (hold_.load(std::memory_order_relaxed)) return settled ? Activity::held : Activity::stopping;
+    if (waits_at_stop(settled)) return Activity::held;
     const bool is_last = section.done == head_.load(std::memory_order_relaxed);
-    const bool runs_out = section.runs_out && is_last;
+    const bool runs_out = section.runs_out && is_last && section.done != rests_at_.load(std::memory_order_relaxed);
     if (runs_out && !runs_out_) ++state_.starvations;
     runs_out_ = runs_out;
     if (settled && is_last) return Activity::idle;
     return runs_out ? Activity::starved : Activity::moving;
   }
 
+  // A stop that was pushed is over when it was reached and resumed.
+  bool waits_at_stop(bool settled) noexcept {
+    const Event* const next = first_event();
+    const bool waits = next != nullptr && next->waits && settled && has_reached(next->segment);
+    waits_before_.store(waits ? next->segment + 1 : 0, std::memory_order_relaxed);
+    if (!waits || released_.load(std::memory_order_relaxed) <= next->segment) return waits;
+    drop_event();
+    return false;
+  }
+
+  struct Event {
+    std::uint64_t segment = 0;  // behind which it comes, plus 1
+    ControllerEvent event;
+    bool waits = false;
+  };
+  [[nodiscard]] const Event* first_event() const noexcept {
+    const std::uint64_t taken = events_taken_.load(std::memory_order_relaxed);
+    if (taken == events_pushed_.load(std::memory_order_acquire)) return nullptr;
+    return &events_[taken & (events_.size() - 1)];
+  }
+  void drop_event() noexcept {
+    events_taken_.store(events_taken_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  }
+
+  [[nodiscard]] std::uint64_t running(const PlannedPoint& point) const noexcept {
+    const Sections& sections = planner_.sections();
+    return sections.at_rest() ? sections.current().done : point.point.segment;
+  }
+
+  // Where the motion was so many periods ago.
+  struct Passed {
+    double distance_mm = 0.0;
+    std::uint64_t running = 0;
+    std::uint32_t line = 0;
+    bool rests = true;
+  };
+  [[nodiscard]] const Passed& passed(std::size_t periods) const noexcept {
+    return passed_[(state_.steps + passed_.size() - periods) % passed_.size()];
+  }
+  // Whether the set-point given last is behind the start of a segment; where the motion rested, whether it has come to
+  // rest.
+  [[nodiscard]] bool has_reached(std::uint64_t segment) const noexcept {
+    const Passed& now = passed(delay_);
+    return (now.running >= segment && !now.rests) || passed(passed_.size() - 1).running >= segment;
+  }
+
   void publish(Activity activity, const PlannedPoint& point) noexcept {
-    const Section& section = planner_.sections().current();
-    const std::uint64_t running = planner_.sections().at_rest() ? section.done : point.point.segment;
+    const std::uint64_t running = this->running(point);
     state_.activity = activity;
     std::ranges::copy(values(0), state_.set_point.begin());
     state_.speed_mm_per_s = point.point.state.speed;
@@ -182,19 +272,15 @@ class MotionController::Implementation {
     state_.line = point.line;
     state_.segments_done = running - first_;
     state_.segments_waiting = head_.load(std::memory_order_relaxed) - running;
-    passed_[state_.steps % passed_.size()] = {point.distance, point.line};
-    const Passed& behind = passed_[(state_.steps + 1) % passed_.size()];
+    const Passed& behind = passed(delay_);
     state_.set_point_distance_mm = behind.distance_mm;
     state_.set_point_line = behind.line;
     shared_.write(state_);
   }
 
-  struct Passed {
-    double distance_mm = 0.0;
-    std::uint32_t line = 0;
-  };
-
   // For segments that are done with, but whose roundings may reach what follows.
+  static constexpr double longest_dwell_s = 1e6;
+  static constexpr double dwell_rounding = 1e-12;
   static constexpr std::size_t room_behind = RoundedPath::lookback + 1;
 
   std::size_t n_following_;
@@ -215,7 +301,14 @@ class MotionController::Implementation {
   bool runs_out_ = false;
   int rest_periods_ = 0;
   std::vector<double> values_;  // as the filters have them
-  std::vector<Passed> passed_;  // as many periods back as the filters delay
+  double period_s_;
+  std::vector<Event> events_;
+  std::atomic<std::uint64_t> events_pushed_{0}, events_taken_{0};
+  std::atomic<std::uint64_t> rests_at_{0};      // a dwell or stop is behind the segment before this one
+  std::atomic<std::uint64_t> released_{0};      // segments before this one do not wait
+  std::atomic<std::uint64_t> waits_before_{0};  // the segment that waits, plus 1; 0: none
+  std::size_t delay_;
+  std::vector<Passed> passed_;  // as many periods as the filters last
   ControllerState state_;
   SharedState shared_;
 };
@@ -244,8 +337,14 @@ Activity MotionController::step(MotionSetPoint& out) noexcept {
   return activity;
 }
 void MotionController::feed_override(double ratio) noexcept { implementation_->feed_override(ratio); }
-void MotionController::hold() noexcept { implementation_->hold(true); }
-void MotionController::resume() noexcept { implementation_->hold(false); }
+void MotionController::hold() noexcept { implementation_->hold(); }
+void MotionController::resume() noexcept { implementation_->resume(); }
+PushResult MotionController::push_event(const ControllerEvent& event) noexcept {
+  return implementation_->push_event(event, false);
+}
+PushResult MotionController::push_dwell(double time_s) noexcept { return implementation_->push_dwell(time_s); }
+PushResult MotionController::push_stop() noexcept { return implementation_->push_event({}, true); }
+bool MotionController::next_event(ControllerEvent& event) noexcept { return implementation_->next_event(event); }
 void MotionController::abort() noexcept { implementation_->abort(); }
 bool MotionController::restart(std::span<const double> position) noexcept { return implementation_->restart(position); }
 ControllerState MotionController::state() const noexcept { return implementation_->state(); }

@@ -115,9 +115,10 @@ std::ptrdiff_t OnlinePlanner::periods_ahead() const noexcept {
          static_cast<std::ptrdiff_t>(current.first_period + reader.index);
 }
 
-bool OnlinePlanner::plan(std::uint64_t pushed, double ratio, bool settled) {
+bool OnlinePlanner::plan(std::uint64_t pushed, double ratio, bool settled, std::uint64_t released) {
   bool has_worked = false;
   settled_ = settled;
+  released_ = released;
   while (true) {
     follow_reader();
     if (periods_ahead() > rules_.lead_periods) return has_worked;
@@ -127,6 +128,16 @@ bool OnlinePlanner::plan(std::uint64_t pushed, double ratio, bool settled) {
     if (section == nullptr || !next_section(*section, pushed, ratio)) return has_worked;
     has_worked = true;
   }
+}
+
+// Periods of rest at a stop.
+int OnlinePlanner::rest_at(const PathPoint& point) const noexcept {
+  const PlannedSegment& here = (*ring_)[point.segment];
+  return rules_.settling_periods + (point.offset <= 0.0 ? static_cast<int>(here.dwell) : 0);
+}
+
+bool OnlinePlanner::waits_at(const PathPoint& point) const noexcept {
+  return point.offset <= 0.0 && (*ring_)[point.segment].waits && point.segment >= released_;
 }
 
 bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept {
@@ -181,11 +192,12 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double 
       from.offset = 0.0;
     }
   }
+  if (rests && waits_at(from)) return false;
   const PlannedSegment& here = (*ring_)[from.segment];
-  if (settled_) {
-    settle_ = 0;
-  } else if (rests && !has_motion_ && here.stop && from.offset <= 0.0) {
-    settle_ = rules_.settling_periods;
+  if (rests) {
+    const bool is_settled = settled_ && periods_ahead() <= 0;
+    const int needed = !here.stop || from.offset > 0.0 ? 0 : rest_at(from) - (is_settled ? rules_.settling_periods : 0);
+    settle_ = !has_motion_ || motion_.at_end() ? needed : std::min(settle_, needed);
   }
   const double feed = here.programmed * here.feed_share * ratio;
   const bool is_faster = from.state.speed > std::min(here.max_speed, feed) * kept_feed;
@@ -251,14 +263,15 @@ bool OnlinePlanner::fill(Section& section, double max_speed, int& settle) noexce
   section.count = section.whole_count = 0;
   std::size_t n = 0;
   while (n < length_ && !motion_.at_end()) {
-    const bool waits = settle > 0 && motion_.at_stop();
-    if (waits) {
+    const bool rests = motion_.at_stop();
+    if (n > 0 && rests && waits_at(motion_.point())) break;
+    if (settle > 0 && rests) {
       --settle;
     } else {
       const bool rested = motion_.at_rest();
       motion_.advance(max_speed);
       if (rested && motion_.at_rest()) return false;
-      if (motion_.at_stop()) settle = rules_.settling_periods;
+      if (motion_.at_stop()) settle = motion_.at_end() ? rules_.settling_periods : rest_at(motion_.point());
     }
     add(section, n++, motion_);
   }

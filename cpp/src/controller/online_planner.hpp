@@ -31,16 +31,20 @@ class OnlinePlanner {
   void restart(std::uint64_t first, const AxisValues& position) noexcept;
 
   /// Plans until enough periods lie ahead. `pushed`: segments that are known; `ratio`: of the feeds, above 0;
-  /// `settled`: the filters behind have come to rest. Does not allocate. False: there was nothing to do.
-  bool plan(std::uint64_t pushed, double ratio, bool settled);
+  /// `settled`: the filters behind have come to rest; `released`: segments before this one do not wait any more. Does
+  /// not allocate. False: there was nothing to do.
+  bool plan(std::uint64_t pushed, double ratio, bool settled, std::uint64_t released);
 
   [[nodiscard]] Sections& sections() noexcept { return sections_; }
+  [[nodiscard]] const Sections& sections() const noexcept { return sections_; }
   /// The segment that is being run; of those before it as many are needed as RoundedPath looks back.
   [[nodiscard]] std::uint64_t running() const noexcept { return running_.load(std::memory_order_acquire); }
 
  private:
   void follow_reader() noexcept;
   [[nodiscard]] std::ptrdiff_t periods_ahead() const noexcept;
+  [[nodiscard]] int rest_at(const PathPoint& point) const noexcept;
+  [[nodiscard]] bool waits_at(const PathPoint& point) const noexcept;
   [[nodiscard]] bool wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept;
   std::uint64_t look_ahead(const PathPoint& from, std::uint64_t pushed, double ratio) noexcept;
   bool next_section(Section& section, std::uint64_t pushed, double ratio);
@@ -63,9 +67,10 @@ class OnlinePlanner {
   int settle_ = 0;                         // periods of rest that are left at a stop
   const Section* last_ = nullptr;
   std::uint32_t last_number_ = 0;
-  std::size_t start_ = 0;     // behind how many of its points the next one goes on
-  std::size_t length_ = 1;    // periods of the next one
-  bool settled_ = true;       // the filters behind
+  std::size_t start_ = 0;   // behind how many of its points the next one goes on
+  std::size_t length_ = 1;  // periods of the next one
+  bool settled_ = true;     // the filters behind
+  std::uint64_t released_ = 0;
   std::uint32_t failed_ = 0;  // the section behind which no motion was found, plus 1
   std::size_t retry_ = 0;
   double least_acceleration_ = 0.0, least_jerk_ = 0.0;
