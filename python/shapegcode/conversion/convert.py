@@ -18,6 +18,7 @@ from shapegcode.conversion.recommendation import gain_um
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.sensitivity import StartedTrials, start_trials
 from shapegcode.conversion.tables import chosen_cuts
+from shapegcode.conversion.translate import require_dialect, with_dialect
 from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
 from shapegcode.program import Program
@@ -103,6 +104,7 @@ def convert(
         "price.cut_time_percent": max_cut_time_increase_percent,
     }
     program, machine = read(program, machine, stated)
+    require_dialect(program, machine, budget)
     choice = CutChoice(chosen_cuts(program, only, leave), shape_all, tolerance_curve)
     pool = ThreadPoolExecutor(max_workers=cores())
     try:
@@ -113,7 +115,7 @@ def convert(
         if machine.shaping.rapids:
             shaped = shape_rapids(plan, shaped)
         shaped = _as_it_was(plan, shaped)
-        return result_of(plan, shaped, judge(plan, shaped))
+        return with_dialect(result_of(plan, shaped, judge(plan, shaped)))
     finally:
         pool.shutdown(cancel_futures=True)
 

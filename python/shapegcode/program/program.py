@@ -385,6 +385,14 @@ def least_increment_mm(machine: Machine, units: int) -> float:
     return controller.least_increment_inch * MM_PER_INCH if units == 20 else controller.least_increment_mm
 
 
+def written_increment_mm(machine: Machine, units: int) -> float:
+    """Likewise of the words that `convert` writes, which are finer in some dialects."""
+    decimals = machine.emission.position_decimals
+    if decimals is None:
+        return least_increment_mm(machine, units)
+    return 10.0 ** -(decimals + 1) * MM_PER_INCH if units == 20 else 10.0**-decimals
+
+
 _ON_INCREMENT = 1e-6  # increments: so near to one a position is on it
 
 
