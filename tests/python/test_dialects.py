@@ -248,6 +248,7 @@ REFUSED = [
     ("haas", "#500=1.", "macro statements and names are not translated"),
     ("siemens", "G91G28Z0.", "homing is G74"),
     ("siemens", "G58", "G58 is work coordinate system 5 on FANUC, and a programmable offset of single axes"),
+    ("linuxcnc", "G43Z5.", "G43 without H"),
     ("siemens", "G43H7", "G43 H7 is offset 7 on FANUC and D1 of the tool in the spindle"),
     ("isg", "G08P1", "acceleration at the begin of the block"),
     ("isg", "G20", "G20 is inch on FANUC, and mirroring off"),
@@ -324,6 +325,52 @@ def test_several_programs(tmp_path: Path) -> None:
     (tmp_path / "memory.nc").write_text(TEXT)
     done = run(tmp_path, "convert", "memory.nc", "-m", "vx500", "--program", "all", "-o", "out.nc", "--dialect", "haas")
     assert done.returncode == 2 and "--program all writes FANUC's words alone" in done.stderr
+
+
+OTHERS = [
+    ("G21\nG64 P0.01\nG1 X1 F100\nM2\n", 2, "LinuxCNC: G64 P0.01 (tolerance of the path"),
+    ("G21\no100 sub\nG1 X1 F100\no100 endsub\nM2\n", 2, "LinuxCNC: O100 SUB (O word)"),
+    ("G21 (A)\n#<depth> = 3\nM2\n", 2, "LinuxCNC: #<DEPTH> (named parameter)"),
+    ("; a comment\nG1 X1 F100\nG4 F2.5\nM30\n", 3, "a Sinumerik: G4 F2.5 (dwell in seconds"),
+    ("G2 X10 Y0 CR=5 F100\nM30\n", 1, "a Sinumerik: CR= (radius of an arc)"),
+]
+
+
+@pytest.mark.parametrize(("text", "line", "message"), OTHERS)
+def test_a_program_for_another_control_is_not_read(text: str, line: int, message: str) -> None:
+    with pytest.raises(sg.ProgramError, match=rf"^<text>:{line}:1: this is a program for {re.escape(message)}"):
+        sg.Program.from_text(text, "vx500")
+
+
+def test_what_was_written_for_another_control_is_not_read_as_fanuc() -> None:
+    for dialect, sign in (("linuxcnc", "G91.1"), ("siemens", "CR=")):
+        with pytest.raises(sg.ProgramError, match=sign):
+            sg.Program.from_text(converted(dialect).text.decode(), "vx500")
+
+
+@pytest.mark.parametrize("command", ["expand", "feed", "sweep"])
+def test_commands_that_write_fanuc_alone(command: str, tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(TEXT)
+    words = {"sweep": ["sweep", "-o", "out.nc", "--axis", "x"]}.get(command, [command, "part.nc", "-o", "out.nc"])
+    words += ["--tool", "t.toml", "--stock", "s.toml"] * (command == "feed")
+    done = run(tmp_path, *words, "-m", "vx500", "--set", "emission.dialect=linuxcnc")
+    assert done.returncode == 2 and "this command writes FANUC's words, and emission.dialect is linuxcnc" in done.stderr
+
+
+def test_what_stands_behind_the_end_is_left_out() -> None:
+    text = TEXT.replace("M30\n%\n", "M30\nG00X5.\n%\nG01X1000.\n")
+    for dialect in READERS:
+        conversion = converted(dialect, text)
+        assert b"X1000" not in conversion.text and b"X5." not in conversion.text.partition(b"M30")[2]
+        assert any("behind the end of the program is left out" in each for each in conversion.warnings)
+    assert not any("behind the end" in each for each in converted("haas").warnings)
+
+
+def test_exact_stop_in_exact_stop_mode() -> None:
+    text = "G21G90\nG00X0.\nG61\nG01X5.F500.\nG09X6.\nG64\nX7.\nM30\n"
+    assert translated("linuxcnc", text)[2:] == [
+        "G61.1", "G01X5.F500.", "G61.1", "X6.", "G61.1", "G64P0.001", "X7.", "M30",
+    ]  # fmt: skip
 
 
 # ---- budget, restart, override, what is said -------------------------------------------------------------------------

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.result import Conversion, DialectNotes
+from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import DIALECTS, FANUC_MEANINGS, Dialect, code_name
 from shapegcode.program import Program, located_error
@@ -38,6 +39,7 @@ _PLACE = re.compile(r"(N\d+)?\(EMISSION (PROLOGUE|EPILOGUE|LOCK|UNLOCK)\)")
 _LENGTHS = "XYZIJKR"
 _CYCLES = {"G73", "G81", "G82", "G83", "G85"}
 _WITH_AXES = {"G10", "G27", "G28", "G29", "G30", "G31", "G52", "G53", "G92"}
+_COORDINATE = re.compile(rf"(?<![A-Z])([XYZ])({_NUMBER})")
 _CODE = re.compile(r"[GM]\d+(\.\d)?")
 _MARK_LINE = re.compile(r"\(TEXT [0-9A-F]{8}\)")
 
@@ -74,7 +76,7 @@ def translate(
     numbers[len(lines) - has_end :] = len(out)
     if writer.state.is_open is False:
         out += writer.opening()
-    end = program.core.line_end.replace("\r\r", "\r")
+    end = "\r\n" if program.core.line_end == "\r\n" else "\n"
     text = (end.join(out) + (end if has_end else "")).encode("latin-1")
     if b"(TEXT 00000000)" in text:
         text = text.replace(b"(TEXT 00000000)", f"(TEXT {text_mark(text)})".encode(), 1)
@@ -156,7 +158,10 @@ class _State:
     cycle: bool = False
     tool: str = ""
     next_tool: str = ""
+    path: str = "G64"
     is_open: bool = False  # the first block was written
+    percents: int = 0  # `%` so far
+    ended_at: int = 0  # line of M02 or M30
     feed: str = ""  # the F in force, where a rapid needs one of its own
     needs_feed: bool = False
     added: int = 0
@@ -181,6 +186,7 @@ class _Translator:
         self.cautions: dict[str, str] = {}
         self._rapid = min(axis.rapid_mm_per_min for axis in machine.axes.as_tuple())
         core = program.core
+        self._has_percent = core.find(b"%", 1 + core.find(b"%")) > 0  # one alone is the last
         dwells = (each for each in core.steps if each[0] == _core.StepKind.move)
         others = core.other_moves
         self._dwells = {line: others[index][1] for _, index, line in dwells if others[index][1] > 0.0}
@@ -195,16 +201,21 @@ class _Translator:
 
     def lines(self, number: int, line: str) -> list[str]:
         """What becomes of a line."""
+        state = self.state
+        if state.percents > 1 or (state.ended_at and line.lstrip()[:1] not in ("%", "(", "")):
+            return self._left_out(number)
         if (place := _PLACE.fullmatch(line)) is not None:
             first, *rest = getattr(self._machine.emission, _EMISSION[place[2]])
             return [(place[1] or "") + first, *rest] if not self._dialect.one_code else [first, *rest]
-        if self.state.is_open and (move := _MOVE.fullmatch(line)) is not None and "K" not in line:
+        if state.is_open and (move := _MOVE.fullmatch(line)) is not None and "K" not in line:
             return self._move(number, line, move)
         comments = _COMMENT.findall(line)
         body = _COMMENT.sub("", line).strip(" \t\r").upper()
         if not body or body[0] in "%O:<":
             return self._frame(body, comments, line)
-        before = [] if self.state.is_open else self.opening()
+        if self._has_percent and not state.percents:
+            return []  # a leader, which no control reads
+        before = [] if state.is_open else self.opening()
         skip, body = self._skipped(number, body)
         if _WORD.sub("", body).strip():
             raise self._error(number, f"{body}: macro statements and names are not translated")
@@ -227,7 +238,7 @@ class _Translator:
     def _move(self, number: int, line: str, move: re.Match[str]) -> list[str]:
         """A line of nothing but motion, with a point in every number."""
         if move[1] is not None:
-            self.state.motion = int(move[1])
+            self.state.motion, self.state.cycle = int(move[1]), False
         dialect = self._dialect
         if number in self._times or dialect.one_code:
             return self._block(number, "", [("G", move[1])] * (move[1] is not None) + _WORD.findall(move[2]), ())
@@ -243,6 +254,7 @@ class _Translator:
             return ["(TEXT 00000000)"] if dialect.comment == "(" else []
         shown = [self._comment(text) for text in comments]
         if body.startswith("%"):
+            self.state.percents += 1
             if dialect.frame == "name":
                 return [] if self.state.is_open else [f"%{self._name()}", *shown]
             return [body[0] + "".join(shown)] if dialect.frame in ("tape", "percent") else shown
@@ -251,6 +263,11 @@ class _Translator:
                 return [f"O{body[1:].zfill(5)}{''.join(shown)}"]
             return [self._comment(f"{plain_comment(body).strip()} {' '.join(comments)}".strip())]
         return shown or [""]
+
+    def _left_out(self, number: int) -> list[str]:
+        """A line behind the end of the program, which another control might run."""
+        self.cautions.setdefault("end", f"{self._where(number)}: what stands behind the end of the program is left out")
+        return []
 
     def _name(self) -> str:
         found = re.search(rb"(?m)^[O:](\d+)", self._program.core.slice(0, min(self._program.core.size, 4096)))
@@ -274,8 +291,13 @@ class _Translator:
         if {"G28", "G30"} & {*codes} - self._own.keys() and motion:
             before += motion  # two codes that use the axis words of one block
         if "G09" in codes and self._dialect.exact_stop is not None:
-            before += [self._filled(line) for line in self._dialect.exact_stop[:1] if line]
-            behind += [self._filled(self._dialect.exact_stop[1])]
+            stop, again = self._dialect.exact_stop
+            before += [stop] if stop else []
+            behind += [self._filled(again or self._dialect.becomes[self.state.path])]
+        if "G43" in codes and not any(letter == "H" for letter, _ in words):
+            raise self._error(number, f"G43 without H: the offset in force is not known to {self._dialect.control}")
+        if not skip and {"M02", "M30"} & {*codes}:
+            self.state.ended_at = number
         for letter, value in words:
             code = code_name(letter + value) if letter in "GM" else letter
             if code in before or (code == "G09" and self._dialect.exact_stop is not None):
@@ -284,12 +306,31 @@ class _Translator:
             out.append(self._word(number, letter, value, code, codes))
         if self._dialect.time_feed:
             before, out, behind = self._timed(number, before, out, behind)
-        lines = self._split(number, codes, words, out) if self._dialect.one_code else [skip + self._joined(out)]
-        lines = [*before, *(line for line in lines if line), *behind]
+        lines = self._split(number, codes, words, out) if self._dialect.one_code else [self._joined(out)]
+        lines = [skip + line for line in (*before, *lines, *behind) if line]
+        self._hold(number, words, codes, lines)
         if comments:
             text = " ".join(self._comment(text) for text in comments)
             lines = [f"{lines[0]}{' ' * (self._dialect.comment == ';')}{text}", *lines[1:]] if lines else [text]
         return lines
+
+    def _hold(self, number: int, words: Sequence[tuple[str, str]], codes: Sequence[str], lines: Sequence[str]) -> None:
+        """Hold what was written against what was read: each coordinate is there, and none besides."""
+        if "G04" in codes or self._taken(codes) or (self._dialect.one_code and self.state.incremental):
+            return
+        want = {letter: float(self._length(letter, value, self._dialect)) for letter, value in words if letter in "XYZ"}
+        have = {letter: float(value) for line in lines for letter, value in _COORDINATE.findall(line)}
+        lost = [letter for letter, value in want.items() if not abs(have.get(letter, math.nan) - value) <= _CHORD_MM]
+        if lost or have.keys() - want.keys() - {*("XYZ" if self._is_arc() else "")}:
+            raise RoundTripError(f"line {number}: {words} became {lines} for {self._dialect.control}")
+
+    def _is_arc(self) -> bool:
+        return self._dialect.one_code and self.state.motion in (2, 3)
+
+    def _taken(self, codes: Sequence[str]) -> bool:
+        """Whether what takes the place of a code like G28 takes that of its axes too."""
+        own = [self._own[code] for code in codes if code in self._own and code in _WITH_AXES]
+        return any(not _CODE.fullmatch(text) for text in own)
 
     def _note(self, code: str) -> None:
         """Keep what a code puts into force."""
@@ -298,6 +339,8 @@ class _Translator:
             state.motion, state.cycle = int(code[1:]), False
         elif code in ("G20", "G21"):
             state.unit = code
+        elif code in ("G61", "G64"):
+            state.path = code
         elif code in ("G90", "G91"):
             state.incremental = code == "G91"
         elif code in _CYCLES or code == "G80":
@@ -310,9 +353,8 @@ class _Translator:
         dialect = self._dialect
         if code in self._own:
             return self._own[code]
-        taken = (own for own in codes if own in self._own and own in _WITH_AXES)
-        if letter not in "GMNST" and any(not _CODE.fullmatch(self._own[own]) for own in taken):
-            return ""  # what takes the place of G28 takes that of its axes too
+        if letter not in "GMNST" and self._taken(codes):
+            return ""
         if "G04" in codes and (code == "G04" or letter in "XUP"):
             return self._dwell(number, codes) if code == "G04" else ""
         if letter in "GM":

@@ -24,7 +24,10 @@ FANUC_MEANINGS: Mapping[str, str] = MappingProxyType(
         "G21": "mm",
         "G28": "the move to the reference position through the programmed one",
         "G30": "the move to the second reference position",
+        "G41": "cutter compensation on the left",
+        "G42": "cutter compensation on the right",
         "G43": "the tool length offset H",
+        "G52": "a shift of the coordinate system",
         "G49": "tool length offset off",
         "G53": "the machine coordinate system in this block",
         "G54.1": "an additional work coordinate system",
@@ -34,6 +37,8 @@ FANUC_MEANINGS: Mapping[str, str] = MappingProxyType(
         "G61": "an exact stop in every block",
         "G64": "cutting mode, without stops between blocks",
         "G65": "a macro call",
+        **{f"G{code}": "a drilling cycle" for code in (73, 74, 76, *range(81, 90))},
+        "G92": "the coordinate system set by a position",
         "G93": "inverse time, F in 1/min",
         "G95": "feed per revolution",
         "M00": "a stop",
@@ -85,7 +90,7 @@ class Dialect:
         least_block_s: shortest block that the control runs; None: not known.
         lock: lines that switch the feed override off, and on again; empty: none are known.
         lock_word: word of every shaped block that does it instead.
-        exact_stop: lines before and behind a block with G09; None: G09 is a word like others.
+        exact_stop: lines before and behind a block with G09, "" behind: the mode in force; None: a word like others.
         header: comments for the operator.
     """
 
@@ -154,7 +159,8 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType({
                 "it cannot be switched off; it slows with the angle between blocks, and no setting that prevents that "
                 "was found: make a first run and compare its time", _HAAS_TIME,
             ),
-            "override": Fact("#3004=2 switches the feed override off (needs the macro option)", _HAAS_LOCK),
+            "override": Fact(f"#3004=2 switches the feed override off (macro option; {_HAAS_LOCK}); that a G53 alone "
+                             "keeps it from being given back too early is assumed"),
             "restart": _BY_NUMBER,
         },
         _words(f"{_MOTION} {_TAPE} {_STOPS} M06"),
@@ -230,7 +236,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType({
         {"G28": "it goes to the position that G28.1 stored, to machine zero where none was stored",
          "G43": "H is the number of a tool in the tool table"},
         frame="percent", opening=("G91.1",), dwell="G04P{s}", decimals=5, feed_decimals=3,
-        lock=(("M50P0",), ("M50P1",)), exact_stop=("G61.1", "G64P{blend}"),
+        lock=(("M50P0",), ("M50P1",)), exact_stop=("G61.1", ""),
         header=("INI TRAJ ARC_BLEND_RAMP_FREQ 10000", "INI TRAJ ARC_BLEND_KINK_RATIO 0.7"),
     ),
     "klipper": Dialect(
@@ -265,6 +271,8 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType({
             "feed": Fact("shaped blocks with G93, F in seconds: the control reports a time that it cannot keep; "
                          "all others in mm/min, as it is delivered",
                          f"{_BECKHOFF}206602507.html"),
+            "arcs": Fact("R, and I J K from the start with G162",
+                         "https://infosys.beckhoff.com/content/1033/tccncprogramming/15556639883.html, 15556764811"),
             "decimals": Fact("three in mm"),
             "least block": _UNKNOWN_BLOCK,
             "look-ahead": Fact("slope of the type STEP and no contouring (G61, #HSC): not tried"),
@@ -280,7 +288,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType({
          "G53": "work offsets off until the next one", "G93": "the time of the block in seconds",
          "M06": "a subprogram, where one is configured", "M08": "no function unless it is configured",
          "M09": "no function unless it is configured"},
-        frame="name", dwell="G04 X{s}", time_feed=True, lock_word="G166",
+        frame="name", opening=("G162",), dwell="G04 X{s}", time_feed=True, lock_word="G166",
     ),
 })  # fmt: skip
 """By name; `fanuc` has no row: it is what everything else here reads and writes."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.computer import require_memory_for_lines
-from shapegcode.program.reading import Reading, given_text, signs_of_turning
+from shapegcode.program.reading import Reading, given_text, signs_of_other_control, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
 
@@ -134,6 +134,8 @@ class Program:
             line, signs = turning
             message = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"
             raise located_error(source, line, 1, message)
+        if not emitted and (other := signs_of_other_control(data)) is not None:
+            raise located_error(source, other[0], 1, f"{other[1]}; shapegcode reads FANUC's words")
         reading = Reading(
             machine,
             # What shapegcode wrote has FANUC's arcs, whatever those of its original were.
