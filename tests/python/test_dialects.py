@@ -25,7 +25,7 @@ from dialect_readers import (
 )
 from shapegcode import _core
 from shapegcode.conversion.translate import translate
-from shapegcode.machine.dialects import DIALECTS, DialectName
+from shapegcode.machine.dialects import DialectName, all_dialects
 
 PROGRAMS = Path(__file__).parents[1] / "golden" / "programs"
 READERS = {
@@ -78,7 +78,7 @@ def converted(dialect: str, text: str = TEXT, **options: Any) -> sg.Conversion:
 
 
 def test_every_dialect_has_a_reader() -> None:
-    assert {"fanuc", *READERS} == {"fanuc", *DIALECTS} == set(get_args(DialectName))
+    assert {"fanuc", *READERS} == {"fanuc", *all_dialects()} == set(get_args(DialectName))
 
 
 # ---- read back -------------------------------------------------------------------------------------------------------
@@ -409,7 +409,7 @@ def test_restart_points(dialect: str, tmp_path: Path) -> None:
         assert dialect == "klipper" or line.startswith(f"N{point.number}")
     compare(dialect, conversion, READERS[dialect](conversion.text.decode(), tmp_path))
     restart = next(note.text for note in conversion.at_the_control if note.topic == "restart")
-    assert DIALECTS[dialect].facts["restart"].text in restart
+    assert all_dialects()[dialect].facts["restart"].text in restart
 
 
 @pytest.mark.parametrize("dialect", ["haas", "mitsubishi", "linuxcnc", "isg"])
@@ -437,7 +437,7 @@ def test_lines_of_the_shop_around_a_cut() -> None:
 
 @pytest.mark.parametrize("dialect", READERS)
 def test_what_is_assumed_is_said(dialect: str) -> None:
-    conversion, row = converted(dialect), DIALECTS[dialect]
+    conversion, row = converted(dialect), all_dialects()[dialect]
     assert conversion.dialect is not None and conversion.dialect.assumed == row.assumed
     assert {"words", "dwell", "feed", "decimals", "least block", "look-ahead", "override", "restart"} <= {*row.facts}
     report = conversion.to_dict()["dialect"]

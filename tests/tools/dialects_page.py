@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shapegcode.machine.dialects import DIALECTS, FANUC_MEANINGS, Dialect
+from shapegcode.machine.dialects import Dialect, all_dialects, fanuc_meaning
 
 _HEAD = """\
 # Dialects of output
@@ -22,7 +22,7 @@ what they are on FANUC and what they are there, unless `emission.words` says wha
 
 def dialects_documentation() -> str:
     """Every row of the table."""
-    return "\n".join([_HEAD, *(_section(name, dialect) for name, dialect in DIALECTS.items())])
+    return "\n".join([_HEAD, *(_section(name, dialect) for name, dialect in all_dialects().items())])
 
 
 def _section(name: str, dialect: Dialect) -> str:
@@ -31,10 +31,7 @@ def _section(name: str, dialect: Dialect) -> str:
         for topic, fact in dialect.facts.items()
     ]
     becomes = [f"`{code}` → {f'`{text}`' if text else 'left out'}" for code, text in sorted(dialect.becomes.items())]
-    means = [
-        f"`{code}`: {dialect.means[code]}" + (f" (FANUC: {FANUC_MEANINGS[code]})" if code in FANUC_MEANINGS else "")
-        for code in sorted(dialect.means)
-    ]
+    means = [f"`{code}`: {dialect.means[code]} (FANUC: {fanuc_meaning(code)})" for code in sorted(dialect.means)]
     cautions = [f"`{code}`: {text}" for code, text in dialect.cautions.items()]
     lines = [
         f"## {name}: {dialect.control}\n",

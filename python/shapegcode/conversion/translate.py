@@ -20,7 +20,7 @@ from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.result import Conversion, DialectNotes
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
-from shapegcode.machine.dialects import DIALECTS, FANUC_MEANINGS, Dialect, code_name
+from shapegcode.machine.dialects import Dialect, code_name, dialect_of, fanuc_meaning
 from shapegcode.program import Program, located_error
 from shapegcode.program.stamp import plain_comment, text_mark
 
@@ -65,7 +65,9 @@ def translate(
 
     `shaped`: of each shaped cut its blocks, its lines, and the lines of `original` whose place they take.
     """
-    writer = _Translator(program, machine, original or program, shaped, block_period_s)
+    dialect = dialect_of(machine.emission.dialect)
+    assert dialect is not None  # FANUC's words are what is read
+    writer = _Translator(dialect, program, machine, original or program, shaped, block_period_s)
     lines = program.expanded_text.decode("latin-1").split(program.core.line_end)
     has_end = lines[-1] == ""
     out: list[str] = []
@@ -86,9 +88,8 @@ def translate(
 def require_dialect(program: Program, machine: Machine, budget: Budget | None) -> None:
     """Refuse, before anything is shaped, a program or a budget that `emission.dialect` cannot be written for."""
     name = machine.emission.dialect
-    if name == "fanuc":
+    if (dialect := dialect_of(name)) is None:
         return
-    dialect = DIALECTS[name]
     other_blocks = dialect.arc_radius != "R" or dialect.time_feed
     if budget is not None and (dialect.one_code or (budget.limits_rate and other_blocks)):
         raise _core.ArgumentError(
@@ -113,9 +114,9 @@ def require_dialect(program: Program, machine: Machine, budget: Budget | None) -
 def with_dialect(conversion: Converted) -> Converted:
     """The conversion with its program in the words of `emission.dialect`."""
     found, simulated = translated(conversion), conversion.simulated
-    if found is None or simulated is None:
+    name = "fanuc" if simulated is None else simulated.machine.emission.dialect
+    if found is None or (dialect := dialect_of(name)) is None:
         return conversion
-    name, dialect = simulated.machine.emission.dialect, DIALECTS[simulated.machine.emission.dialect]
     limit = conversion.budget.limits.max_bytes if conversion.budget is not None else None
     if limit is not None and len(found.text) > limit:
         less = limit * conversion.emitted.size // len(found.text)
@@ -172,6 +173,7 @@ class _Translator:
 
     def __init__(
         self,
+        dialect: Dialect,
         program: Program,
         machine: Machine,
         original: Program,
@@ -179,7 +181,7 @@ class _Translator:
         block_period_s: float,
     ) -> None:
         self._program, self._machine, self._original = program, machine, original
-        self._dialect: Dialect = DIALECTS[machine.emission.dialect]
+        self._dialect = dialect
         self._own = {code_name(word): text for word, text in machine.emission.words.items()}
         self._shaped = shaped
         self.state = _State(int(machine.power_on.motion[1:]), machine.power_on.units)
@@ -521,7 +523,7 @@ class _Translator:
         return located_error(file, line, 1, message)
 
     def _refusal(self, number: int, code: str) -> _core.ProgramError:
-        here = FANUC_MEANINGS.get(code, "a code of its own" if code[0] == "G" else "a function of the machine builder")
+        here = fanuc_meaning(code)
         there = self._dialect.means.get(code, "not known")
         return self._error(
             number, f"{code} is {here} on FANUC, and {there} on {self._dialect.control}: take it out, or say what it "

@@ -22,7 +22,7 @@ from shapegcode.conversion.restart import (
     decimal,
 )
 from shapegcode.machine import Machine
-from shapegcode.machine.dialects import DIALECTS
+from shapegcode.machine.dialects import dialect_of
 from shapegcode.machine.programs import Emission
 from shapegcode.model.machine_model import MachineModel, OwnFilter
 from shapegcode.model.modes import NO_OFFSET, Offset, excited_modes
@@ -386,7 +386,7 @@ class RegionWriter:
     def _units(self, region: _core.Region) -> tuple[float, int]:
         """Millimetres of the program's unit, and digits behind the point of F."""
         inch = region.exit.units == 20
-        controller, own = self._machine.controller, DIALECTS.get(self._machine.emission.dialect)
+        controller, own = self._machine.controller, dialect_of(self._machine.emission.dialect)
         decimals = controller.feed_decimals_inch if inch else controller.feed_decimals_mm
         finer = own.feed_decimals if own is not None else None
         return MM_PER_INCH if inch else 1.0, decimals if finer is None else max(decimals, finer + inch)

@@ -20,7 +20,7 @@ from shapegcode._core import Mode
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine.axes import Axes
 from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Times
-from shapegcode.machine.dialects import DIALECTS, FANUC_MEANINGS, code_name
+from shapegcode.machine.dialects import code_name, dialect_of, fanuc_meaning
 from shapegcode.machine.programs import Emission, Input, Price, Shaping, Tolerance, Verdict
 from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml, values_of
 from shapegcode.settings.load import (
@@ -90,7 +90,7 @@ class Machine(TomlTable):
 
     @model_validator(mode="after")
     def _dialect_runs_the_blocks(self) -> Machine:
-        own = DIALECTS.get(self.emission.dialect)
+        own = dialect_of(self.emission.dialect)
         shortest = own.least_block_s if own is not None else None
         if own is not None and shortest is not None and self.controller.block_time_s < shortest * (1 - 1e-9):
             raise KeyProblem(
@@ -106,12 +106,11 @@ class Machine(TomlTable):
         for name, lines in written.items():
             for code in map(code_name, _CODE.findall(" ".join(lines))):
                 if own is not None and code in own.means:
-                    here = FANUC_MEANINGS.get(code, "a code of its own")
                     raise KeyProblem(
                         f"emission.{name}",
                         list(lines),
-                        f"{code} is {here} on FANUC, and {own.means[code]} on {own.control}: these lines are in the "
-                        f"words of emission.dialect = {toml(self.emission.dialect)}",
+                        f"{code} is {fanuc_meaning(code)} on FANUC, and {own.means[code]} on {own.control}: "
+                        f"these lines are in the words of emission.dialect = {toml(self.emission.dialect)}",
                     )
         return self
 
@@ -132,18 +131,18 @@ class Machine(TomlTable):
         emission, controller = self.emission, self.controller
         if emission.override != "lock":
             return self
-        named = DIALECTS[emission.dialect].control if emission.dialect != "fanuc" else ""
-        if not (named and DIALECTS[emission.dialect].lock_word):
+        own = dialect_of(emission.dialect)
+        if own is None or not own.lock_word:
             for name, lines in (("lock_lines", emission.locking), ("unlock_lines", emission.unlocking)):
                 if not lines:
-                    none = f": no word that switches the feed override of {named} off is known" if named else ""
+                    none = f": no word that switches the feed override of {own.control} off is known" if own else ""
                     raise KeyProblem(
                         f"emission.{name}", [], f'must say something with emission.override = "lock"{none}'
                     )
         variables = set(_VARIABLE.findall(" ".join((*emission.locking, *emission.unlocking))))
-        own = variables - {"#3003", "#3004"}
+        kept = variables - {"#3003", "#3004"}
         for name, lines in (("prologue", emission.prologue), ("epilogue", emission.epilogue)):
-            if used := own & set(_VARIABLE.findall(" ".join(lines))):
+            if used := kept & set(_VARIABLE.findall(" ".join(lines))):
                 raise KeyProblem(
                     f"emission.{name}", list(lines), f"uses {min(used)}, in which emission.lock_lines keep the switch"
                 )

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
-from shapegcode.machine.dialects import DIALECTS, DialectName, code_name
+from shapegcode.machine.dialects import DialectName, code_name, dialect_of
 from shapegcode.settings.keys import Bool, Float, NonNegative, Positive, Text, TomlTable, key, toml
 
 _OFFSET_NAME = re.compile(r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}")
@@ -283,19 +283,19 @@ class Emission(TomlTable):
     @property
     def locking(self) -> tuple[str, ...]:
         """Lines that switch the feed override off: `lock_lines`, or the dialect's own where they are FANUC's."""
-        own = DIALECTS.get(self.dialect)
+        own = dialect_of(self.dialect)
         return self.lock_lines if own is None or self.lock_lines != _FANUC_LOCK[0] else own.lock[0]
 
     @property
     def unlocking(self) -> tuple[str, ...]:
         """Lines that switch it on again, likewise."""
-        own = DIALECTS.get(self.dialect)
+        own = dialect_of(self.dialect)
         return self.unlock_lines if own is None or self.unlock_lines != _FANUC_LOCK[1] else own.lock[1]
 
     @property
     def position_decimals(self) -> int | None:
         """Decimals of positions in mm that are finer than the control's own; None: as these."""
-        own = DIALECTS.get(self.dialect)
+        own = dialect_of(self.dialect)
         return self.decimals if own is None or self.decimals is not None else own.decimals
 
     @property
