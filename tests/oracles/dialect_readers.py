@@ -93,22 +93,24 @@ def read_siemens(text: str, _folder: Path) -> list[ReadMove]:
     ]
     assert len(rows) == len(lines)
     at, motion, axes, feed, unit, found = np.zeros(3), "G0", (0, 1), math.nan, 1.0, []
+    distance = "G90"
     for line, row in zip(lines, rows, strict=True):
         motion = row.get("gg01_motion") or motion
         axes = _PLANES[row["gg06_plane_select"]] if row.get("gg06_plane_select") else axes
         unit = {"G700": 25.4, "G710": 1.0}.get(row.get("gg13_wp_measure") or "", unit)
-        from_last = row.get("gg14_wp_measure_mode", "G90") == "G91"
+        distance = row.get("gg14_wp_measure_mode") or distance
+        from_last = distance == "G91"
         if row.get("gg02_wait"):
             found.append(ReadMove(at, at, dwell_s=row["F"]))
             continue
         feed = row["F"] * unit if row.get("F") is not None else feed
         named = [row.get(axis) for axis in "XYZ"]
         end = np.array([at[k] if named[k] is None else named[k] * unit + from_last * at[k] for k in range(3)])
-        if np.array_equal(end, at):
-            continue
         centre, turn = None, {"G2": -1, "G3": 1}.get(motion, 0)
+        names = nc_to_dataframe(line + "\n")[1]["symbol_table"] if turn else {}
+        if np.array_equal(end, at) and not names.keys() & {*"IJK"}:
+            continue
         if turn:
-            names = nc_to_dataframe(line + "\n")[1]["symbol_table"]
             if "CR" in names:
                 centre = centre_of(at, end, names["CR"] * unit, turn, axes)
             else:
@@ -148,7 +150,7 @@ def read_mitsubishi(text: str, _folder: Path) -> list[ReadMove]:
 
 
 def read_isg(text: str, _folder: Path) -> list[ReadMove]:
-    assert text.startswith("%O")
+    assert text.startswith("%")
     return list(_read_words(text.partition("\n")[2], isg=True))
 
 
@@ -179,9 +181,9 @@ def _read_words(text: str, *, haas: bool = False, isg: bool = False) -> Iterator
             feed = float(named["F"]) * (1.0 if timed else unit)
         given = [float(named["XYZ"[k]]) * unit if "XYZ"[k] in named else math.nan for k in range(3)]
         end = np.where(np.isnan(given), at, np.array(given) + (0.0 if absolute else at))
-        if np.array_equal(end, at):
-            continue
         centre, turn = None, {2: -1, 3: 1}.get(motion, 0)
+        if np.array_equal(end, at) and not (turn and named.keys() & {*"IJK"}):
+            continue
         if turn and "R" in named:
             centre = centre_of(at, end, float(named["R"]) * unit, turn, axes)
         elif turn:

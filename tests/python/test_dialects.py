@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from pathlib import Path
 from typing import Any, get_args
 
@@ -85,14 +85,21 @@ def test_every_dialect_has_a_reader() -> None:
 
 
 def compare(dialect: str, conversion: sg.Conversion, read: list[ReadMove]) -> tuple[int, float]:
-    """Every move and dwell of the program as it was judged beside what the other reader makes of what was written.
+    """The program as it was judged beside what the other reader makes of what was written."""
+    blocks = [place.blocks(conversion.emitted) for place in conversion.placed]
+    in_cuts = {int(line) for path in blocks for line in path.segment_lines}
+    return compare_moves(dialect, conversion.emitted, read, in_cuts, conversion.block_period_s)
+
+
+def compare_moves(
+    dialect: str, program: sg.Program, read: list[ReadMove], in_cuts: Set[int] = frozenset(), period_s: float = 1.0
+) -> tuple[int, float]:
+    """Every move and dwell of a program beside what the other reader makes of it in a dialect.
 
     Gives the number of moves and the largest distance in mm.
     """
-    machine = machine_for(dialect)
-    tick_s, period_s = machine.controller.interpolation_period_s, conversion.block_period_s
-    in_cuts = {int(line) for place in conversion.placed for line in place.blocks(conversion.emitted).segment_lines}
-    left, farthest, skipped, moves = iter(read), 0.0, 0, moves_of(conversion.emitted)
+    tick_s = machine_for(dialect).controller.interpolation_period_s
+    left, farthest, skipped, moves = iter(read), 0.0, 0, moves_of(program)
     for segment, dwell_s in moves:
         if dwell_s > 0.0:
             assert next(left).dwell_s == pytest.approx(dwell_s, abs=1e-9)
@@ -165,6 +172,83 @@ def test_real_programs_read_back(dialect: str, name: str, tmp_path: Path) -> Non
         text = re.sub(r" ?H\d+", "", text).replace("G43", "G0")  # their tool lengths are not in the program
     conversion = converted(dialect, text, keys={"emission.words": {**WORDS.get(dialect, {}), **words}})
     compare(dialect, conversion, READERS[dialect](conversion.text.decode(), tmp_path))
+
+
+def random_program(rng: np.random.Generator) -> str:
+    """Rapids, lines, arcs by R and by I J K, circles and helices in three planes, dwells, exact stops, G90 and G91."""
+    at, plane, absolute = np.zeros(3), 17, True
+    lines = ["G21G90G94G17G40", "G00X0.Y0.Z0."]
+    axes = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+
+    def words(end: np.ndarray[Any, Any], which: set[int]) -> str:
+        values = end if absolute else end - at
+        return "".join(f"{'XYZ'[axis]}{values[axis]:.3f}" for axis in sorted(which))
+
+    for _ in range(int(rng.integers(8, 25))):
+        kind = rng.choice(
+            ["rapid", "line", "arc", "circle", "dwell", "mode", "stop"], p=[0.1, 0.3, 0.3, 0.1, 0.08, 0.08, 0.04]
+        )
+        a, b, normal = axes[plane]
+        feed = f"F{rng.integers(50, 6000)}{rng.choice(['', '.', '.5'])}"
+        if kind == "dwell":
+            lines.append(rng.choice([f"G04P{rng.integers(1, 3000)}", f"G04X{rng.integers(1, 3000) / 1000:.3f}"]))
+        elif kind == "mode":
+            absolute = not absolute
+            plane = int(rng.choice([17, 18, 19]))
+            lines.append(f"G{90 if absolute else 91}G{plane}")
+        elif kind in ("rapid", "line", "stop"):
+            end = np.round(at + rng.uniform(-30.0, 30.0, 3), 3)
+            which = {int(axis) for axis in rng.choice(3, size=int(rng.integers(1, 4)), replace=False)}
+            end = np.where([axis in which for axis in range(3)], end, at)
+            code = {"rapid": "G00", "line": "G01", "stop": "G09G01"}[kind]
+            lines.append(f"{code}{words(end, which)}{'' if kind == 'rapid' else feed}")
+            at = end
+        else:
+            radius, begin = float(rng.uniform(1.0, 40.0)), float(rng.uniform(0.0, math.tau))
+            sweep = math.tau if kind == "circle" else float(rng.uniform(0.2, 5.5))
+            turn = int(rng.choice([-1, 1]))
+            centre, end = np.zeros(3), at.copy()
+            offset = np.round(radius * np.array([-math.cos(begin), -math.sin(begin)]), 3)
+            begin = math.atan2(-offset[1], -offset[0])
+            centre[[a, b]] = at[[a, b]] + offset
+            radius = float(np.hypot(*offset))
+            if kind == "arc":
+                angle = begin + turn * sweep
+                end[[a, b]] = np.round(centre[[a, b]] + radius * np.array([math.cos(angle), math.sin(angle)]), 3)
+            which = {a, b} if kind == "arc" else set[int]()
+            if rng.random() < 0.3:
+                end[normal] = round(float(at[normal] + rng.uniform(-5.0, 5.0)), 3)
+                which |= {normal}
+            # Near half a turn R may be too small for the rounded ends, which LinuxCNC refuses.
+            by_radius = kind == "arc" and abs(sweep - math.pi) > 0.2 and rng.random() < 0.5
+            form = f"R{radius if sweep < math.pi else -radius:.3f}"
+            if not by_radius:
+                form = "".join(
+                    f"{'IJK'[axis]}{offset[k]:.3f}" for k, axis in sorted(enumerate((a, b)), key=lambda p: p[1])
+                )
+            lines.append(f"G0{3 if turn > 0 else 2}{words(end, which)}{form}{feed}")
+            at = end
+    return "\n".join([*lines, "M30", ""])
+
+
+def read_random(dialect: str, seed: int, folder: Path) -> tuple[int, float] | None:
+    """A random program in a dialect, read by both; None: FANUC's reader refuses it."""
+    machine = machine_for(dialect, {"controller.arc_radius_tolerance_mm": 0.01})
+    try:
+        program = sg.Program.from_text(random_program(np.random.default_rng(seed)), machine)
+    except sg.ProgramError:
+        return None  # an arc whose ends are too near, or too far for its radius
+    return compare_moves(dialect, program, READERS[dialect](translate(program, machine).text.decode(), folder))
+
+
+@pytest.mark.parametrize("dialect", READERS)
+@pytest.mark.parametrize(
+    "seeds", [range(15), pytest.param(range(15, 200), marks=pytest.mark.slow)], ids=["few", "many"]
+)
+def test_random_programs_read_back(dialect: str, seeds: range, tmp_path: Path) -> None:
+    found = [each for seed in seeds if (each := read_random(dialect, seed, tmp_path)) is not None]
+    assert len(found) > 0.7 * len(seeds)
+    assert max(distance for _, distance in found) < 1e-3
 
 
 # ---- derived by hand, each from the page named -----------------------------------------------------------------------

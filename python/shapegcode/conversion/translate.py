@@ -70,7 +70,7 @@ def translate(
     writer = _Translator(dialect, program, machine, original or program, shaped, block_period_s)
     lines = program.expanded_text.decode("latin-1").split(program.core.line_end)
     has_end = lines[-1] == ""
-    out: list[str] = []
+    out = [f"%{writer.name()}"] if dialect.frame == "name" and program.core.find(b"%") < 0 else list[str]()
     numbers = np.empty(len(lines), dtype=np.int64)
     for index, line in enumerate(lines[: len(lines) - has_end]):
         numbers[index] = len(out) + 1
@@ -258,7 +258,7 @@ class _Translator:
         if body.startswith("%"):
             self.state.percents += 1
             if dialect.frame == "name":
-                return [] if self.state.is_open else [f"%{self._name()}", *shown]
+                return [] if self.state.is_open else [f"%{self.name()}", *shown]
             return [body[0] + "".join(shown)] if dialect.frame in ("tape", "percent") else shown
         if body:
             if dialect.frame == "tape" and re.fullmatch(r"[O:]\d+", body):
@@ -271,7 +271,8 @@ class _Translator:
         self.cautions.setdefault("end", f"{self._where(number)}: what stands behind the end of the program is left out")
         return []
 
-    def _name(self) -> str:
+    def name(self) -> str:
+        """Of the program, where the control wants one."""
         found = re.search(rb"(?m)^[O:](\d+)", self._program.core.slice(0, min(self._program.core.size, 4096)))
         return f"O{found[1].decode()}" if found else "SHAPED"
 
@@ -471,7 +472,8 @@ class _Translator:
                 (late if code in _BEHIND_THE_MOVE else lines).append(filled)
         if "F" in named:
             state.feed, state.needs_feed = f"F{self._length('F', named['F'], self._dialect)}", True
-        if "G04" in codes or not move:
+        is_circle = state.motion in (2, 3) and not named.keys().isdisjoint("IJK")
+        if "G04" in codes or not (move or is_circle):
             return [*lines, *late]
         # G0 is as fast as G1 there: each has its F.
         feed = f"F{self._rapid:g}" if state.motion == 0 else state.feed if state.needs_feed else ""
