@@ -51,6 +51,11 @@ class ReadMove:
         return float(np.linalg.norm(self.start + share * step - point))
 
 
+def same(one: Vector, other: Vector) -> bool:
+    """Whether two positions are one, but for the round-off of a sum of increments."""
+    return bool(np.abs(one - other).max() < 1e-9)
+
+
 def centre_of(start: Vector, end: Vector, radius: float, turn: int, axes: tuple[int, int]) -> Vector:
     """Centre of an arc given by its radius: negative for more than half a turn."""
     a, b = axes
@@ -108,7 +113,7 @@ def read_siemens(text: str, _folder: Path) -> list[ReadMove]:
         end = np.array([at[k] if named[k] is None else named[k] * unit + from_last * at[k] for k in range(3)])
         centre, turn = None, {"G2": -1, "G3": 1}.get(motion, 0)
         names = nc_to_dataframe(line + "\n")[1]["symbol_table"] if turn else {}
-        if np.array_equal(end, at) and not names.keys() & {*"IJK"}:
+        if same(end, at) and not names.keys() & {*"IJK"}:
             continue
         if turn:
             if "CR" in names:
@@ -135,7 +140,7 @@ def read_klipper(text: str, _folder: Path) -> list[ReadMove]:
             found.append(ReadMove(at, at, dwell_s=move["dwell_s"]))
             continue
         end = np.array(move["end"])
-        if not np.array_equal(end, at):
+        if not same(end, at):
             found.append(ReadMove(at, end, False, move["speed_mm_per_s"] * 60.0))
         at = end
     return found
@@ -182,7 +187,7 @@ def _read_words(text: str, *, haas: bool = False, isg: bool = False) -> Iterator
         given = [float(named["XYZ"[k]]) * unit if "XYZ"[k] in named else math.nan for k in range(3)]
         end = np.where(np.isnan(given), at, np.array(given) + (0.0 if absolute else at))
         centre, turn = None, {2: -1, 3: 1}.get(motion, 0)
-        if np.array_equal(end, at) and not (turn and named.keys() & {*"IJK"}):
+        if same(end, at) and not (turn and named.keys() & {*"IJK"}):
             continue
         if turn and "R" in named:
             centre = centre_of(at, end, float(named["R"]) * unit, turn, axes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Set
+from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
@@ -75,6 +76,9 @@ def machine_for(dialect: str, keys: Mapping[str, Any] | None = None) -> sg.Machi
 def converted(dialect: str, text: str = TEXT, **options: Any) -> sg.Conversion:
     program = sg.Program.from_text(text, machine_with(READING))
     return sg.convert(program, machine_for(dialect, options.pop("keys", None)), shape_all=True, **options)
+
+
+WITH_INCHES = ["haas", "mitsubishi", "siemens", "linuxcnc"]
 
 
 def test_every_dialect_has_a_reader() -> None:
@@ -162,9 +166,19 @@ def test_shaped_rapids_and_no_header(dialect: str, tmp_path: Path) -> None:
     compare(dialect, conversion, READERS[dialect](conversion.text.decode(), tmp_path))
 
 
+REAL = [
+    "CONTOUR_R.NC",
+    "G17_18_19.NC",
+    "TEST_G90.NC",
+    "TEST_G91.NC",
+    "VINT_360arc.NC",
+    "helical_bore.nc",
+    "mixed_ijk_r_planes.nc",
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("dialect", READERS)
-@pytest.mark.parametrize("name", ["CONTOUR_R.NC", "VINT_360arc.NC", "helical_bore.nc"])
+@pytest.mark.parametrize(("dialect", "name"), [*product(READERS, REAL), *product(WITH_INCHES, ["PARALLEL.NC"])])
 def test_real_programs_read_back(dialect: str, name: str, tmp_path: Path) -> None:
     text = (PROGRAMS / name).read_text()
     words = {"G28": "", "G49": "", "M01": ""}
@@ -314,7 +328,7 @@ def test_numbers_without_a_point(dialect: str) -> None:
     assert re.findall(r"[XYZ]-?[\d.]+", line) == ["X1.", "Y-0.5", "Z5."]
 
 
-@pytest.mark.parametrize("dialect", sorted({*READERS} - {"klipper", "isg"}))
+@pytest.mark.parametrize("dialect", WITH_INCHES)
 def test_inch(dialect: str, tmp_path: Path) -> None:
     conversion = converted(dialect, TEXT.replace("G21", "G20").replace("F6000.", "F200.").replace("F3000.", "F120."))
     assert {"siemens": b"G700", "linuxcnc": b"G64P0.00004"}.get(dialect, b"G20") in conversion.text

@@ -81,7 +81,7 @@ def _rows() -> tuple[Mapping[str, Dialect], Mapping[str, str]]:
     """The dialects by name, and what words say on a FANUC control."""
     file = resources.files("shapegcode") / "data" / "control" / "dialects.toml"
     tables = tomllib.loads(file.read_text(encoding="utf-8"))
-    fanuc = tables.pop("fanuc")
+    fanuc = {code: text for codes, text in tables.pop("fanuc").items() for code in codes.split()}
     rows = {}
     for name, table in tables.items():
         facts = {topic: Fact(**fact) for topic, fact in table.pop("facts").items()}

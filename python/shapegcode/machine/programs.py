@@ -149,8 +149,8 @@ class Emission(TomlTable):
     """How shaped programs are written."""
 
     dialect: DialectName = key(
-        "control whose words `convert` writes; programs are read in FANUC's words whatever this says, and all other "
-        "commands write these",
+        "control whose words `convert` writes; programs are read in FANUC's words whatever this says, and other "
+        "commands that write a program refuse all but fanuc",
         default="fanuc",
     )
     words: dict[str, Text] = key(
