@@ -125,14 +125,28 @@ def read_siemens(text: str, _folder: Path) -> list[ReadMove]:
     return found
 
 
+def _in_klipper(script: str, asked: str) -> str:
+    """What a script answers in Klipper's environment."""
+    fetch = [ROOT / "tests" / "tools" / "fetch_peers.sh"]
+    python = subprocess.run(fetch, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()[-1]
+    command = [python, Path(__file__).with_name(script)]
+    return subprocess.run(command, input=asked, stdout=subprocess.PIPE, text=True, check=True).stdout
+
+
+def plan_klipper(moves: list[ReadMove], acceleration: float, folder: Path) -> tuple[Vector, float]:
+    """Set-points at 1 ms of moves from rest to rest as Klipper's look-ahead plans them, and their time."""
+    pieces = [{"kind": "line", "end": list(each.end), "feed": each.feed_mm_per_min / 60.0} for each in moves]
+    limits = {"velocity": 500.0, "acceleration": acceleration, "square_corner_velocity": 5.0, "arc_mm": 1.0}
+    asked = {
+        "path": {"start": list(moves[0].start), "pieces": pieces}, "limits": limits, "period_s": 0.001,
+        "file": str(folder / "points.npy"),
+    }  # fmt: skip
+    time_s = float(_in_klipper("klipper_plan.py", json.dumps(asked)))
+    return np.load(folder / "points.npy"), time_s
+
+
 def read_klipper(text: str, _folder: Path) -> list[ReadMove]:
-    python = subprocess.run(
-        [ROOT / "tests" / "tools" / "fetch_peers.sh"], stdout=subprocess.PIPE, text=True, check=True
-    ).stdout.splitlines()[-1]
-    script = Path(__file__).with_name("klipper_moves.py")
-    answer = json.loads(
-        subprocess.run([python, script], input=text, stdout=subprocess.PIPE, text=True, check=True).stdout
-    )
+    answer = json.loads(_in_klipper("klipper_moves.py", text))
     assert answer["unknown"] == []
     at, found = np.zeros(3), []
     for move in answer["moves"]:

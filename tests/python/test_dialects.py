@@ -17,6 +17,7 @@ from acceptance import machine_with, moves_of
 from command import run
 from dialect_readers import (
     ReadMove,
+    plan_klipper,
     read_haas,
     read_isg,
     read_klipper,
@@ -24,6 +25,7 @@ from dialect_readers import (
     read_mitsubishi,
     read_siemens,
 )
+from judge import Mode, residual_um
 from shapegcode import _core
 from shapegcode.conversion.translate import translate
 from shapegcode.machine.dialects import DialectName, all_dialects
@@ -186,6 +188,27 @@ def test_real_programs_read_back(dialect: str, name: str, tmp_path: Path) -> Non
         text = re.sub(r" ?H\d+", "", text).replace("G43", "G0")  # their tool lengths are not in the program
     conversion = converted(dialect, text, keys={"emission.words": {**WORDS.get(dialect, {}), **words}})
     compare(dialect, conversion, READERS[dialect](conversion.text.decode(), tmp_path))
+
+
+#: mm/s² of the planner; largest residual in X and Y of the shaped program, µm (46 and 131 Hz behind it).
+PLANNED = [(10_000.0, 1.5), (50_000.0, 1.5), (5_000.0, 3.0)]
+
+
+@pytest.mark.parametrize(("acceleration", "limit_um"), PLANNED)
+def test_klipper_plans_the_shaped_program(acceleration: float, limit_um: float, tmp_path: Path) -> None:
+    text = "G21G90\nG00X0.Y0.Z0.\nG01X20.F12000.\nG03X40.Y20.R20.\nG01Y40.\nG04P500\nM30\n"  # paper 000's path
+    machine = machine_for("klipper")
+    conversion = converted("klipper", text)
+    original = translate(sg.Program.from_text(text, machine), machine).text
+    modes = [[Mode(46.0, 0.02)], [Mode(131.0, 0.02)], []]
+    found = []
+    for program in (original, conversion.text):
+        cut = [each for each in read_klipper(program.decode(), tmp_path) if not is_fast(each) and not each.dwell_s]
+        points, time_s = plan_klipper(cut, acceleration, tmp_path)
+        found.append((residual_um(points, modes, 0.001)[:2], time_s))
+    (before, _), (after, shaped_s) = found
+    assert np.all(after < limit_um) and np.all(after < 0.5 * before)
+    assert shaped_s == pytest.approx(conversion.cutting_time_s.emitted, rel=0.01, abs=0.01)
 
 
 def random_program(rng: np.random.Generator) -> str:
