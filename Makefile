@@ -108,7 +108,7 @@ test-all-python: package dev
 	$(PYTEST) -m slow
 
 # LinuxCNC is installed for it, with a user that may run it where this is root, and the component into its modules.
-test-linuxcnc: dev
+test-linuxcnc: package dev
 	$(BIN)/python -m pytest tests/linuxcnc
 
 lint: test-packages dev
