@@ -577,6 +577,14 @@ def test_fanuc_stays_as_it_is() -> None:
     assert conversion.text == conversion.emitted.text
 
 
+def test_option_of_the_function_and_the_line_of_a_caution() -> None:
+    text = TEXT.replace("M05\n", "G91G28Z0.\nG90\nM05\n")
+    conversion = sg.convert(text, machine_with(READING), dialect="linuxcnc", shape_all=True)
+    assert conversion.dialect is not None and conversion.dialect.control == "LinuxCNC 2.9"
+    line = text.splitlines().index("G91G28Z0.") + 1
+    assert f"<text>:{line}: G28: it goes to the position that G28.1 stored" in " ".join(conversion.warnings)
+
+
 def test_a_comment_that_would_act_on_linuxcnc() -> None:
     assert b"(NOTE MSG, A NOTE)" in converted("linuxcnc").text
     assert b"(MSG, A NOTE)" in converted("haas").text

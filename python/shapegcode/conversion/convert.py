@@ -43,6 +43,7 @@ def convert(
     shaper: str | None = None,
     per_axis: bool | None = None,
     planner: str | None = None,
+    dialect: str | None = None,
     rapids: bool | None = None,
     budget: Budget | None = None,
     arc_feed_ratio: float | None = None,
@@ -67,6 +68,7 @@ def convert(
         shaper: family of the shaper, such as "zvd": `shaping.family`.
         per_axis: a shaper for each axis: `shaping.per_axis`.
         planner: what plans a cut before it is shaped, "look-ahead" or "optimal": `shaping.planner`.
+        dialect: control in whose words the program is written, such as "linuxcnc": `emission.dialect`.
         rapids: rapids become shaped moves where that saves time: `shaping.rapids`.
         budget: what the emitted text may need; None: no limit.
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc: `shaping.arc_feed_ratio`.
@@ -98,6 +100,7 @@ def convert(
         "shaping.family": shaper,
         "shaping.per_axis": per_axis,
         "shaping.planner": planner,
+        "emission.dialect": dialect,
         "shaping.rapids": rapids,
         "shaping.arc_feed_ratio": arc_feed_ratio,
         "price.program_time_percent": max_time_increase_percent,

@@ -31,7 +31,7 @@ _BLEND_MM = 0.001  # LinuxCNC's G64 P
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _WORD = re.compile(rf"([A-Z])\s*({_NUMBER})")
 # Most lines: a move that needs no look at its words.
-_MOVE = re.compile(r"(?:G0?([0123]))?((?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+))+)")
+_MOVE = re.compile(r"(N\d+)?(?:G0?([0123]))?((?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+))+)")
 _RADIUS = re.compile(r"R|(?<![\d.])\.")
 _COMMENT = re.compile(r"\(([^()]*)\)")
 _ACTIVE_COMMENT = re.compile(r"\s*(MSG|DEBUG|PRINT|LOG|PROBE|PY|AXIS)")
@@ -198,8 +198,8 @@ class _Translator:
         for blocks, _, _ in shaped if self._dialect.time_feed else ():
             times = dict(_block_times(blocks, block_period_s))
             self._times |= times
-            self._firsts.add(min(times))
-            self._lasts.add(max(times))
+            self._firsts |= {min(times, default=-1)}
+            self._lasts |= {max(times, default=-1)}
 
     def lines(self, number: int, line: str) -> list[str]:
         """What becomes of a line."""
@@ -209,8 +209,9 @@ class _Translator:
         if (place := _PLACE.fullmatch(line)) is not None:
             first, *rest = getattr(self._machine.emission, _EMISSION[place[2]])
             return [(place[1] or "") + first, *rest] if not self._dialect.one_code else [first, *rest]
-        if state.is_open and (move := _MOVE.fullmatch(line)) is not None and "K" not in line:
-            return self._move(number, line, move)
+        compact = line.replace(" ", "")
+        if state.is_open and (move := _MOVE.fullmatch(compact)) is not None and "K" not in line:
+            return self._move(number, compact, move)
         comments = _COMMENT.findall(line)
         body = _COMMENT.sub("", line).strip(" \t\r").upper()
         if not body or body[0] in "%O:<":
@@ -239,14 +240,15 @@ class _Translator:
 
     def _move(self, number: int, line: str, move: re.Match[str]) -> list[str]:
         """A line of nothing but motion, with a point in every number."""
-        if move[1] is not None:
-            self.state.motion, self.state.cycle = int(move[1]), False
+        if move[2] is not None:
+            self.state.motion, self.state.cycle = int(move[2]), False
         dialect = self._dialect
         if number in self._times or dialect.one_code:
-            return self._block(number, "", [("G", move[1])] * (move[1] is not None) + _WORD.findall(move[2]), ())
+            return self._block(number, "", _WORD.findall(line), ())
         if dialect.arc_radius == "CR=":
             line = _RADIUS.sub(lambda found: "CR=" if found[0] == "R" else "0.", line)
-            return [re.sub(r"^G0?(\d)", r"G\1 ", line)]  # readers want the blank behind a code
+            line = re.sub(r"^(N\d+)", r"\1 ", line)
+            return [re.sub(r"(^| )G0?(\d)", r"\1G\2 ", line)]  # readers want the blank behind a code
         return [line]
 
     def _frame(self, body: str, comments: Sequence[str], line: str) -> list[str]:
