@@ -161,6 +161,23 @@ def test_what_is_written_reads_back(dialect: str, tmp_path: Path) -> None:
     assert farthest < 1e-3
 
 
+@pytest.mark.parametrize("dialect", ["haas", "mitsubishi"])
+def test_our_own_reader_reads_it(dialect: str) -> None:
+    """But for a dwell in seconds, which is an alarm to FANUC and not another time."""
+    conversion = converted(dialect)
+    text = conversion.text.decode()
+    if dialect == "haas":
+        with pytest.raises(sg.ProgramError, match="G04 P takes whole milliseconds"):
+            sg.Program.from_text(text, machine_with(READING))
+        text = re.sub(r"G04P([\d.]+)", r"G04X\1", text)
+    read = sg.Program.from_text(text, machine_with(READING))
+    assert read.stamp is not None and read.shaped_regions == len(conversion.placed)
+    for (ours, dwell_s), (segment, judged_s) in zip(moves_of(read), moves_of(conversion.emitted), strict=True):
+        assert dwell_s == pytest.approx(judged_s, abs=1e-12)
+        assert np.array_equal(ours.end_mm, segment.end_mm) and ours.feed_mm_per_s == segment.feed_mm_per_s
+        assert (ours.kind, ours.sweep_rad) == (segment.kind, segment.sweep_rad)
+
+
 @pytest.mark.parametrize("dialect", READERS)
 def test_shaped_rapids_and_no_header(dialect: str, tmp_path: Path) -> None:
     conversion = converted(dialect, rapids=True, keys={"emission.header": False})
