@@ -33,10 +33,10 @@ user = cache(linuxcnc_run.as_user)
 
 @cache
 def figures(
-    name: str, acceleration: int, *, shaped: bool, as_delivered: bool
+    name: str, acceleration: int, *, shaped: bool, as_delivered: bool, override: float = 1.0, lock: str = "ask"
 ) -> tuple[NDArray[np.float64], float, float]:
     """Residual vibration in X and Y, µm; time of the cut, s; largest distance of the table from the path, µm."""
-    program, conversion = converted(name)
+    program, conversion = converted(name, lock)
     text = conversion.text if shaped else translate(program, conversion.simulated.machine).text
     ini = {
         "MAX_VELOCITY = 200": "MAX_VELOCITY = 500", "MAX_LINEAR_VELOCITY = 200": "MAX_LINEAR_VELOCITY = 500",
@@ -47,7 +47,7 @@ def figures(
     with TemporaryDirectory(prefix="dialect-") as folder:
         file = Path(folder) / "program.ngc"
         file.write_bytes(text)
-        command = linuxcnc_run.run(user(), file, ini=ini, set={"enable": 0}).command
+        command = linuxcnc_run.run(user(), file, ini=ini, override=override, set={"enable": 0}).command
     moved = np.flatnonzero(np.any(np.diff(command, axis=0) != 0.0, axis=1))
     pauses = np.flatnonzero(np.diff(moved) > 300)
     first = moved[pauses[-1] + 1] if len(pauses) else moved[0]
@@ -66,8 +66,9 @@ def figures(
 
 
 @cache
-def converted(name: str) -> tuple[sg.Program, sg.Conversion]:
-    machine = sg.Machine.load("vx500").with_values({**ANY_PRICE, "emission.dialect": "linuxcnc"})
+def converted(name: str, lock: str = "ask") -> tuple[sg.Program, sg.Conversion]:
+    keys = {**ANY_PRICE, "emission.dialect": "linuxcnc", "emission.override": lock}
+    machine = sg.Machine.load("vx500").with_values(keys)
     program = sg.Program.from_text(f"G21G90\n{PATHS[name]}M30\n", machine)
     return program, sg.convert(program, machine, shape_all=True)
 
@@ -87,3 +88,11 @@ def test_the_shaped_program_in_linuxcnc(name: str, acceleration: int, as_deliver
     assert time_s == pytest.approx(expected_s, rel=0.08 if as_delivered else 0.01, abs=0.015)
     if name == "paper" and acceleration == 10_000 and not as_delivered:
         assert np.all(after < 1.5)
+
+
+def test_the_feed_override_can_be_locked() -> None:
+    at_full, time_s, _ = figures("paper", 10_000, shaped=True, as_delivered=False)
+    open_, open_s, _ = figures("paper", 10_000, shaped=True, as_delivered=False, override=0.7)
+    locked, locked_s, _ = figures("paper", 10_000, shaped=True, as_delivered=False, override=0.7, lock="lock")
+    assert open_[1] > 10.0 and open_s > 1.3 * time_s
+    assert np.all(np.abs(locked - at_full) < 0.05) and locked_s == pytest.approx(time_s, abs=0.0015)
