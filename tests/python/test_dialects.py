@@ -459,6 +459,27 @@ def test_a_position_beyond_eight_digits() -> None:
     assert b"X1200." in converted("linuxcnc", text, keys={"emission.decimals": 4}).text
 
 
+@pytest.mark.parametrize(
+    ("dialect", "key", "code"),
+    [
+        ("klipper", "units", "G20"),
+        ("isg", "units", "G20"),
+        ("isg", "feed_mode", "G93"),
+        ("siemens", "work_offset", "G58"),
+    ],
+)
+def test_a_mode_at_power_on_that_the_control_lacks(dialect: str, key: str, code: str) -> None:
+    keys = {f"power_on.{key}": code}
+    for first, is_refused in (("G90", True), ("G21G94G54G90", False)):
+        machine = machine_for(dialect, keys)
+        program = sg.Program.from_text(f"{first}\nG00X1.\nM30\n", machine)
+        if is_refused:
+            with pytest.raises(sg.ProgramError, match=rf"^<text>:1:1: {code} is "):
+                translate(program, machine)
+        else:
+            assert "X1." in translate(program, machine).text.decode()
+
+
 def test_several_programs(tmp_path: Path) -> None:
     (tmp_path / "memory.nc").write_text(TEXT)
     done = run(tmp_path, "convert", "memory.nc", "-m", "vx500", "--program", "all", "-o", "out.nc", "--dialect", "haas")
@@ -598,6 +619,8 @@ def test_option_of_the_function_and_the_line_of_a_caution() -> None:
     text = TEXT.replace("M05\n", "G91G28Z0.\nG90\nM05\n")
     conversion = sg.convert(text, machine_with(READING), dialect="linuxcnc", shape_all=True)
     assert conversion.dialect is not None and conversion.dialect.control == "LinuxCNC 2.9"
+    assert any("G54: there is one" in each for each in converted("klipper").warnings)
+    assert not any("G54" in each for each in converted("klipper", TEXT.replace("G54", "")).warnings)
     line = text.splitlines().index("G91G28Z0.") + 1
     assert f"<text>:{line}: G28: it goes to the position that G28.1 stored" in " ".join(conversion.warnings)
 

@@ -38,6 +38,7 @@ _ACTIVE_COMMENT = re.compile(r"\s*(MSG|DEBUG|PRINT|LOG|PROBE|PY|AXIS)")
 _PLACE = re.compile(r"(N\d+)?\(EMISSION (PROLOGUE|EPILOGUE|LOCK|UNLOCK)\)")
 _LENGTHS = "XYZIJKR"
 _CYCLES = {"G73", "G81", "G82", "G83", "G85"}
+_GROUPS = ({"G20", "G21"}, {"G93", "G94", "G95"}, {"G61", "G64"}, {f"G{code}" for code in range(54, 60)})
 _WITH_AXES = {"G10", "G27", "G28", "G29", "G30", "G31", "G52", "G53", "G92"}
 _COORDINATE = re.compile(rf"(?<![A-Z])([XYZ])({_NUMBER})")
 _CODE = re.compile(r"[GM]\d+(\.\d)?")
@@ -77,7 +78,7 @@ def translate(
         out += writer.lines(index + 1, line)
     numbers[len(lines) - has_end :] = len(out)
     if writer.state.is_open is False:
-        out += writer.opening()
+        out += writer.opening("")
     end = "\r\n" if program.core.line_end == "\r\n" else "\n"
     text = (end.join(out) + (end if has_end else "")).encode("latin-1")
     if b"(TEXT 00000000)" in text:
@@ -218,22 +219,27 @@ class _Translator:
             return self._frame(body, comments, line)
         if self._has_percent and not state.percents:
             return []  # a leader, which no control reads
-        before = [] if state.is_open else self.opening()
+        before = [] if state.is_open else self.opening(body)
         skip, body = self._skipped(number, body)
         if _WORD.sub("", body).strip():
             raise self._error(number, f"{body}: macro statements and names are not translated")
         words = [(letter, value) for letter, value in _WORD.findall(body)]
         return [*before, *self._block(number, skip, words, comments)]
 
-    def opening(self) -> list[str]:
-        """Lines before the first block: what the control may have otherwise when it is switched on."""
+    def opening(self, first: str) -> list[str]:
+        """Lines before the first block: what the control may have otherwise when it is switched on.
+
+        A mode that the dialect lacks is refused, unless the first block sets another one.
+        """
         self.state.is_open = True
         on, dialect = self._machine.power_on, self._dialect
         notes = [f"DIALECT {dialect.control}", *dialect.header]
         notes += _wrapped("ASSUMED ", [topic.upper() for topic in dialect.assumed])
         comments = [self._comment(_header(note)) for note in notes] if self._machine.emission.header else []
+        own = {code_name(letter + value) for letter, value in _WORD.findall(first) if letter == "G"}
         codes = [on.units, on.plane, on.distance, on.feed_mode, "G40", on.path_mode, on.work_offset, "G80"]
-        known = [code for code in codes if code in dialect.same or code in dialect.becomes]
+        set_here = {code for code in codes for group in _GROUPS if code in group and group & own}
+        known = [code for code in codes if code not in set_here and (code != "G80" or code in dialect.same)]
         words = [(code[0], code[1:]) for code in known]
         start = [("G", "00")] if on.motion == "G00" else []
         return [*comments, *dialect.opening, *self._block(0, "", words, ()), *self._block(0, "", start, ())]
@@ -367,7 +373,7 @@ class _Translator:
                 return "D1"
             if code not in dialect.same and code not in dialect.becomes:
                 raise self._refusal(number, code)
-            if code in dialect.cautions:
+            if code in dialect.cautions and number > 0:
                 self.cautions[code] = f"{self._where(number)}: {code}: {dialect.cautions[code]}"
             short = letter + (value.lstrip("0") or "0") if dialect.short_codes else letter + value
             return self._filled(dialect.becomes.get(code, short))
