@@ -200,9 +200,7 @@ REAL = [
 @pytest.mark.parametrize(("dialect", "name"), [*product(READERS, REAL), *product(WITH_INCHES, ["PARALLEL.NC"])])
 def test_real_programs_read_back(dialect: str, name: str, tmp_path: Path) -> None:
     text = (PROGRAMS / name).read_text()
-    words = {"G28": "", "G49": "", "M01": ""}
-    if dialect in ("klipper", "isg"):
-        text = re.sub(r" ?H\d+", "", text).replace("G43", "G0")  # their tool lengths are not in the program
+    words = {"G28": "", "G49": "", "M01": "", **({"G43": ""} if dialect in ("klipper", "isg") else {})}
     conversion = converted(dialect, text, keys={"emission.words": {**WORDS.get(dialect, {}), **words}})
     compare(dialect, conversion, READERS[dialect](conversion.text.decode(), tmp_path))
 
@@ -412,6 +410,8 @@ def test_what_a_shop_states_is_written() -> None:
     keys = {"emission.words": {"M88": "M61", "G28": "SUPA G0 Z0 D0", "G08": ""}}
     lines = translated("siemens", "G21G90\nM88\nG91G28Z0.\nG08P1\nG00X1.\nM30\n".replace("G08P1\n", "G08\n"), keys)
     assert lines[1:] == ["M61", "G91 SUPA G0 Z0 D0", "G0 X1.", "M30"]
+    keys = {"emission.words": {"G43": "D5", "M06": "G0 Z200. M6"}}
+    assert translated("isg", "G21G90\nT5M06\nG43Z5.H05\nM30\n", keys)[1:] == ["T5G0 Z200. M6", "D5Z5.", "M30"]
 
 
 @pytest.mark.parametrize(

@@ -327,7 +327,8 @@ class _Translator:
 
     def _hold(self, number: int, words: Sequence[tuple[str, str]], codes: Sequence[str], lines: Sequence[str]) -> None:
         """Hold what was written against what was read: each coordinate is there, and none besides."""
-        if "G04" in codes or self._taken(codes) or (self._dialect.one_code and self.state.incremental):
+        stated = any(_COORDINATE.search(self._own.get(code, "")) for code in codes)
+        if "G04" in codes or stated or self._taken(codes) or (self._dialect.one_code and self.state.incremental):
             return
         want = {letter: float(self._length(letter, value, self._dialect)) for letter, value in words if letter in "XYZ"}
         have = {letter: float(value) for line in lines for letter, value in _COORDINATE.findall(line)}
@@ -388,8 +389,8 @@ class _Translator:
             self.state.tool = value.lstrip("0")
         if letter in "ST" and (not dialect.one_code or {"M03", "M04", "M06"} & {*codes}):
             return letter + value
-        if letter == "H" and ("G43" in codes or "G44" in codes):
-            return self._offset(number, value, codes)
+        if letter == "H" and "G43" in codes:
+            return self._offset(number, value)
         if letter == "D" and "G41" in dialect.same:
             return letter + value
         if self.state.cycle and letter in "QL":
@@ -431,10 +432,12 @@ class _Translator:
         text = f"{time_s:.6f}".rstrip("0")
         return form.format(ms=milliseconds, s=text)
 
-    def _offset(self, number: int, value: str, codes: Sequence[str]) -> str:
+    def _offset(self, number: int, value: str) -> str:
+        if self._own.get("G43", "G43") != "G43":
+            return ""  # what takes the place of G43 takes that of H too
         if self._dialect.arc_radius != "CR=":
             return f"H{value}"
-        if value.lstrip("0") != self.state.tool or "G44" in codes:
+        if value.lstrip("0") != self.state.tool:
             tool = self.state.tool or "not known"
             raise self._error(
                 number, f"G43 H{value} is offset {value} on FANUC and D1 of the tool in the spindle on "
