@@ -81,6 +81,7 @@ test:
 	$(MAKE) release
 	$(MAKE) stub-check
 	tests/tools/fetch_rs274.sh
+	tests/tools/fetch_peers.sh
 	tests/tools/fetch_axe.sh
 	$(PYTEST) -m 'not slow'
 
@@ -102,11 +103,12 @@ test-all-core:
 
 test-all-python: package dev
 	tests/tools/fetch_rs274.sh
+	tests/tools/fetch_peers.sh
 	tests/tools/fetch_axe.sh
 	$(PYTEST) -m slow
 
 # LinuxCNC is installed for it, with a user that may run it where this is root, and the component into its modules.
-test-linuxcnc: dev
+test-linuxcnc: package dev
 	$(BIN)/python -m pytest tests/linuxcnc
 
 lint: test-packages dev
@@ -140,6 +142,7 @@ bench-realtime: build-packages
 
 coverage: test-packages dev
 	tests/tools/fetch_rs274.sh
+	tests/tools/fetch_peers.sh
 	tests/tools/fetch_axe.sh
 	tests/tools/coverage.sh -m 'not slow'
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import write_schemas
+from dialects_page import dialects_documentation
 from machine_page import machine_documentation
 from tool_files_page import file_documentation
 
@@ -94,6 +95,7 @@ def schema_documentation(*, linked: bool = False) -> str:
 
 PAGES: dict[str, Callable[[], str]] = {
     "reference/machine.md": machine_documentation,
+    "reference/dialects.md": dialects_documentation,
     "reference/tool_files.md": file_documentation,
     "reference/api.md": api_documentation,
     "reference/schemas.md": schema_documentation,

@@ -287,8 +287,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "tls_key",
     ),
     "output": (
-        "output", "update", "write_origins", "force", "full", "csv", "npz", "every", "blocks", "plots", "json", "html",
-        "html_script",
+        "output", "dialect", "update", "write_origins", "force", "full", "csv", "npz", "every", "blocks", "plots",
+        "json", "html", "html_script",
     ),
     "how much is said": ("quiet", "verbose", "cite"),
 }  # fmt: skip

@@ -46,6 +46,7 @@ MACHINE_KEYS = {
     "--max-time-increase": "price.program_time_percent",
     "--max-cut-time-increase": "price.cut_time_percent",
     "--compensation": "input.compensation",
+    "--dialect": "emission.dialect",
 }
 """Options that stand for a key of the machine file."""
 
@@ -107,6 +108,8 @@ def run(args: argparse.Namespace) -> int:
     failed = output.with_name(output.name + machine.emission.failed_suffix)
     if args.feed_schedule != bool(args.tool and args.stock) or bool(args.tool) != bool(args.stock):
         raise ArgumentError("--feed-schedule, --tool and --stock belong together: give all three or none")
+    if hasattr(args, "several") and machine.emission.dialect != "fanuc":
+        raise ArgumentError(f"--program all writes FANUC's words alone (emission.dialect = {machine.emission.dialect})")
     runner.check_files(args, also_written=[failed])
     _give_memory_back()
     with runner.progress(f"converting {args.input}", args) as bar:
@@ -129,7 +132,8 @@ def run(args: argparse.Namespace) -> int:
     if needed:
         names = ", ".join(place.address for place in needed)
         notes.append(f"calls of {names} were kept: as they are in {args.input}, they stand behind the program")
-    content = alone_with(result.emitted.view(), program.text, needed)
+    view = result.emitted.view() if result.written is None else memoryview(result.written)
+    content = alone_with(view, program.text, needed)
     tables = result.tables(every_cut=args.verbose)
     return runner.finish(result, args, tables=tables, notes=notes, output=(target, content))
 

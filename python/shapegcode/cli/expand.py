@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     """Expand one program; see the module."""
     from shapegcode.program.expand import expand
 
-    machine = load_machine(args)
+    machine = load_machine(args, writes_program=True)
     runner.check_files(args)
     with runner.progress(f"expanding {args.input}", args):
         result = expand(args.input, machine, compensation=args.compensation, program_number=args.program)

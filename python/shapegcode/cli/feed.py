@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.program.compensation import read_for_conversion
 
     output = output_file(args.output)
-    machine = load_machine(args)
+    machine = load_machine(args, writes_program=True)
     runner.check_files(args)
     cutting = read_cutting_arguments(args)
     with runner.progress(f"scheduling {args.input}", args) as bar:

@@ -120,9 +120,9 @@ def add_program_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def load_machine(args: argparse.Namespace) -> Machine:
-    """The machine of ``-m`` with the values of ``--set``."""
-    from shapegcode.errors import MachineError, Problem
+def load_machine(args: argparse.Namespace, *, writes_program: bool = False) -> Machine:
+    """The machine of ``-m`` with the values of ``--set``; refused where a program cannot be written in its words."""
+    from shapegcode.errors import ArgumentError, MachineError, Problem
     from shapegcode.machine import Machine
 
     machine = Machine.load(args.machine)
@@ -134,7 +134,13 @@ def load_machine(args: argparse.Namespace) -> Machine:
         if not sign:
             raise MachineError("--set", (Problem(assignment, "", "must be KEY=VALUE"),))
         values[key.strip()] = _toml_value(text)
-    return machine.with_values(values, source=f"{args.machine} with --set") if values else machine
+    machine = machine.with_values(values, source=f"{args.machine} with --set") if values else machine
+    if writes_program and (dialect := machine.emission.dialect) != "fanuc":
+        raise ArgumentError(
+            f"this command writes FANUC's words, and emission.dialect is {dialect}: G04 P and other words may mean "
+            "another thing there; --set emission.dialect=fanuc writes them all the same"
+        )
+    return machine
 
 
 def _toml_value(text: str) -> Any:

@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the program."""
     from shapegcode.identification.sweep_program import plan_sweep
 
-    machine = load_machine(args)
+    machine = load_machine(args, writes_program=True)
     runner.check_files(args)
     with runner.progress("planning the strokes", args):
         found, text = plan_sweep(

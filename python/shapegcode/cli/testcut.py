@@ -127,7 +127,9 @@ def _write(args: argparse.Namespace) -> int:
     )
 
     feed = args.feeds[0] if args.action == "taper" else args.feed
-    conditions = CutConditions(load_machine(args), Tool.load(args.tool), feed, args.axial_depth, args.spindle, args.up)
+    conditions = CutConditions(
+        load_machine(args, writes_program=True), Tool.load(args.tool), feed, args.axial_depth, args.spindle, args.up
+    )
     if args.action == "taper":
         design = taper_cut(conditions, args.feeds if len(args.feeds) > 1 else None, args.radial_depth, args.length)
     else:

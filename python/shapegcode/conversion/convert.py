@@ -18,6 +18,7 @@ from shapegcode.conversion.recommendation import gain_um
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.sensitivity import StartedTrials, start_trials
 from shapegcode.conversion.tables import chosen_cuts
+from shapegcode.conversion.translate import require_dialect, with_dialect
 from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
 from shapegcode.program import Program
@@ -42,6 +43,7 @@ def convert(
     shaper: str | None = None,
     per_axis: bool | None = None,
     planner: str | None = None,
+    dialect: str | None = None,
     rapids: bool | None = None,
     budget: Budget | None = None,
     arc_feed_ratio: float | None = None,
@@ -66,6 +68,7 @@ def convert(
         shaper: family of the shaper, such as "zvd": `shaping.family`.
         per_axis: a shaper for each axis: `shaping.per_axis`.
         planner: what plans a cut before it is shaped, "look-ahead" or "optimal": `shaping.planner`.
+        dialect: control in whose words the program is written, such as "linuxcnc": `emission.dialect`.
         rapids: rapids become shaped moves where that saves time: `shaping.rapids`.
         budget: what the emitted text may need; None: no limit.
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc: `shaping.arc_feed_ratio`.
@@ -97,12 +100,14 @@ def convert(
         "shaping.family": shaper,
         "shaping.per_axis": per_axis,
         "shaping.planner": planner,
+        "emission.dialect": dialect,
         "shaping.rapids": rapids,
         "shaping.arc_feed_ratio": arc_feed_ratio,
         "price.program_time_percent": max_time_increase_percent,
         "price.cut_time_percent": max_cut_time_increase_percent,
     }
     program, machine = read(program, machine, stated)
+    require_dialect(program, machine, budget)
     choice = CutChoice(chosen_cuts(program, only, leave), shape_all, tolerance_curve)
     pool = ThreadPoolExecutor(max_workers=cores())
     try:
@@ -113,7 +118,7 @@ def convert(
         if machine.shaping.rapids:
             shaped = shape_rapids(plan, shaped)
         shaped = _as_it_was(plan, shaped)
-        return result_of(plan, shaped, judge(plan, shaped))
+        return with_dialect(result_of(plan, shaped, judge(plan, shaped)))
     finally:
         pool.shutdown(cancel_futures=True)
 

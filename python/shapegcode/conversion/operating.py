@@ -15,6 +15,7 @@ from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad
 from shapegcode.conversion.restart import CutRestarts, RestartPoint
 from shapegcode.machine import Machine
+from shapegcode.machine.dialects import dialect_of
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import slowest_excited_hz
 from shapegcode.program import Program
@@ -120,6 +121,9 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
     rate = max((load.blocks_per_second for load in loads.values()), default=0.0)
     needs = f"up to {rate:.0f} blocks/s, one every {block_period_s * 1e3:g} ms"
     prologue = " ".join(machine.emission.prologue)
+    if (own := dialect_of(machine.emission.dialect)) is not None:
+        before = f"; {prologue} before each shaped cut" if prologue else ""
+        return f"{needs}{before}; {own.control}: {own.facts['look-ahead'].text}"
     if machine.emission.leaves_look_ahead:
         on = " ".join(machine.emission.epilogue)
         again = f", {on} behind it on again" if on else ""
@@ -180,11 +184,14 @@ def _restarts(
     emitted: Program, placed: Sequence[Placed], restarts: Sequence[CutRestarts], machine: Machine
 ) -> Iterator[str]:
     """Where to restart, what to do before it, and where there is no restart point, and why."""
-    yield _restart_lines(emitted, placed)
     emission = machine.emission
+    if (own := dialect_of(emission.dialect)) is not None:
+        yield f"{own.control}: {own.facts['restart'].text}"
+    else:
+        yield _restart_lines(emitted, placed)
     count = sum(len(each.marks) for each in restarts)
     if count:
-        before = [line for line in (*emission.prologue, *(emission.lock_lines if emission.override == "lock" else ()))]
+        before = [line for line in (*emission.prologue, *(emission.locking if emission.override == "lock" else ()))]
         shakes_um = max(mark.vibration_um for each in restarts for mark in each.marks)
         switched = f", by MDI {' '.join(before)}" if before else ""
         yield (

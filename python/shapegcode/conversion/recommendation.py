@@ -16,7 +16,7 @@ from shapegcode.machine import Machine
 from shapegcode.machine.controller import Controller
 from shapegcode.machine.programs import Tolerance
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.program import Program, least_increment_mm
+from shapegcode.program import Program, written_increment_mm
 from shapegcode.program.stamp import no_room
 from shapegcode.verdict.figures import Placed, ProgramFigures, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures
@@ -202,7 +202,7 @@ def simulation_warnings(program: Program, figures: ProgramFigures, machine: Mach
         for region in figures.regions
         for miss in region.misses
     ]
-    rounding_um = math.sqrt(2.0) * least_increment_mm(machine, 21) * 1e3
+    rounding_um = math.sqrt(2.0) * written_increment_mm(machine, 21) * 1e3
     return [*misses, *_binding(figures, machine.tolerance, rounding_um, is_priced=is_priced), *_worse(figures)]
 
 
@@ -215,7 +215,7 @@ def text_warnings(
         *_mode_left_on(program, placed, machine.emission.prologue),
         *_too_fast(program, placed, fastest),
         *_memory_and_line(machine.controller, size, blocks, figures.region_time_s().emitted),
-        *_slowed(0 if machine.emission.leaves_look_ahead else figures.slowed_blocks, blocks),
+        *_slowed(0 if machine.emission.leaves_look_ahead else figures.slowed_blocks, blocks, machine.emission.dialect),
     ]
 
 
@@ -299,10 +299,11 @@ def _memory_and_line(controller: Controller, size: int, blocks: int, cutting_s: 
             )
 
 
-def _slowed(slowed: int, blocks: int) -> Iterator[str]:
+def _slowed(slowed: int, blocks: int, dialect: str) -> Iterator[str]:
     if slowed:
+        prologue = '(emission.prologue, for example ["G05.1Q0"])' if dialect == "fanuc" else "(emission.prologue)"
         yield (
             f"{slowed} of {blocks} shaped blocks step an axis by more than "
             "controller.corner_speed_difference_mm_per_min: run them with the look-ahead mode off "
-            '(emission.prologue, for example ["G05.1Q0"]), or it slows them'
+            f"{prologue}, or it slows them"
         )

@@ -57,6 +57,29 @@ class ChangeProof:
     refused: tuple[ProgramDifference, ...]
 
 
+@dataclass(frozen=True)
+class DialectNotes:
+    """For which control the program is written, and what is known of that control.
+
+    Attributes:
+        name: `emission.dialect`.
+        control: which that is.
+        facts: by topic (words, dwell, look-ahead, override, restart ...) what holds there.
+        assumed: topics for which there is no source.
+    """
+
+    name: str
+    control: str
+    facts: Mapping[str, str]
+    assumed: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """In one sentence."""
+        assumed = f"; assumed: {', '.join(self.assumed)}" if self.assumed else ""
+        return f"written in the words of {self.control} (emission.dialect = {self.name}){assumed}"
+
+
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class Conversion(ProgramFigures, Result):
     """A program, shaped: the emitted program, and what simulating it beside the original showed.
@@ -90,6 +113,8 @@ class Conversion(ProgramFigures, Result):
         restart_points: blocks inside of shaped cuts at which the control can begin.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
+        dialect: only where the program is written for another control than FANUC's.
+        written: the program in the words of that control; None: `emitted` is what is written.
         simulated: a handle and no data: both programs and the machine, to simulate them again for a picture or a page.
     """
 
@@ -123,6 +148,8 @@ class Conversion(ProgramFigures, Result):
     restart_points: tuple[RestartPoint, ...] = ()
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
+    dialect: DialectNotes | None = field(default=None, metadata=sparse())
+    written: bytes | None = field(default=None, metadata=hidden())
     simulated: SimulatedPrograms | None = field(default=None, compare=False, metadata=hidden())
 
     __eq__ = Result.__eq__
@@ -140,8 +167,8 @@ class Conversion(ProgramFigures, Result):
 
     @property
     def text(self) -> bytes:
-        """The emitted program, as a file holds it."""
-        return self.emitted.text
+        """The program that was written, as a file holds it."""
+        return self.emitted.text if self.written is None else self.written
 
     @property
     def ok(self) -> bool:
@@ -172,6 +199,8 @@ class Conversion(ProgramFigures, Result):
             lines.append(self.reason)
         elif self.advice is not None:
             lines.append(str(self.advice))
+        if self.dialect is not None:
+            lines.append(self.dialect.sentence)
         return "\n".join(lines)
 
     def _headline(self) -> str:
@@ -407,7 +436,8 @@ class Conversion(ProgramFigures, Result):
             return page
         # It was read back before it had one.
         *others, last = page.scene.variants
-        with_verdict = replace(last, text=self.text.decode("utf-8", "replace"))
+        # In FANUC's words, whose lines the simulated motion knows.
+        with_verdict = replace(last, text=self.emitted.text.decode("utf-8", "replace"))
         return replace(page, scene=replace(page.scene, variants=(*others, with_verdict)))
 
     def page_sections(self, made: Made | None = None) -> tuple[Section, ...]:

@@ -13,6 +13,7 @@ from shapegcode import _core
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.convert import convert
 from shapegcode.conversion.result import Conversion
+from shapegcode.conversion.translate import translated
 from shapegcode.conversion.write import filter_tolerance
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
@@ -181,7 +182,9 @@ def convert_scheduled(
             "recommendation": "do not run",
             "reason": emitted.answer,
         }
-    return ScheduledConversion(**vars(conversion) | changed, feed_schedule=emitted)
+    scheduled = ScheduledConversion(**vars(conversion) | changed, feed_schedule=emitted)
+    found = translated(scheduled)
+    return scheduled if found is None else replace(scheduled, written=found.text)  # with that verdict in its header
 
 
 def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, margin: float) -> FeedSchedule:

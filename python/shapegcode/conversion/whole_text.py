@@ -20,7 +20,7 @@ from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.programs import stamp_of_machine
-from shapegcode.program import Program, end_off_grid_mm, least_increment_mm
+from shapegcode.program import Program, end_off_grid_mm, written_increment_mm
 from shapegcode.program.compensation import guard_lines, header_lines
 from shapegcode.program.computer import cores
 from shapegcode.shaping.grid import Grid
@@ -59,8 +59,8 @@ def why_off_grid(program: Program, region: _core.Region, machine: Machine) -> st
     if region.incremental:
         return ""
     units = {region.exit.units, *(each.exit.units for each in program.regions)}
-    limit_mm = 0.5 * min(least_increment_mm(machine, each) for each in units) + 1e-9
-    off_mm = end_off_grid_mm(region, least_increment_mm(machine, region.exit.units))
+    limit_mm = 0.5 * min(written_increment_mm(machine, each) for each in units) + 1e-9
+    off_mm = end_off_grid_mm(region, written_increment_mm(machine, region.exit.units))
     moves = zip("XYZ", region.path.end_mm, off_mm, region.path.extent_mm, region.exit.known, strict=True)
     for axis, end_mm, off, extent_mm, is_known in moves:
         if is_known and extent_mm > 0.0 and off > limit_mm:
@@ -365,7 +365,7 @@ _STATE_FIELDS = (
 def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) -> Program:
     """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps."""
     # Half an increment: a program may carry more digits than the controller resolves.
-    tolerance_mm = {units: 0.5 * least_increment_mm(machine, units) + 1e-9 for units in (20, 21)}
+    tolerance_mm = {units: 0.5 * written_increment_mm(machine, units) + 1e-9 for units in (20, 21)}
     probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]
     emitted = Program.from_parts(parts, machine, source="emitted program", probe_lines=probes)
     states = emitted.core.probed

@@ -22,9 +22,11 @@ from shapegcode.conversion.restart import (
     decimal,
 )
 from shapegcode.machine import Machine
+from shapegcode.machine.dialects import dialect_of
+from shapegcode.machine.programs import Emission
 from shapegcode.model.machine_model import MachineModel, OwnFilter
 from shapegcode.model.modes import NO_OFFSET, Offset, excited_modes
-from shapegcode.program import MM_PER_INCH, Program, between_increments, least_increment_mm
+from shapegcode.program import MM_PER_INCH, Program, between_increments, written_increment_mm
 from shapegcode.program.stamp import REGION_MARK
 from shapegcode.shaping.grid import Grid
 
@@ -336,9 +338,12 @@ class RegionWriter:
         number = marks.first_word
         before = self._head(region, number, starts[0], state)
         emission = self._machine.emission
-        unlock = emission.unlock_lines if emission.override == "lock" else ()
-        after = _lines([_restore_line(region, state.motion, state.plane), *unlock, *emission.epilogue], state)
-        emitted = RegionText([before, *texts, after])
+        after = [
+            _restore_line(region, state.motion, state.plane),
+            *_own(emission, "UNLOCK"),
+            *_own(emission, "EPILOGUE"),
+        ]
+        emitted = RegionText([before, *texts, _lines(after, state)])
         unstopped, stops = stopped
         found = restarts.result(before, stops, (end - unstopped) * fit.block_period_s if stops else 0.0)
         planned_um = shaper.largest_deviation_mm * 1e3
@@ -352,7 +357,7 @@ class RegionWriter:
         controller, emission = self._machine.controller, self._machine.emission
         unit, feed_decimals = self._units(region)
         fit = _core.FitOptions()
-        fit.increment_mm = least_increment_mm(self._machine, region.exit.units)
+        fit.increment_mm = written_increment_mm(self._machine, region.exit.units)
         fit.block_period_s = self._grid.block_period_s
         fit.interpolation_period_s = self._model.period_s
         fit.feed_unit_mm_per_s = 10.0**-feed_decimals * unit / 60.0
@@ -381,17 +386,19 @@ class RegionWriter:
     def _units(self, region: _core.Region) -> tuple[float, int]:
         """Millimetres of the program's unit, and digits behind the point of F."""
         inch = region.exit.units == 20
-        controller = self._machine.controller
-        return (MM_PER_INCH, controller.feed_decimals_inch) if inch else (1.0, controller.feed_decimals_mm)
+        controller, own = self._machine.controller, dialect_of(self._machine.emission.dialect)
+        decimals = controller.feed_decimals_inch if inch else controller.feed_decimals_mm
+        finer = own.feed_decimals if own is not None else None
+        return MM_PER_INCH if inch else 1.0, decimals if finer is None else max(decimals, finer + inch)
 
     def _head(self, region: _core.Region, number: str, start: list[int], writer: _core.WriterOptions) -> bytes:
         """The lines before the blocks: prologue, a safe line, the dwell in which the buffer fills."""
         emission = self._machine.emission
         fastest = max(axis.max_feed_mm_per_min for axis in self._machine.axes.as_tuple())
-        lock = emission.lock_lines if emission.override == "lock" else ()
         unit_mm, _ = self._units(region)
         resting = between_increments(region, unit_mm * 10.0**-writer.position_decimals)
-        lines = [*lock, *emission.prologue, _safe_line(region, start, resting, writer.position_decimals, fastest)]
+        safe = _safe_line(region, start, resting, writer.position_decimals, fastest)
+        lines = [*_own(emission, "LOCK"), *_own(emission, "PROLOGUE"), safe]
         lines[0] = number + lines[0]
         if emission.header:
             lines.insert(0, self._mark)
@@ -422,6 +429,14 @@ def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, 
             yield piece, share, following is None
             piece, share = following, following_share
             following, following_share = under_way.result() if under_way is not None else (None, 1.0)
+
+
+def _own(emission: Emission, kind: str) -> tuple[str, ...]:
+    """Lines of the machine file around a cut; in another dialect a mark of their place, which `translate` fills."""
+    lines = {"PROLOGUE": emission.prologue, "EPILOGUE": emission.epilogue}.get(kind)
+    if lines is None:
+        lines = () if emission.override != "lock" else emission.locking if kind == "LOCK" else emission.unlocking
+    return lines if emission.dialect == "fanuc" or not lines else (f"(EMISSION {kind})",)
 
 
 def _lines(lines: Sequence[str], writer: _core.WriterOptions) -> bytes:

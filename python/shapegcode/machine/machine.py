@@ -20,6 +20,7 @@ from shapegcode._core import Mode
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine.axes import Axes
 from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Times
+from shapegcode.machine.dialects import code_name, dialect_of, fanuc_meaning
 from shapegcode.machine.programs import Emission, Input, Price, Shaping, Tolerance, Verdict
 from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml, values_of
 from shapegcode.settings.load import (
@@ -44,6 +45,7 @@ from shapegcode.settings.remarks import (
 
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
 _VARIABLE = re.compile(r"#\d+")
+_CODE = re.compile(r"[GM]\d+(?:\.\d)?")
 _USUAL_DIAL_PERCENT = (70.0, 120.0)  # as far as operators turn it without thinking
 
 
@@ -87,6 +89,32 @@ class Machine(TomlTable):
         return self
 
     @model_validator(mode="after")
+    def _dialect_runs_the_blocks(self) -> Machine:
+        own = dialect_of(self.emission.dialect)
+        shortest = own.least_block_s if own is not None else None
+        if own is not None and shortest is not None and self.controller.block_time_s < shortest * (1 - 1e-9):
+            raise KeyProblem(
+                "controller.block_time_s",
+                self.controller.block_time_s,
+                f"must not be below {toml(shortest)} with emission.dialect = {toml(self.emission.dialect)}: "
+                f"{own.facts['least block'].text}",
+            )
+        emission = self.emission
+        written = {"prologue": emission.prologue, "epilogue": emission.epilogue}
+        if emission.override == "lock":
+            written |= {"lock_lines": emission.locking, "unlock_lines": emission.unlocking}
+        for name, lines in written.items():
+            for code in map(code_name, _CODE.findall(" ".join(lines))):
+                if own is not None and code in own.means:
+                    raise KeyProblem(
+                        f"emission.{name}",
+                        list(lines),
+                        f"{code} is {fanuc_meaning(code)} on FANUC, and {own.means[code]} on {own.control}: "
+                        f"these lines are in the words of emission.dialect = {toml(self.emission.dialect)}",
+                    )
+        return self
+
+    @model_validator(mode="after")
     def _modes_stand_where_they_are_excited(self) -> Machine:
         for index, (letter, axis) in enumerate(zip("xyz", self.axes.as_tuple(), strict=True)):
             for number, mode in enumerate(axis.modes, start=1):
@@ -103,13 +131,18 @@ class Machine(TomlTable):
         emission, controller = self.emission, self.controller
         if emission.override != "lock":
             return self
-        for name, lines in (("lock_lines", emission.lock_lines), ("unlock_lines", emission.unlock_lines)):
-            if not lines:
-                raise KeyProblem(f"emission.{name}", [], 'must say something with emission.override = "lock"')
-        variables = set(_VARIABLE.findall(" ".join((*emission.lock_lines, *emission.unlock_lines))))
-        own = variables - {"#3003", "#3004"}
+        own = dialect_of(emission.dialect)
+        if own is None or not own.lock_word:
+            for name, lines in (("lock_lines", emission.locking), ("unlock_lines", emission.unlocking)):
+                if not lines:
+                    none = f": no word that switches the feed override of {own.control} off is known" if own else ""
+                    raise KeyProblem(
+                        f"emission.{name}", [], f'must say something with emission.override = "lock"{none}'
+                    )
+        variables = set(_VARIABLE.findall(" ".join((*emission.locking, *emission.unlocking))))
+        kept = variables - {"#3003", "#3004"}
         for name, lines in (("prologue", emission.prologue), ("epilogue", emission.epilogue)):
-            if used := own & set(_VARIABLE.findall(" ".join(lines))):
+            if used := kept & set(_VARIABLE.findall(" ".join(lines))):
                 raise KeyProblem(
                     f"emission.{name}", list(lines), f"uses {min(used)}, in which emission.lock_lines keep the switch"
                 )

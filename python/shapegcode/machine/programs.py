@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
+from shapegcode.machine.dialects import DialectName, code_name, dialect_of
 from shapegcode.settings.keys import Bool, Float, NonNegative, Positive, Text, TomlTable, key, toml
 
 _OFFSET_NAME = re.compile(r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}")
@@ -140,12 +141,30 @@ class Input(TomlTable):
 
 
 _BLOCK_CHARACTERS = re.compile(r"[A-Z0-9 .,+\-*/=#\[\]()<>_:;&]*")
+_FANUC_LOCK = (("#33=#3004", "#3004=[#33OR2]"), ("G53", "#3004=#33"))
 _LOOK_AHEAD = re.compile(r"G(?:0?5\.1 *Q|0?8 *P)(\d)(?!\d)")
 
 
 class Emission(TomlTable):
     """How shaped programs are written."""
 
+    dialect: DialectName = key(
+        "control whose words `convert` writes; programs are read in FANUC's words whatever this says, and other "
+        "commands that write a program refuse all but fanuc",
+        default="fanuc",
+    )
+    words: dict[str, Text] = key(
+        "what codes of the original become in another dialect, where they mean something else there or are not known: "
+        '{ "M11" = "M61", "G49" = "" } ("": left out). What takes the place of G10, G28, G30, G52, G53, G92 takes that '
+        'of the coordinates in the block too, unless it is one code: { "G28" = "SUPA G0 Z0 D0" }',
+        default={},
+    )
+    decimals: Annotated[int, Strict(), Field(ge=2, le=6)] | None = key(
+        "decimals of positions in mm in shaped blocks, one more in inch; left out: as the dialect wants them, else "
+        "those of controller.least_increment_mm",
+        unit="digits",
+        default=None,
+    )
     block_period_s: Annotated[Positive, Field(le=1)] | None = key(
         "duration of a short block: a whole multiple of controller.interpolation_period_s and not below "
         "controller.block_time_s; left out: chosen for the shortest shaper",
@@ -167,13 +186,13 @@ class Emission(TomlTable):
         'lines that switch the feed override off, for override = "lock"; a builder\'s own code, for example ["M49"], '
         "goes here",
         fanuc="#3004",
-        default=("#33=#3004", "#3004=[#33OR2]"),
+        default=_FANUC_LOCK[0],
     )
     unlock_lines: tuple[Text, ...] = key(
         "lines that give the feed override back as it was. Macro statements run when they are read, so G53 comes "
         'first: it is not read past until the moves before it are done. For a builder\'s own code ["M48"]',
         fanuc="#3004",
-        default=("G53", "#3004=#33"),
+        default=_FANUC_LOCK[1],
     )
     prefill_dwell_s: Annotated[NonNegative, Field(le=60)] = key(
         "dwell before each shaped cut, in which the block buffer fills; 0: none", default=0.0
@@ -221,6 +240,18 @@ class Emission(TomlTable):
         default="vibration",
     )
 
+    @field_validator("words")
+    @classmethod
+    def _codes(cls, words: dict[str, str]) -> dict[str, str]:
+        for word, text in words.items():
+            if not re.fullmatch(r"[GM]\d{1,4}(\.\d)?", word):
+                raise ValueError(f'{json.dumps(word)} is no G or M code; names are for example "M11" or "G05.1"')
+            if not _BLOCK_CHARACTERS.fullmatch(text):
+                raise ValueError(f"{json.dumps(text)} for {word} has a character that a program may not hold")
+        if len({code_name(word) for word in words}) < len(words):
+            raise ValueError("a code is named twice, with leading zeros and without")
+        return words
+
     @field_validator("prologue", "epilogue", "lock_lines", "unlock_lines")
     @classmethod
     def _fanuc_lines(cls, lines: tuple[str, ...]) -> tuple[str, ...]:
@@ -241,6 +272,31 @@ class Emission(TomlTable):
                     f"{self.max_line_length}"
                 )
         return self
+
+    @model_validator(mode="after")
+    def _has_another_dialect(self) -> Emission:
+        for name, stated in (("words", self.words), ("decimals", self.decimals)):
+            if stated and self.dialect == "fanuc":
+                raise ValueError(f"{name} counts only where emission.dialect is another one than fanuc")
+        return self
+
+    @property
+    def locking(self) -> tuple[str, ...]:
+        """Lines that switch the feed override off: `lock_lines`, or the dialect's own where they are FANUC's."""
+        own = dialect_of(self.dialect)
+        return self.lock_lines if own is None or self.lock_lines != _FANUC_LOCK[0] else own.lock[0]
+
+    @property
+    def unlocking(self) -> tuple[str, ...]:
+        """Lines that switch it on again, likewise."""
+        own = dialect_of(self.dialect)
+        return self.unlock_lines if own is None or self.unlock_lines != _FANUC_LOCK[1] else own.lock[1]
+
+    @property
+    def position_decimals(self) -> int | None:
+        """Decimals of positions in mm that are finer than the control's own; None: as these."""
+        own = dialect_of(self.dialect)
+        return self.decimals if own is None or self.decimals is not None else own.decimals
 
     @property
     def prefill_lines(self) -> tuple[str, ...]:

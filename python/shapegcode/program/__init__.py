@@ -8,6 +8,7 @@ from shapegcode.program.program import (
     given_program,
     least_increment_mm,
     located_error,
+    written_increment_mm,
 )
 from shapegcode.program.reading import program_loader, reader_options
 
@@ -21,4 +22,5 @@ __all__ = [
     "located_error",
     "program_loader",
     "reader_options",
+    "written_increment_mm",
 ]

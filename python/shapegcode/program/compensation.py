@@ -120,7 +120,8 @@ def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
         known = [table[name] for table in (own.tool_radius_mm, own.tool_radius_wear_mm) if name in table]
         if number == 0 or not known or abs(sum(known) - radius) > 1e-9:
             continue
-        if machine.emission.compensation_guard == "stop" or not machine.controller.holds_macros:
+        stops = machine.emission.compensation_guard == "stop" or machine.emission.dialect != "fanuc"
+        if stops or not machine.controller.holds_macros:
             lines.append(f"M00(CHECK D{number} RADIUS {radius:.4g} WITH WEAR)")
             continue
         value = _offset_expression(number, machine.controller.offset_memory)

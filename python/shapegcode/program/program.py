@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.computer import require_memory_for_lines
-from shapegcode.program.reading import Reading, given_text, signs_of_turning
+from shapegcode.program.reading import Reading, given_text, signs_of_other_control, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
 
@@ -134,6 +134,8 @@ class Program:
             line, signs = turning
             message = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"
             raise located_error(source, line, 1, message)
+        if not emitted and (other := signs_of_other_control(data)) is not None:
+            raise located_error(source, other[0], 1, f"{other[1]}; shapegcode reads FANUC's words")
         reading = Reading(
             machine,
             # What shapegcode wrote has FANUC's arcs, whatever those of its original were.
@@ -383,6 +385,14 @@ def least_increment_mm(machine: Machine, units: int) -> float:
     """Least increment of the words of a program in G20 or G21, mm."""
     controller = machine.controller
     return controller.least_increment_inch * MM_PER_INCH if units == 20 else controller.least_increment_mm
+
+
+def written_increment_mm(machine: Machine, units: int) -> float:
+    """Likewise of the words that `convert` writes, which are finer in some dialects."""
+    decimals = machine.emission.position_decimals
+    if decimals is None:
+        return least_increment_mm(machine, units)
+    return 10.0 ** -(decimals + 1) * MM_PER_INCH if units == 20 else 10.0**-decimals
 
 
 _ON_INCREMENT = 1e-6  # increments: so near to one a position is on it

@@ -252,6 +252,33 @@ _LIKELY = (
 )
 
 
+_OTHER_CONTROLS = (
+    (
+        re.compile(rb"(?m)^[ \t]*O[ \t]*(?:<\w+>|\d+)[ \t]*(?:SUB|ENDSUB|CALL|IF|WHILE|DO|REPEAT)\b"),
+        "LinuxCNC",
+        "O word",
+    ),
+    (re.compile(rb"#<\w+>"), "LinuxCNC", "named parameter"),
+    (re.compile(rb"G9[01]\.1(?!\d)"), "LinuxCNC", "centres of arcs"),
+    (re.compile(rb"G0*64\s*P[ \t]*[\d.]+"), "LinuxCNC", "tolerance of the path; FANUC's G64 has no P"),
+    (re.compile(rb"(?<![A-Z])CR\s*="), "a Sinumerik", "radius of an arc"),
+    (re.compile(rb"(?<![A-Z])MSG(?=\s)"), "a Sinumerik", "message"),
+    (re.compile(rb"G0*4\s*F[ \t]*[\d.]+"), "a Sinumerik", "dwell in seconds; FANUC's F is a feed"),
+    (re.compile(rb"%_N_\w+"), "a Sinumerik", "name of a program"),
+    (re.compile(rb"G7[01]0(?![\d.])"), "a Sinumerik", "inch or mm"),
+)
+
+
+def signs_of_other_control(text: bytes) -> tuple[int, str] | None:
+    """What shows that a program is written for another control, in words that no FANUC control knows."""
+    code = re.sub(rb";[^\n]*", b"", _COMMENT.sub(b" ", text[:_LOOKED_AT_BYTES].upper()))
+    for sign, control, meaning in _OTHER_CONTROLS:
+        if (found := sign.search(code)) is not None:
+            words = " ".join(found[0].decode("latin-1").split())
+            return code.count(b"\n", 0, found.start()) + 1, f"this is a program for {control}: {words} ({meaning})"
+    return None
+
+
 def signs_of_turning(text: bytes) -> tuple[int, str] | None:
     """What shows that a program is one of a lathe; a program with Y words or a tool change M06 is none."""
     code = _COMMENT.sub(b"", text[:_LOOKED_AT_BYTES].upper())

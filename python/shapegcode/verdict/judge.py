@@ -17,7 +17,7 @@ from shapegcode import _core
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.program import Program, least_increment_mm
+from shapegcode.program import Program, least_increment_mm, written_increment_mm
 from shapegcode.program.computer import cores
 from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_xyz_um
 from shapegcode.results.result import Pair, Xyz
@@ -126,7 +126,7 @@ class Judge:
             simulation = CaseSimulation(
                 place.blocks(emitted), place.region.path, self._model, self.cases, self.target,
                 self._model.offset(place.region), tracker,
-                least_increment_mm(self._machine, place.region.exit.units),
+                written_increment_mm(self._machine, place.region.exit.units),
             )  # fmt: skip
             planned = pool.submit(simulation.planned)  # takes longest
             runs = [pool.submit(simulation.nominal, rule) for rule in BLOCK_ENDS]

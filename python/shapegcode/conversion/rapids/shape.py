@@ -25,7 +25,7 @@ from shapegcode.conversion.whole_text import read_back
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.program import Program, least_increment_mm
+from shapegcode.program import Program, written_increment_mm
 from shapegcode.program.stamp import RAPID_MARK
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
@@ -137,7 +137,7 @@ class _RapidShaper:
         region = choice.region
         limits = self.model.limits()
         # Ends of blocks are rounded, and F is rounded up: at the clamp itself a block would last a tick too long.
-        increment_mm = least_increment_mm(self.machine, region.exit.units)
+        increment_mm = written_increment_mm(self.machine, region.exit.units)
         margin_mm_per_s = 2.0 * increment_mm / self.grid.block_period_s
         limits.max_feed_mm_per_s = np.maximum(limits.max_feed_mm_per_s - margin_mm_per_s, margin_mm_per_s)
         limits.feed_override = max(0.5, 1.0 - margin_mm_per_s / region.path[0].feed_mm_per_s)

@@ -1,0 +1,582 @@
+"""A program in FANUC's words, as the converter emits it, written in the words of another control.
+
+Nothing is shaped here and nothing judged. A word that means another thing there, or of which it is not known what it
+means, is refused with its line; so the original is translated before it is shaped.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.conversion.budget import Budget
+from shapegcode.conversion.result import Conversion, DialectNotes
+from shapegcode.errors import RoundTripError
+from shapegcode.machine import Machine
+from shapegcode.machine.dialects import Dialect, code_name, dialect_of, fanuc_meaning
+from shapegcode.program import Program, located_error
+from shapegcode.program.stamp import plain_comment, text_mark
+
+Converted = TypeVar("Converted", bound=Conversion)
+
+_CHORD_MM = 0.0005  # largest distance of an arc from its chords
+_BLEND_MM = 0.001  # LinuxCNC's G64 P
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_WORD = re.compile(rf"([A-Z])\s*({_NUMBER})")
+# Most lines: a move that needs no look at its words.
+_MOVE = re.compile(r"(N\d+)?(?:G0?([0123]))?((?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+))+)")
+_RADIUS = re.compile(r"R|(?<![\d.])\.")
+_COMMENT = re.compile(r"\(([^()]*)\)")
+_ACTIVE_COMMENT = re.compile(r"\s*(MSG|DEBUG|PRINT|LOG|PROBE|PY|AXIS)")
+_PLACE = re.compile(r"(N\d+)?\(EMISSION (PROLOGUE|EPILOGUE|LOCK|UNLOCK)\)")
+_LENGTHS = "XYZIJKR"
+_CYCLES = {"G73", "G81", "G82", "G83", "G85"}
+_GROUPS = ({"G20", "G21"}, {"G93", "G94", "G95"}, {"G61", "G64"}, {f"G{code}" for code in range(54, 60)})
+_WITH_AXES = {"G10", "G27", "G28", "G29", "G30", "G31", "G52", "G53", "G92"}
+_COORDINATE = re.compile(rf"(?<![A-Z])([XYZ])({_NUMBER})")
+_CODE = re.compile(r"[GM]\d+(\.\d)?")
+_MARK_LINE = re.compile(r"\(TEXT [0-9A-F]{8}\)")
+
+
+@dataclass(frozen=True)
+class Translation:
+    """A program in the words of another control."""
+
+    text: bytes
+    lines: npt.NDArray[np.int64]  # by line of the FANUC text, from 0: its line in this one, from 1
+    blocks: int  # blocks beyond those of the FANUC text: chords of arcs
+    cautions: tuple[str, ...]  # words that mean the same only as far as the control is set up so
+
+
+def translate(
+    program: Program,
+    machine: Machine,
+    original: Program | None = None,
+    shaped: Sequence[tuple[_core.Path, tuple[int, int], tuple[int, int]]] = (),
+    block_period_s: float = 0.0,
+) -> Translation:
+    """Write a program in the words of `emission.dialect`.
+
+    `shaped`: of each shaped cut its blocks, its lines, and the lines of `original` whose place they take.
+    """
+    dialect = dialect_of(machine.emission.dialect)
+    assert dialect is not None  # FANUC's words are what is read
+    writer = _Translator(dialect, program, machine, original or program, shaped, block_period_s)
+    lines = program.expanded_text.decode("latin-1").split(program.core.line_end)
+    has_end = lines[-1] == ""
+    out = [f"%{writer.name()}"] if dialect.frame == "name" and program.core.find(b"%") < 0 else list[str]()
+    numbers = np.empty(len(lines), dtype=np.int64)
+    for index, line in enumerate(lines[: len(lines) - has_end]):
+        numbers[index] = len(out) + 1
+        out += writer.lines(index + 1, line)
+    numbers[len(lines) - has_end :] = len(out)
+    if writer.state.is_open is False:
+        out += writer.opening("")
+    end = "\r\n" if program.core.line_end == "\r\n" else "\n"
+    text = (end.join(out) + (end if has_end else "")).encode("latin-1")
+    if b"(TEXT 00000000)" in text:
+        text = text.replace(b"(TEXT 00000000)", f"(TEXT {text_mark(text)})".encode(), 1)
+    return Translation(text, numbers, writer.state.added, tuple(writer.cautions.values()))
+
+
+def require_dialect(program: Program, machine: Machine, budget: Budget | None) -> None:
+    """Refuse, before anything is shaped, a program or a budget that `emission.dialect` cannot be written for."""
+    name = machine.emission.dialect
+    if (dialect := dialect_of(name)) is None:
+        return
+    other_blocks = dialect.arc_radius != "R" or dialect.time_feed
+    if budget is not None and (dialect.one_code or (budget.limits_rate and other_blocks)):
+        raise _core.ArgumentError(
+            f"a budget is counted in FANUC's words, and {dialect.control} (emission.dialect = {name}) has others: give "
+            f"{'none' if dialect.one_code else '--max-bytes alone'}"
+        )
+    decimals = machine.emission.position_decimals
+    for region in program.regions:
+        if decimals is None:
+            break
+        inch = region.exit.units == 20
+        limit_mm = (10.0 ** (7 - decimals) * 25.4) if inch else 10.0 ** (8 - decimals)
+        reach_mm = float(np.abs(region.path.polyline(1.0)).max())
+        if reach_mm >= limit_mm and not region.incremental:
+            raise program.region_error(
+                region, f"it reaches {reach_mm:.3f} mm; {decimals + inch} decimals in a word of eight digits name no "
+                f"position beyond {limit_mm:g} mm: set emission.decimals to {decimals - 1} or less"
+            )  # fmt: skip
+    translate(program, machine)
+
+
+def with_dialect(conversion: Converted) -> Converted:
+    """The conversion with its program in the words of `emission.dialect`."""
+    found, simulated = translated(conversion), conversion.simulated
+    name = "fanuc" if simulated is None else simulated.machine.emission.dialect
+    if found is None or (dialect := dialect_of(name)) is None:
+        return conversion
+    limit = conversion.budget.limits.max_bytes if conversion.budget is not None else None
+    if limit is not None and len(found.text) > limit:
+        less = limit * conversion.emitted.size // len(found.text)
+        raise _core.ArgumentError(
+            f"in the words of {dialect.control} the program has {len(found.text)} bytes, the budget is {limit} "
+            f"(--max-bytes): give {less}, which counts FANUC's words"
+        )
+    facts = {topic: fact.text for topic, fact in dialect.facts.items()}
+    points = [replace(each, line=int(found.lines[each.line - 1])) for each in conversion.restart_points]
+    return replace(
+        conversion, written=found.text, bytes_emitted=len(found.text), restart_points=tuple(points),
+        blocks=replace(conversion.blocks, emitted=conversion.blocks.emitted + found.blocks),
+        warnings=(*conversion.warnings, *found.cautions),
+        dialect=DialectNotes(name, dialect.control, facts, dialect.assumed),
+    )  # fmt: skip
+
+
+def translated(conversion: Conversion) -> Translation | None:
+    """The emitted program in the words of `emission.dialect`; None: these are FANUC's."""
+    simulated, emitted = conversion.simulated, conversion.emitted
+    if simulated is None or simulated.machine.emission.dialect == "fanuc":
+        return None
+    shaped = [
+        (place.blocks(emitted), (place.first_line, place.last_line), place.original_lines)
+        for place in conversion.placed
+    ]
+    moves = conversion.rapids.moves if conversion.rapids is not None else ()
+    shaped += [(emitted.core.cutting_path(*each.emitted_lines), each.emitted_lines, each.lines) for each in moves]
+    shaped.sort(key=lambda each: each[1])
+    return translate(emitted, simulated.machine, simulated.original, shaped, conversion.block_period_s)
+
+
+@dataclass
+class _State:
+    """What is in force behind a line, as far as the writing depends on it."""
+
+    motion: int
+    unit: str
+    incremental: bool = False
+    cycle: bool = False
+    tool: str = ""
+    next_tool: str = ""
+    path: str = "G64"
+    is_open: bool = False  # the first block was written
+    percents: int = 0  # `%` so far
+    ended_at: int = 0  # line of M02 or M30
+    feed: str = ""  # the F in force, where a rapid needs one of its own
+    needs_feed: bool = False
+    added: int = 0
+
+
+class _Translator:
+    """Writes line by line."""
+
+    def __init__(
+        self,
+        dialect: Dialect,
+        program: Program,
+        machine: Machine,
+        original: Program,
+        shaped: Sequence[tuple[_core.Path, tuple[int, int], tuple[int, int]]],
+        block_period_s: float,
+    ) -> None:
+        self._program, self._machine, self._original = program, machine, original
+        self._dialect = dialect
+        self._own = {code_name(word): text for word, text in machine.emission.words.items()}
+        self._shaped = shaped
+        self.state = _State(int(machine.power_on.motion[1:]), machine.power_on.units)
+        self.cautions: dict[str, str] = {}
+        self._rapid = min(axis.rapid_mm_per_min for axis in machine.axes.as_tuple())
+        core = program.core
+        self._has_percent = core.find(b"%", 1 + core.find(b"%")) > 0  # one alone is the last
+        dwells = (each for each in core.steps if each[0] == _core.StepKind.move)
+        others = core.other_moves
+        self._dwells = {line: others[index][1] for _, index, line in dwells if others[index][1] > 0.0}
+        self._arcs = {} if self._dialect.arc_radius else dict(_arcs(program))
+        self._times: dict[int, str] = {}
+        self._firsts, self._lasts = set[int](), set[int]()
+        for blocks, _, _ in shaped if self._dialect.time_feed else ():
+            times = dict(_block_times(blocks, block_period_s))
+            self._times |= times
+            self._firsts |= {min(times, default=-1)}
+            self._lasts |= {max(times, default=-1)}
+
+    def lines(self, number: int, line: str) -> list[str]:
+        """What becomes of a line."""
+        state = self.state
+        if state.percents > 1 or (state.ended_at and line.lstrip()[:1] not in ("%", "(", "")):
+            return self._left_out(number)
+        if (place := _PLACE.fullmatch(line)) is not None:
+            first, *rest = getattr(self._machine.emission, _EMISSION[place[2]])
+            return [(place[1] or "") + first, *rest] if not self._dialect.one_code else [first, *rest]
+        compact = line.replace(" ", "")
+        if state.is_open and (move := _MOVE.fullmatch(compact)) is not None and "K" not in line:
+            return self._move(number, compact, move)
+        comments = _COMMENT.findall(line)
+        body = _COMMENT.sub("", line).strip(" \t\r").upper()
+        if not body or body[0] in "%O:<":
+            return self._frame(body, comments, line)
+        if self._has_percent and not state.percents:
+            return []  # a leader, which no control reads
+        before = [] if state.is_open else self.opening(body)
+        skip, body = self._skipped(number, body)
+        if _WORD.sub("", body).strip():
+            raise self._error(number, f"{body}: macro statements and names are not translated")
+        words = [(letter, value) for letter, value in _WORD.findall(body)]
+        return [*before, *self._block(number, skip, words, comments)]
+
+    def opening(self, first: str) -> list[str]:
+        """Lines before the first block: what the control may have otherwise when it is switched on.
+
+        A mode that the dialect lacks is refused, unless the first block sets another one.
+        """
+        self.state.is_open = True
+        on, dialect = self._machine.power_on, self._dialect
+        notes = [f"DIALECT {dialect.control}", *dialect.header]
+        notes += _wrapped("ASSUMED ", [topic.upper() for topic in dialect.assumed])
+        comments = [self._comment(_header(note)) for note in notes] if self._machine.emission.header else []
+        own = {code_name(letter + value) for letter, value in _WORD.findall(first) if letter == "G"}
+        codes = [on.units, on.plane, on.distance, on.feed_mode, "G40", on.path_mode, on.work_offset, "G80"]
+        set_here = {code for code in codes for group in _GROUPS if code in group and group & own}
+        known = [code for code in codes if code not in set_here and (code != "G80" or code in dialect.same)]
+        words = [(code[0], code[1:]) for code in known]
+        start = [("G", "00")] if on.motion == "G00" else []
+        return [*comments, *dialect.opening, *self._block(0, "", words, ()), *self._block(0, "", start, ())]
+
+    def _move(self, number: int, line: str, move: re.Match[str]) -> list[str]:
+        """A line of nothing but motion, with a point in every number."""
+        if move[2] is not None:
+            self.state.motion, self.state.cycle = int(move[2]), False
+        dialect = self._dialect
+        if number in self._times or dialect.one_code:
+            return self._block(number, "", _WORD.findall(line), ())
+        if dialect.arc_radius == "CR=":
+            line = _RADIUS.sub(lambda found: "CR=" if found[0] == "R" else "0.", line)
+            line = re.sub(r"^(N\d+)", r"\1 ", line)
+            return [re.sub(r"(^| )G0?(\d)", r"\1G\2 ", line)]  # readers want the blank behind a code
+        return [line]
+
+    def _frame(self, body: str, comments: Sequence[str], line: str) -> list[str]:
+        """`%`, the program's number or name, comments."""
+        dialect = self._dialect
+        if _MARK_LINE.fullmatch(line.strip()):
+            return ["(TEXT 00000000)"] if dialect.comment == "(" else []
+        shown = [self._comment(text) for text in comments]
+        if body.startswith("%"):
+            self.state.percents += 1
+            if dialect.frame == "name":
+                return [] if self.state.is_open else [f"%{self.name()}", *shown]
+            return [body[0] + "".join(shown)] if dialect.frame in ("tape", "percent") else shown
+        if body:
+            if dialect.frame == "tape" and re.fullmatch(r"[O:]\d+", body):
+                return [f"O{body[1:].zfill(5)}{''.join(shown)}"]
+            return [self._comment(f"{plain_comment(body).strip()} {' '.join(comments)}".strip())]
+        return shown or [""]
+
+    def _left_out(self, number: int) -> list[str]:
+        """A line behind the end of the program, which another control might run."""
+        self.cautions.setdefault("end", f"{self._where(number)}: what stands behind the end of the program is left out")
+        return []
+
+    def name(self) -> str:
+        """Of the program, where the control wants one."""
+        found = re.search(rb"(?m)^[O:](\d+)", self._program.core.slice(0, min(self._program.core.size, 4096)))
+        return f"O{found[1].decode()}" if found else "SHAPED"
+
+    def _skipped(self, number: int, body: str) -> tuple[str, str]:
+        skip = re.match(r"/\d?\s*", body)
+        if skip is None:
+            return "", body
+        if self._dialect.one_code:
+            raise self._error(number, f"/ (block skip) is not known to {self._dialect.control}")
+        return skip[0].strip(), body[skip.end() :]
+
+    def _block(self, number: int, skip: str, words: Sequence[tuple[str, str]], comments: Sequence[str]) -> list[str]:
+        """A block of words."""
+        codes = [code_name(letter + value) for letter, value in words if letter in "GM"]
+        before, behind, out = [], [], []
+        for code in codes:
+            self._note(code)
+        motion = [code for code in codes if code in ("G00", "G01", "G02", "G03")]
+        if {"G28", "G30"} & {*codes} - self._own.keys() and motion:
+            before += motion  # two codes that use the axis words of one block
+        if "G09" in codes and self._dialect.exact_stop is not None:
+            stop, again = self._dialect.exact_stop
+            before += [stop] if stop else []
+            behind += [self._filled(again or self._dialect.becomes[self.state.path])]
+        if "G43" in codes and not any(letter == "H" for letter, _ in words):
+            raise self._error(number, f"G43 without H: the offset in force is not known to {self._dialect.control}")
+        if not skip and {"M02", "M30"} & {*codes}:
+            self.state.ended_at = number
+        for letter, value in words:
+            code = code_name(letter + value) if letter in "GM" else letter
+            if code in before or (code == "G09" and self._dialect.exact_stop is not None):
+                out.append("")
+                continue
+            out.append(self._word(number, letter, value, code, codes))
+        if self._dialect.time_feed:
+            before, out, behind = self._timed(number, before, out, behind)
+        lines = self._split(number, codes, words, out) if self._dialect.one_code else [self._joined(out)]
+        lines = [skip + line for line in (*before, *lines, *behind) if line]
+        self._hold(number, words, codes, lines)
+        if comments:
+            text = " ".join(self._comment(text) for text in comments)
+            lines = [f"{lines[0]}{' ' * (self._dialect.comment == ';')}{text}", *lines[1:]] if lines else [text]
+        return lines
+
+    def _hold(self, number: int, words: Sequence[tuple[str, str]], codes: Sequence[str], lines: Sequence[str]) -> None:
+        """Hold what was written against what was read: each coordinate is there, and none besides."""
+        stated = any(_COORDINATE.search(self._own.get(code, "")) for code in codes)
+        if "G04" in codes or stated or self._taken(codes) or (self._dialect.one_code and self.state.incremental):
+            return
+        want = {letter: float(self._length(letter, value, self._dialect)) for letter, value in words if letter in "XYZ"}
+        have = {letter: float(value) for line in lines for letter, value in _COORDINATE.findall(line)}
+        lost = [letter for letter, value in want.items() if not abs(have.get(letter, math.nan) - value) <= _CHORD_MM]
+        if lost or have.keys() - want.keys() - {*("XYZ" if self._is_arc() else "")}:
+            raise RoundTripError(f"line {number}: {words} became {lines} for {self._dialect.control}")
+
+    def _is_arc(self) -> bool:
+        return self._dialect.one_code and self.state.motion in (2, 3)
+
+    def _taken(self, codes: Sequence[str]) -> bool:
+        """Whether what takes the place of a code like G28 takes that of its axes too."""
+        own = [self._own[code] for code in codes if code in self._own and code in _WITH_AXES]
+        return any(not _CODE.fullmatch(text) for text in own)
+
+    def _note(self, code: str) -> None:
+        """Keep what a code puts into force."""
+        state = self.state
+        if code in ("G00", "G01", "G02", "G03"):
+            state.motion, state.cycle = int(code[1:]), False
+        elif code in ("G20", "G21"):
+            state.unit = code
+        elif code in ("G61", "G64"):
+            state.path = code
+        elif code in ("G90", "G91"):
+            state.incremental = code == "G91"
+        elif code in _CYCLES or code == "G80":
+            state.cycle = code != "G80"
+        elif code == "M06":
+            state.tool = state.next_tool or state.tool
+
+    def _word(self, number: int, letter: str, value: str, code: str, codes: Sequence[str]) -> str:
+        """A word in the dialect; empty: it is left out."""
+        dialect = self._dialect
+        if code in self._own:
+            return self._own[code]
+        if letter not in "GMNST" and self._taken(codes):
+            return ""
+        if "G04" in codes and (code == "G04" or letter in "XUP"):
+            return self._dwell(number, codes) if code == "G04" else ""
+        if letter in "GM":
+            if code == "G43" and dialect.arc_radius == "CR=":
+                return "D1"
+            if code not in dialect.same and code not in dialect.becomes:
+                raise self._refusal(number, code)
+            if code in dialect.cautions and number > 0:
+                self.cautions[code] = f"{self._where(number)}: {code}: {dialect.cautions[code]}"
+            short = letter + (value.lstrip("0") or "0") if dialect.short_codes else letter + value
+            return self._filled(dialect.becomes.get(code, short))
+        if letter in "XYZIJRF" or (letter == "K" and not self.state.cycle):
+            address = dialect.arc_radius if letter == "R" and not self.state.cycle else letter
+            return "" if letter == "R" and not address else address + self._length(letter, value, dialect)
+        if letter == "N":
+            return "" if dialect.one_code else letter + value
+        if letter == "T" and "M06" not in codes:
+            self.state.next_tool = value.lstrip("0")
+        elif letter == "T":
+            self.state.tool = value.lstrip("0")
+        if letter in "ST" and (not dialect.one_code or {"M03", "M04", "M06"} & {*codes}):
+            return letter + value
+        if letter == "H" and "G43" in codes:
+            return self._offset(number, value)
+        if letter == "D" and "G41" in dialect.same:
+            return letter + value
+        if self.state.cycle and letter in "QL":
+            return letter + (self._length("Q", value, dialect) if letter == "Q" else value)
+        if self.state.cycle and letter == "P":
+            return self._cycle_dwell(number, value, codes)
+        why = " repeats a drilling cycle" if letter == "K" else ""
+        raise self._error(number, f"{letter}{value}{why}: what it means to {dialect.control} is not known{_CURE}")
+
+    def _length(self, letter: str, value: str, dialect: Dialect) -> str:
+        """A number with a point: without one each control reads it in its own way."""
+        controller = self._machine.controller
+        if "." not in value:
+            if letter != "F" and not controller.calculator_decimal_point:
+                inch = self.state.unit == "G20"
+                step = controller.least_increment_inch if inch else controller.least_increment_mm
+                value = f"{int(value) * step:.6f}".rstrip("0")
+            else:
+                value += "."
+        bare = dialect.arc_radius == "CR=" and value.lstrip("+-").startswith(".")
+        return value.replace(".", "0.") if bare else value
+
+    def _dwell(self, number: int, codes: Sequence[str]) -> str:
+        if [code for code in codes if code != "G04"] or number not in self._dwells:
+            raise self._error(number, "G04 stands in a block with other codes, or has no time")
+        return self._seconds(number, self._dwells[number], self._dialect.dwell)
+
+    def _cycle_dwell(self, number: int, value: str, codes: Sequence[str]) -> str:
+        if not {"G82"} & {*codes}:
+            raise self._error(number, f"P{value}: only in a block with G82 is it known what it means there")
+        return self._seconds(number, int(value) * 1e-3, self._dialect.dwell.partition("G04")[2])
+
+    def _seconds(self, number: int, time_s: float, form: str) -> str:
+        milliseconds = round(time_s * 1e3)
+        if "{ms}" in form and abs(time_s * 1e3 - milliseconds) > 1e-6:
+            raise self._error(
+                number, f"a dwell of {time_s * 1e3:g} ms: {self._dialect.control} takes whole milliseconds"
+            )
+        text = f"{time_s:.6f}".rstrip("0")
+        return form.format(ms=milliseconds, s=text)
+
+    def _offset(self, number: int, value: str) -> str:
+        if self._own.get("G43", "G43") != "G43":
+            return ""  # what takes the place of G43 takes that of H too
+        if self._dialect.arc_radius != "CR=":
+            return f"H{value}"
+        if value.lstrip("0") != self.state.tool:
+            tool = self.state.tool or "not known"
+            raise self._error(
+                number, f"G43 H{value} is offset {value} on FANUC and D1 of the tool in the spindle on "
+                f"{self._dialect.control}: the tool is {tool}{_CURE}"
+            )  # fmt: skip
+        return ""
+
+    def _filled(self, text: str) -> str:
+        inch = self.state.unit == "G20"
+        blend = f"{_BLEND_MM / 25.4:.5f}" if inch else f"{_BLEND_MM:g}"
+        return text.replace("{blend}", blend)
+
+    def _joined(self, words: Sequence[str]) -> str:
+        # A reader of `G4 F1` or `D1` beside other words needs the blank.
+        gap = " " if self._dialect.comment == ";" else ""
+        return gap.join(word for word in words if word)
+
+    def _timed(
+        self, number: int, before: list[str], out: list[str], behind: list[str]
+    ) -> tuple[list[str], list[str], list[str]]:
+        """The block with its time in place of F, between G93 and G94."""
+        if number not in self._times:
+            return before, out, behind
+        own = [word for word in out if not word.startswith("F")]
+        own = ["G93" if word == "G94" else word for word in own]
+        lock = [self._dialect.lock_word] if self._machine.emission.override == "lock" else []
+        first, last = ["G93"] * (number in self._firsts), ["G94"] * (number in self._lasts)
+        return [*before, *first], [*lock, *own, f"F{self._times[number]}"], [*behind, *last]
+
+    def _split(
+        self, number: int, codes: Sequence[str], words: Sequence[tuple[str, str]], out: Sequence[str]
+    ) -> list[str]:
+        """A line for each code, and the move with its own G."""
+        named, state = dict(words), self.state
+        lines, late, move = list[str](), list[str](), list[str]()
+        for (letter, value), text in zip(words, out, strict=True):
+            if letter in "XYZ":
+                move.append(text)
+            elif letter in "GM" and text and code_name(letter + value) not in ("G00", "G01", "G02", "G03"):
+                code = code_name(letter + value)
+                tail = {"M03": "S", "M04": "S", "M06": "T"}.get(code, "")
+                filled = f"{text} {tail}{named[tail]}" if tail in named and tail else text
+                (late if code in _BEHIND_THE_MOVE else lines).append(filled)
+        if "F" in named:
+            state.feed, state.needs_feed = f"F{self._length('F', named['F'], self._dialect)}", True
+        is_circle = state.motion in (2, 3) and not named.keys().isdisjoint("IJK")
+        if "G04" in codes or not (move or is_circle):
+            return [*lines, *late]
+        # G0 is as fast as G1 there: each has its F.
+        feed = f"F{self._rapid:g}" if state.motion == 0 else state.feed if state.needs_feed else ""
+        state.needs_feed = state.motion == 0
+        if state.motion in (2, 3):
+            return [*lines, *self._chords(number, words, feed), *late]
+        return [*lines, " ".join(filter(None, [f"G{state.motion}", *move, feed])), *late]
+
+    def _chords(self, number: int, words: Sequence[tuple[str, str]], feed: str) -> list[str]:
+        """An arc as lines from one of its points to the next."""
+        arc, named = self._arcs.get(number), dict(words)
+        if arc is None:
+            raise self._error(number, "an arc whose start is not known cannot be written as chords")
+        half = math.acos(max(0.0, 1.0 - _CHORD_MM / arc.radius_mm))
+        count = max(1, math.ceil(abs(arc.sweep_rad) / (2.0 * half)))
+        self.state.added += count - 1
+        points = np.array([arc.point_at(arc.length_mm * part / count) for part in range(count + 1)])
+        decimals = self._dialect.decimals or 3
+        points = np.round(points, decimals) + 0.0  # no -0
+        moved = np.abs(points - points[0]).max(axis=0) > 0.0
+        axes = [axis for axis in range(3) if moved[axis] or "XYZ"[axis] in named]
+        values = np.diff(points, axis=0) if self.state.incremental else points[1:]
+        moves = [" ".join(f"{'XYZ'[axis]}{value[axis]:.{decimals}f}" for axis in axes) for value in values]
+        return [f"G1 {move}{f' {feed}' * (part == 0 and feed != '')}" for part, move in enumerate(moves)]
+
+    def _comment(self, text: str) -> str:
+        if self._dialect.comment == ";":
+            return f"; {text}"
+        active = self._dialect.frame == "percent" and _ACTIVE_COMMENT.match(text.upper())
+        return f"(NOTE {text})" if active else f"({text})"
+
+    def _where(self, number: int) -> str:
+        file, line = self._place(number)
+        return f"{file}:{line}"
+
+    def _place(self, number: int) -> tuple[str, int]:
+        """File and line of the original from which a line comes."""
+        shift = 0
+        for _, lines, original in self._shaped:
+            if number <= lines[1]:
+                shift = shift or original[0] - lines[0]
+                break
+            shift = original[1] - lines[1]
+        line, file = self._original.core.origin(max(1, number + shift))
+        return file or self._original.source, line
+
+    def _error(self, number: int, message: str) -> _core.ProgramError:
+        file, line = self._place(number)
+        return located_error(file, line, 1, message)
+
+    def _refusal(self, number: int, code: str) -> _core.ProgramError:
+        here = fanuc_meaning(code)
+        there = self._dialect.means.get(code, "not known")
+        return self._error(
+            number, f"{code} is {here} on FANUC, and {there} on {self._dialect.control}: take it out, or say what it "
+            f'becomes there: emission.words = {{ "{code}" = "..." }}'
+        )  # fmt: skip
+
+
+_BEHIND_THE_MOVE = {"M00", "M01", "M02", "M05", "M09", "M30"}
+_CURE = ": take it out of the program, or say what it becomes there (emission.words)"
+_EMISSION = {"PROLOGUE": "prologue", "EPILOGUE": "epilogue", "LOCK": "locking", "UNLOCK": "unlocking"}
+
+
+def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:
+    """Arcs by their lines."""
+    for region in program.regions:
+        for number, line in enumerate(region.path.segment_lines):
+            if (segment := region.path[number]).kind == _core.SegmentKind.arc:
+                yield int(line), segment
+    for segment, _ in program.core.other_moves:
+        if segment.kind == _core.SegmentKind.arc:
+            yield segment.line_number, segment
+
+
+def _block_times(blocks: _core.Path, period_s: float) -> Iterator[tuple[int, str]]:
+    """Time of each block by its line, whole periods: F is rounded up so that it ends just before them."""
+    for number, line in enumerate(blocks.segment_lines):
+        segment = blocks[number]
+        periods = max(1, round(segment.length_mm / segment.feed_mm_per_s / period_s))
+        yield int(line), f"{periods * period_s:.6f}".rstrip("0")
+
+
+def _header(text: str) -> str:
+    return " ".join("".join(c if c.isalnum() or c in " .-_" else " " for c in text.upper()).split())
+
+
+def _wrapped(head: str, words: Iterable[str]) -> list[str]:
+    lines: list[str] = []
+    for word in words:
+        if lines and len(lines[-1]) + len(word) < 56:
+            lines[-1] += f" - {word}"
+        else:
+            lines.append(head + word)
+    return lines

@@ -1,0 +1,116 @@
+"""What controls other than FANUC's read: a row of data/control/dialects.toml for each dialect that `convert` writes."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+from typing import Any, Literal
+
+DialectName = Literal["fanuc", "haas", "mitsubishi", "siemens", "linuxcnc", "klipper", "isg"]
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One thing that is known of a control, or assumed."""
+
+    text: str
+    source: str = ""  # page or recording; empty: assumed
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How programs for a control are written.
+
+    Attributes:
+        control: its name.
+        facts: by topic, what holds there and where that is written.
+        same: words that mean what they mean on a FANUC control.
+        becomes: words that are written otherwise, and how; empty: left out, as it says nothing there.
+        means: words that mean something else there, for the refusal.
+        cautions: words that mean the same as far as the control is set up so.
+        frame: "tape": `%` and the O number; "percent": `%` alone; "name": `%` and the name in the first line; "none".
+        comment: "(" for comments in brackets, ";" for those that reach to the end of the line.
+        opening: lines before the first block.
+        dwell: of one; `{s}` seconds, `{ms}` milliseconds.
+        arc_radius: address of the radius of an arc; empty: arcs are written as chords.
+        time_feed: shaped blocks carry their time in seconds, with G93.
+        one_code: a line holds one code, and each move its own G.
+        short_codes: codes have no leading zeros.
+        decimals: digits of positions in mm in shaped blocks; None: as many as `controller.least_increment_mm` has.
+        feed_decimals: likewise of F; None: `controller.feed_decimals_mm`.
+        least_block_s: shortest block that the control runs; None: not known.
+        lock: lines that switch the feed override off, and on again; empty: none are known.
+        lock_word: word of every shaped block that does it instead.
+        exact_stop: lines before and behind a block with G09, "" behind: the mode in force; None: a word like others.
+        header: comments for the operator.
+    """
+
+    control: str
+    facts: Mapping[str, Fact]
+    same: frozenset[str]
+    becomes: Mapping[str, str] = field(default_factory=dict)
+    means: Mapping[str, str] = field(default_factory=dict)
+    cautions: Mapping[str, str] = field(default_factory=dict)
+    frame: Literal["tape", "percent", "name", "none"] = "tape"
+    comment: str = "("
+    opening: tuple[str, ...] = ()
+    dwell: str = "G04P{ms}"
+    arc_radius: str = "R"
+    time_feed: bool = False
+    one_code: bool = False
+    short_codes: bool = False
+    decimals: int | None = None
+    feed_decimals: int | None = None
+    least_block_s: float | None = None
+    lock: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    lock_word: str = ""
+    exact_stop: tuple[str, str] | None = None
+    header: tuple[str, ...] = ()
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """Topics for which there is no source."""
+        return tuple(topic for topic, fact in self.facts.items() if not fact.source)
+
+
+@cache
+def _rows() -> tuple[Mapping[str, Dialect], Mapping[str, str]]:
+    """The dialects by name, and what words say on a FANUC control."""
+    file = resources.files("shapegcode") / "data" / "control" / "dialects.toml"
+    tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    fanuc = {code: text for codes, text in tables.pop("fanuc").items() for code in codes.split()}
+    rows = {}
+    for name, table in tables.items():
+        facts = {topic: Fact(**fact) for topic, fact in table.pop("facts").items()}
+        same = frozenset(table.pop("same").split())
+        rows[name] = Dialect(facts=facts, same=same, **{key: _tuples(value) for key, value in table.items()})
+    return rows, fanuc
+
+
+def all_dialects() -> Mapping[str, Dialect]:
+    """Every dialect but FANUC's own, by name."""
+    return _rows()[0]
+
+
+def dialect_of(name: str) -> Dialect | None:
+    """The dialect of `emission.dialect`; None: FANUC's words, which everything else here reads and writes."""
+    return None if name == "fanuc" else _rows()[0][name]
+
+
+def fanuc_meaning(code: str) -> str:
+    """What a code says on a FANUC control, for messages."""
+    own = "a function of the machine builder" if code.startswith("M") else "a code of its own"
+    return _rows()[1].get(code, own)
+
+
+def code_name(word: str) -> str:
+    """A code with two digits: G4 is G04."""
+    number, point, decimals = word[1:].partition(".")
+    return f"{word[0]}{number.zfill(2)}{point}{decimals}" if number.isdigit() else word
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
