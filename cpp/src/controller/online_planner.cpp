@@ -21,9 +21,9 @@ constexpr std::size_t margin_periods = 2;
 // So many of the longest stops are planned ahead, and another plan is made when so many are left.
 constexpr double stops_planned = 8.0;
 constexpr double stops_ahead = 2.0;
-// Where they do not reach so far: stations that are planned for each segment that is new, and the share of all that is
-// behind the motion where they are too few for the window.
-constexpr std::size_t stations_for_new = 16;
+// Where they do not reach so far: stations that are planned for each segment that is new, but no larger share of the
+// window than that, or of the stations where these are too few for the window.
+constexpr double stations_for_new = 16.0;
 constexpr double renewed_share = 0.25;
 // What is tried while the motion is under way, by its speed; and how often from rest, with less each time.
 constexpr std::array<double, 4> slower{no_limit, 0.9, 0.6, 0.0};
@@ -149,7 +149,9 @@ bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) cons
     return static_cast<double>(motion_.passed()) >= renewed_share * static_cast<double>(plan_.end());
   }
   const bool has_more = end < pushed || pushed != pushed_before_;
-  if (is_full_ && has_more && stations_for_new * (end - planned_) < plan_.end()) return false;
+  const double worth =
+      std::min(static_cast<double>(plan_.end()) / stations_for_new, renewed_share * static_cast<double>(rules_.window));
+  if (is_full_ && has_more && static_cast<double>(end - planned_) < worth) return false;
   // Before the motion has to brake for what is only the end of the plan.
   return std::isfinite(motion_.to_stop(stops_ahead * longest_stop_mm_));
 }
