@@ -99,12 +99,13 @@ void register_answers(py::module_& module) {
       .value("not_finite", PushResult::not_finite, "A position that is not finite.")
       .value("wrong_axes", PushResult::wrong_axes, "Not as many following axes as the control has.")
       .value("aborted", PushResult::aborted, "Nothing is taken between abort() and restart().")
+      .value("flushing", PushResult::flushing, "Between flush() and flushed() nothing is taken.")
       .value("no_time", PushResult::no_time, "A dwell below zero, above 1e6 s, or no number.");
 
   py::enum_<Activity>(module, "Activity", "What a MotionController does in a period.")
       .value("idle", Activity::idle, "At rest, nothing left to do.")
       .value("moving", Activity::moving, "Along the path, or the shaper is still giving out what it holds.")
-      .value("stopping", Activity::stopping, "Decelerating for hold() or abort().")
+      .value("stopping", Activity::stopping, "Decelerating for hold(), flush() or abort().")
       .value("held", Activity::held, "At rest after hold(), or at a stop that was pushed.")
       .value("starved", Activity::starved,
              "Coming to rest: the segments ran out before one that stops. At rest it is idle.")
@@ -358,6 +359,18 @@ Returns:
 
 Raises:
     ArgumentError: Periods below 0.)")
+      .def(
+          "flush", [](PyController& self) { self.control().flush(); },
+          "Comes to rest along the path and forgets the rest of it; when it rests, flushed() makes it go on from "
+          "there.")
+      .def("flushed", &PyController::flushed, R"(After flush(): takes segments again, from where the motion rests.
+
+Returns:
+    That position, (n_axes,). None: it does not rest yet, or plan() is at work, or there was no flush().)")
+      .def("probe", &PyController::probe, R"(A probe has touched, in the period of the last step: flushes.
+
+Returns:
+    The set-point of that period, (n_axes,).)")
       .def("run", &PyController::run, py::arg("max_periods") = 1'000'000,
            R"(Steps until it rests: idle, held or aborted.
 

@@ -166,6 +166,22 @@ class PyController {
     return control_.plan();
   }
 
+  std::optional<pybind11::array_t<double>> flushed() {
+    pybind11::array_t<double> position(static_cast<pybind11::ssize_t>(axes_));
+    double* const at = position.mutable_data();
+    if (!control_.flushed({at, axes_})) return std::nullopt;
+    end_ = Vector3(at[0], at[1], at[2]);
+    following_.assign(at + axis_count, at + axes_);
+    return position;
+  }
+
+  pybind11::array_t<double> probe() {
+    pybind11::array_t<double> latched(static_cast<pybind11::ssize_t>(axes_));
+    const std::lock_guard lock(*stepping_);
+    control_.probe({latched.mutable_data(), axes_});
+    return latched;
+  }
+
   void restart(const std::vector<double>& position) {
     if (position.size() != axes_) {
       throw Error(ErrorKind::argument, "position has " + std::to_string(position.size()) + " values, must have " +

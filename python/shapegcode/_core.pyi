@@ -960,11 +960,14 @@ class PushResult:
     
       aborted : Nothing is taken between abort() and restart().
     
+      flushing : Between flush() and flushed() nothing is taken.
+    
       no_time : A dwell below zero, above 1e6 s, or no number.
     """
     __members__: typing.ClassVar[dict[str, PushResult]]
     aborted: typing.ClassVar[PushResult]
     accepted: typing.ClassVar[PushResult]
+    flushing: typing.ClassVar[PushResult]
     no_feed: typing.ClassVar[PushResult]
     no_length: typing.ClassVar[PushResult]
     no_time: typing.ClassVar[PushResult]
@@ -1016,7 +1019,7 @@ class Activity:
     
       moving : Along the path, or the shaper is still giving out what it holds.
     
-      stopping : Decelerating for hold() or abort().
+      stopping : Decelerating for hold(), flush() or abort().
     
       held : At rest after hold(), or at a stop that was pushed.
     
@@ -1240,6 +1243,17 @@ class MotionController:
         """
         Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. It acts on what is not planned yet, after 8 to 32 periods and the lead; 0 is a hold.
         """
+    def flush(self) -> None:
+        """
+        Comes to rest along the path and forgets the rest of it; when it rests, flushed() makes it go on from there.
+        """
+    def flushed(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        After flush(): takes segments again, from where the motion rests.
+        
+        Returns:
+            That position, (n_axes,). None: it does not rest yet, or plan() is at work, or there was no flush().
+        """
     def hold(self) -> None:
         """
         Come to rest along the path.
@@ -1247,6 +1261,13 @@ class MotionController:
     def plan(self) -> bool:
         """
         Plans on until enough lies ahead; with `lead_periods`, from one thread. False: there was nothing to do.
+        """
+    def probe(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        A probe has touched, in the period of the last step: flushes.
+        
+        Returns:
+            The set-point of that period, (n_axes,).
         """
     def push(self, segment: Segment, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None) -> PushResult:
         """

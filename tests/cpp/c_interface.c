@@ -172,6 +172,35 @@ static void events(void) {
   CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
 }
 
+/* A probe touches on the way; the way back begins where the motion has come to rest. */
+static void probing(void) {
+  const shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control = made(&settings);
+  const double end[3] = {100, 0, 0};
+  const double start[3] = {0, 0, 0};
+  double set_point[3];
+  double latched[3];
+  double rest[3];
+  int step;
+  int done = 1;
+  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 1, 1) == SHAPEGCODE_OK);
+  for (step = 0; step < 300; ++step) CHECK(shapegcode_controller_step(control, set_point, NULL) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_flushed(control, rest, &done) == SHAPEGCODE_OK && !done);
+  CHECK(shapegcode_controller_probe(control, latched) == SHAPEGCODE_OK);
+  CHECK(distance(latched, set_point) == 0.0);
+  CHECK(shapegcode_controller_push_line(control, start, feed_mm_per_s, 2, 1) == SHAPEGCODE_FLUSHING);
+  run(control, set_point, SHAPEGCODE_IDLE, 2000);
+  CHECK(shapegcode_controller_flushed(control, rest, &done) == SHAPEGCODE_OK && done);
+  CHECK(distance(rest, set_point) < 1e-9 && rest[0] > latched[0] && rest[0] < end[0] - 1.0);
+  CHECK(shapegcode_controller_push_line(control, start, feed_mm_per_s, 2, 1) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_IDLE, 20000);
+  CHECK(distance(set_point, start) == 0.0 && state_of(control).segments_done == 1);
+  CHECK(shapegcode_controller_flush(control) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_flush(NULL) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_controller_probe(control, NULL) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
 static void arcs(void) {
   const double pi = 3.14159265358979323846;
   shapegcode_settings settings = plain_settings();
@@ -325,7 +354,7 @@ static void full_queue(void) {
 static void texts(void) {
   int code;
   CHECK(shapegcode_c_version() == SHAPEGCODE_C_VERSION);
-  for (code = SHAPEGCODE_ERROR_INTERNAL; code <= SHAPEGCODE_NO_TIME; ++code) {
+  for (code = SHAPEGCODE_ERROR_INTERNAL; code <= SHAPEGCODE_FLUSHING; ++code) {
     CHECK(strcmp(shapegcode_status_text(code), shapegcode_status_text(1000)) != 0);
   }
   for (code = SHAPEGCODE_IDLE; code <= SHAPEGCODE_ABORTED; ++code) {
@@ -340,6 +369,7 @@ int main(void) {
   square();
   feed_forward();
   events();
+  probing();
   arcs();
   following_axis();
   abort_and_restart();

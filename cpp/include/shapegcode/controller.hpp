@@ -85,6 +85,7 @@ enum class PushResult : std::uint8_t {
   not_finite,
   wrong_axes,  ///< not as many following axes as the settings have
   aborted,     ///< after abort() nothing is taken until restart()
+  flushing,    ///< between flush() and flushed() nothing is taken
   no_time,     ///< a dwell below zero, above 1e6 s, or no number
 };
 [[nodiscard]] const char* text_of(PushResult result) noexcept;
@@ -93,7 +94,7 @@ enum class PushResult : std::uint8_t {
 enum class Activity : std::uint8_t {
   idle,      ///< at rest, nothing left to do
   moving,    ///< along the path, or the shaper is still giving out what it holds
-  stopping,  ///< decelerating for hold() or abort()
+  stopping,  ///< decelerating for hold(), flush() or abort()
   held,      ///< at rest after hold(), or at a stop that was pushed
   starved,   ///< coming to rest: the segments ran out before one with `stop_at_end`. At rest it is idle
   aborted,   ///< at rest after abort(); the path is gone
@@ -177,7 +178,15 @@ class MotionController {
   /// Come to rest along the path, beginning after 32 periods or an eighth of the lead at the latest; resume() goes on.
   void hold() noexcept;
   void resume() noexcept;  ///< from a stop that was pushed as well
-  /// Come to rest along the path and forget the rest of it.
+  /// Come to rest along the path and forget the rest of it; when it rests, flushed() makes it go on from there.
+  void flush() noexcept;
+  /// From the pushing thread, after flush(): where the motion rests (axes() values), from where on segments are taken
+  /// again. False: it does not rest yet, or plan() is at work, or there was no flush(): nothing has happened.
+  bool flushed(std::span<double> position) noexcept;
+  /// A probe has touched, in the period of the last step: gives its set-point (axes() values), and flushes. From the
+  /// thread that steps.
+  void probe(std::span<double> latched) noexcept;
+  /// Come to rest along the path and forget the rest of it, until restart().
   void abort() noexcept;
   /// At rest at a position (axes() values), the queue empty. Not while another thread pushes or steps. False, and
   /// nothing is changed: a value is not finite.

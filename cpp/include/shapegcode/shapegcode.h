@@ -51,6 +51,7 @@ typedef enum shapegcode_status {
   SHAPEGCODE_AFTER_ABORT = 7,         ///< nothing is taken between abort and restart
   SHAPEGCODE_NO_ARC = 8,              ///< no radius, no sweep, no such plane, or the sweep does not lead to the end
   SHAPEGCODE_NO_TIME = 9,             ///< a dwell below zero, above 1e6 s, or no number
+  SHAPEGCODE_FLUSHING = 10,           ///< between flush and flushed nothing is taken
   SHAPEGCODE_ERROR_ARGUMENT = -1,     ///< a value is outside its range; create writes which, and the limit
   SHAPEGCODE_ERROR_NULL = -2,         ///< a pointer is NULL that must not be
   SHAPEGCODE_ERROR_STRUCT_SIZE = -3,  ///< a struct that was not initialised, or is of a newer header than the library
@@ -227,7 +228,17 @@ shapegcode_status shapegcode_controller_hold(shapegcode_controller* controller);
 /// Go on after hold.
 shapegcode_status shapegcode_controller_resume(shapegcode_controller* controller);
 
-/// Come to rest along the path and forget the rest of it.
+/// Come to rest along the path and forget the rest of it; when it rests, flushed makes it go on from there.
+shapegcode_status shapegcode_controller_flush(shapegcode_controller* controller);
+
+/// From the planning thread, after flush: `*done` is 1 and `position` where the motion rests, from where on segments
+/// are taken again; 0: it does not rest yet, or plan is at work, or there was no flush.
+shapegcode_status shapegcode_controller_flushed(shapegcode_controller* controller, double* position, int* done);
+
+/// A probe has touched, in the period of the last step: gives its set-point and flushes. From the thread that steps.
+shapegcode_status shapegcode_controller_probe(shapegcode_controller* controller, double* latched);
+
+/// Come to rest along the path and forget the rest of it, until restart.
 shapegcode_status shapegcode_controller_abort(shapegcode_controller* controller);
 
 /// At rest at a position (as many values as there are axes), the queue empty. Not while another thread pushes or steps.

@@ -87,6 +87,8 @@ shapegcode_status status_of(PushResult result) noexcept {
       return SHAPEGCODE_WRONG_AXES;
     case PushResult::aborted:
       return SHAPEGCODE_AFTER_ABORT;
+    case PushResult::flushing:
+      return SHAPEGCODE_FLUSHING;
     case PushResult::no_time:
       return SHAPEGCODE_NO_TIME;
   }
@@ -267,6 +269,26 @@ shapegcode_status shapegcode_controller_resume(shapegcode_controller* controller
 shapegcode_status shapegcode_controller_abort(shapegcode_controller* controller) {
   if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
   controller->control.abort();
+  return SHAPEGCODE_OK;
+}
+
+shapegcode_status shapegcode_controller_flush(shapegcode_controller* controller) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  controller->control.flush();
+  return SHAPEGCODE_OK;
+}
+
+shapegcode_status shapegcode_controller_flushed(shapegcode_controller* controller, double* position, int* done) {
+  if (controller == nullptr || position == nullptr || done == nullptr) return SHAPEGCODE_ERROR_NULL;
+  const std::span values(position, static_cast<std::size_t>(controller->control.axes()));
+  *done = controller->control.flushed(values) ? 1 : 0;
+  if (*done != 0) std::ranges::copy(values, controller->end.begin());
+  return SHAPEGCODE_OK;
+}
+
+shapegcode_status shapegcode_controller_probe(shapegcode_controller* controller, double* latched) {
+  if (controller == nullptr || latched == nullptr) return SHAPEGCODE_ERROR_NULL;
+  controller->control.probe({latched, static_cast<std::size_t>(controller->control.axes())});
   return SHAPEGCODE_OK;
 }
 

@@ -25,6 +25,8 @@ const char* shapegcode_status_text(int code) {
       return "the arc has no radius, no sweep or no plane, or its sweep does not lead to its end";
     case SHAPEGCODE_NO_TIME:
       return "a dwell takes 0 to 1e6 s";
+    case SHAPEGCODE_FLUSHING:
+      return "the motion is flushed: push it again when it rests";
     case SHAPEGCODE_ERROR_ARGUMENT:
       return "a value is outside its range";
     case SHAPEGCODE_ERROR_NULL:

@@ -31,6 +31,8 @@ const char* text_of(PushResult result) noexcept {
       return "not as many following axes as the settings have";
     case PushResult::aborted:
       return "aborted: nothing is taken until restart";
+    case PushResult::flushing:
+      return "the motion is flushed: push it again when it rests";
     case PushResult::no_time:
       return "a dwell takes 0 to 1e6 s";
   }
@@ -75,7 +77,7 @@ class MotionController::Implementation {
   }
 
   PushResult push(const Segment& segment, std::span<const double> following_end) noexcept {
-    if (abort_.load(std::memory_order_relaxed)) return PushResult::aborted;
+    if (const PushResult closed = closed_to_pushes(); closed != PushResult::accepted) return closed;
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
     if (head - planner_.running() >= queue_) return PushResult::queue_full;
     const PushResult result = intake_.take(segment, following_end, ring_[head]);
@@ -86,7 +88,7 @@ class MotionController::Implementation {
 
   // Behind the segment that was pushed last.
   PushResult push_event(const ControllerEvent& event, bool waits) noexcept {
-    if (abort_.load(std::memory_order_relaxed)) return PushResult::aborted;
+    if (const PushResult closed = closed_to_pushes(); closed != PushResult::accepted) return closed;
     const std::uint64_t end = events_pushed_.load(std::memory_order_relaxed);
     if (end - events_taken_.load(std::memory_order_acquire) == events_.size()) return PushResult::queue_full;
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
@@ -99,7 +101,7 @@ class MotionController::Implementation {
     return PushResult::accepted;
   }
   PushResult push_dwell(double time_s) noexcept {
-    if (abort_.load(std::memory_order_relaxed)) return PushResult::aborted;
+    if (const PushResult closed = closed_to_pushes(); closed != PushResult::accepted) return closed;
     if (!(time_s >= 0.0 && time_s <= longest_dwell_s)) return PushResult::no_time;
     intake_.dwell(static_cast<std::uint32_t>(std::ceil(time_s / period_s_ * (1.0 - dwell_rounding))));
     rests_at_.store(head_.load(std::memory_order_relaxed), std::memory_order_relaxed);
@@ -115,11 +117,21 @@ class MotionController::Implementation {
 
   bool plan() noexcept {
     if (is_stopping()) return false;
-    return planner_.plan(head_.load(std::memory_order_acquire), override_.load(std::memory_order_relaxed),
-                         settled_.load(std::memory_order_relaxed), released_.load(std::memory_order_relaxed));
+    // Either this is seen by flushed(), or the flush is seen here.
+    is_planning_.store(true, std::memory_order_seq_cst);
+    const Flush flush = flush_.load(std::memory_order_seq_cst);
+    const bool worked =
+        (flush == Flush::none || flush == Flush::over) &&
+        planner_.plan(head_.load(std::memory_order_acquire), override_.load(std::memory_order_relaxed),
+                      settled_.load(std::memory_order_relaxed), released_.load(std::memory_order_relaxed));
+    is_planning_.store(false, std::memory_order_release);
+    return worked;
   }
 
   Activity step() noexcept {
+    const Flush flush = flush_.load(std::memory_order_acquire);
+    if (flush == Flush::at_rest) return rest_on();
+    if (flush == Flush::over || flush == Flush::asked_anew) begin_anew();
     Sections& sections = planner_.sections();
     if (plans_in_step_ && sections.wants_more()) plan();
     const PlannedPoint& point = sections.step(is_stopping());
@@ -145,6 +157,11 @@ class MotionController::Implementation {
       std::copy_n(point.position.begin(), n, value(0));
     }
     publish(activity, point);
+    if (rest_periods_ == settled_periods() && flush_.load(std::memory_order_relaxed) == Flush::asked) {
+      rest_ = point;
+      done_ = sections.current().done - first_;
+      flush_.store(Flush::at_rest, std::memory_order_release);
+    }
     return activity;
   }
 
@@ -163,12 +180,37 @@ class MotionController::Implementation {
     if (waits > released_.load(std::memory_order_relaxed)) released_.store(waits, std::memory_order_relaxed);
   }
   void abort() noexcept { abort_.store(true, std::memory_order_relaxed); }
+  void flush() noexcept {
+    Flush now = flush_.load(std::memory_order_relaxed);
+    while (now == Flush::none || now == Flush::over) {
+      const Flush next = now == Flush::none ? Flush::asked : Flush::asked_anew;
+      if (flush_.compare_exchange_weak(now, next, std::memory_order_seq_cst)) return;
+    }
+  }
+  void probe(std::span<double> latched) noexcept {
+    std::copy_n(values(0).begin(), std::min(latched.size(), axes()), latched.begin());
+    flush();
+  }
+  bool flushed(std::span<double> position) noexcept {
+    if (flush_.load(std::memory_order_seq_cst) != Flush::at_rest) return false;
+    if (is_planning_.load(std::memory_order_seq_cst)) return false;
+    const std::uint64_t head = head_.load(std::memory_order_relaxed);
+    intake_.restart({rest_.position.data(), axes()});
+    planner_.restart(head, rest_.position);
+    new_first_ = head - done_;
+    events_from_ = events_pushed_.load(std::memory_order_relaxed);
+    rests_at_.store(head, std::memory_order_relaxed);
+    std::copy_n(rest_.position.begin(), std::min(position.size(), axes()), position.begin());
+    flush_.store(Flush::over, std::memory_order_seq_cst);
+    return true;
+  }
 
   bool restart(std::span<const double> position) noexcept {
     if (!std::ranges::all_of(position, [](double value) { return std::isfinite(value); })) return false;
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
     hold_.store(false, std::memory_order_relaxed);
     abort_.store(false, std::memory_order_relaxed);
+    flush_.store(Flush::none, std::memory_order_relaxed);
     AxisValues rest{};
     std::copy_n(position.begin(), std::min(position.size(), axes()), rest.begin());
     std::ranges::fill(values_, 0.0);
@@ -195,17 +237,49 @@ class MotionController::Implementation {
   [[nodiscard]] int correction_delay() const noexcept { return filters_.correction_samples(); }
 
  private:
+  // Asked for by anybody, at_rest is said by the thread that steps, over by the one that pushes, none by the former.
+  enum class Flush : std::uint8_t { none, asked, at_rest, over, asked_anew };
+
+  [[nodiscard]] PushResult closed_to_pushes() const noexcept {
+    if (abort_.load(std::memory_order_relaxed)) return PushResult::aborted;
+    const Flush flush = flush_.load(std::memory_order_acquire);
+    return flush == Flush::none || flush == Flush::over ? PushResult::accepted : PushResult::flushing;
+  }
+
+  // A period at rest between flush() and flushed(): what is planned is not looked at.
+  Activity rest_on() noexcept {
+    ++state_.steps;
+    state_.segments_waiting = 0;
+    state_.activity = at_rest_now();
+    shared_.write(state_);
+    return state_.activity;
+  }
+  void begin_anew() noexcept {
+    first_ = new_first_;
+    runs_out_ = false;
+    std::ranges::fill(passed_, Passed{0.0, first_ + done_, rest_.line, true});
+    events_taken_.store(events_from_, std::memory_order_release);
+    waits_before_.store(0, std::memory_order_relaxed);
+    Flush over = Flush::over;
+    if (!flush_.compare_exchange_strong(over, Flush::none, std::memory_order_seq_cst)) flush_.store(Flush::asked);
+  }
+  [[nodiscard]] Activity at_rest_now() const noexcept {
+    if (abort_.load(std::memory_order_relaxed)) return Activity::aborted;
+    return hold_.load(std::memory_order_relaxed) ? Activity::held : Activity::idle;
+  }
+
   // At rest for so long what leaves the filters is at rest: the first period counts.
   [[nodiscard]] int settled_periods() const noexcept { return filters_.duration_samples() + 1; }
   [[nodiscard]] bool is_stopping() const noexcept {
     return hold_.load(std::memory_order_relaxed) || abort_.load(std::memory_order_relaxed) ||
-           override_.load(std::memory_order_relaxed) <= 0.0;
+           override_.load(std::memory_order_relaxed) <= 0.0 || flush_.load(std::memory_order_relaxed) == Flush::asked;
   }
 
   Activity activity_now(const Section& section) noexcept {
     const bool rests = planner_.sections().at_rest();
     const bool settled = rests && rest_periods_ == settled_periods();
     if (abort_.load(std::memory_order_relaxed)) return settled ? Activity::aborted : Activity::stopping;
+    if (flush_.load(std::memory_order_relaxed) == Flush::asked) return settled ? at_rest_now() : Activity::stopping;
     if (hold_.load(std::memory_order_relaxed)) return settled ? Activity::held : Activity::stopping;
     if (waits_at_stop(settled)) return Activity::held;
     const bool is_last = section.done == head_.load(std::memory_order_relaxed);
@@ -218,12 +292,14 @@ class MotionController::Implementation {
 
   // A stop that was pushed is over when it was reached and resumed.
   bool waits_at_stop(bool settled) noexcept {
-    const Event* const next = first_event();
+    const Event* next = first_event();
+    if (next != nullptr && next->waits && released_.load(std::memory_order_relaxed) > next->segment) {
+      drop_event();
+      next = first_event();
+    }
     const bool waits = next != nullptr && next->waits && settled && has_reached(next->segment);
     waits_before_.store(waits ? next->segment + 1 : 0, std::memory_order_relaxed);
-    if (!waits || released_.load(std::memory_order_relaxed) <= next->segment) return waits;
-    drop_event();
-    return false;
+    return waits;
   }
 
   struct Event {
@@ -295,6 +371,11 @@ class MotionController::Implementation {
   std::atomic<bool> hold_{false};
   std::atomic<bool> abort_{false};
   std::atomic<bool> settled_{true};
+  std::atomic<Flush> flush_{Flush::none};
+  std::atomic<bool> is_planning_{false};
+  PlannedPoint rest_;                              // of a flush, with what was done before it
+  std::uint64_t done_ = 0;                         // segments
+  std::uint64_t new_first_ = 0, events_from_ = 0;  // behind it
 
   // Of the real-time thread.
   std::uint64_t first_ = 0;
@@ -344,6 +425,9 @@ PushResult MotionController::push_event(const ControllerEvent& event) noexcept {
 }
 PushResult MotionController::push_dwell(double time_s) noexcept { return implementation_->push_dwell(time_s); }
 PushResult MotionController::push_stop() noexcept { return implementation_->push_event({}, true); }
+void MotionController::flush() noexcept { implementation_->flush(); }
+bool MotionController::flushed(std::span<double> position) noexcept { return implementation_->flushed(position); }
+void MotionController::probe(std::span<double> latched) noexcept { implementation_->probe(latched); }
 bool MotionController::next_event(ControllerEvent& event) noexcept { return implementation_->next_event(event); }
 void MotionController::abort() noexcept { implementation_->abort(); }
 bool MotionController::restart(std::span<const double> position) noexcept { return implementation_->restart(position); }
