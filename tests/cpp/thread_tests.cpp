@@ -3,6 +3,7 @@
 // is checked here is that no reader sees half a state.
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -49,13 +50,26 @@ void session_of(std::uint32_t session) {
   const ControllerSettings settings = settings_of(session);
   MotionController control(settings);
   std::mt19937 random(session);
-  const std::vector<Segment> segments = tests::random_segments(random, 120, 150.0, true);
+  const std::vector<Segment> segments = tests::random_segments(random, 24, 150.0, true);
   const std::array<double, 2> following{};
   const std::span<const double> followed(following.data(), settings.following.size());
   std::atomic<bool> ended{false};
+  std::atomic<bool> is_pushed{false};
   std::thread pusher([&] {
     std::mt19937 draw(session + 1000);
-    for (const Segment& segment : segments) {
+    std::uint32_t events = 0;
+    for (Segment segment : segments) {
+      std::array<double, max_controller_axes> rest{};
+      if (session % 3 == 0 && draw() % 5 == 0) {
+        control.flush();
+        control.resume();
+        control.feed_override(1.0);
+        while (!control.flushed(std::span(rest).first(static_cast<std::size_t>(control.axes()))) &&
+               !ended.load(std::memory_order_relaxed)) {
+          std::this_thread::yield();
+        }
+        segment = make_line({rest[0], rest[1], rest[2]}, segment.end_mm, 100.0);
+      }
       PushResult result = control.push(segment, followed);
       while (result == PushResult::queue_full && !ended.load(std::memory_order_relaxed)) {
         std::this_thread::yield();
@@ -64,9 +78,13 @@ void session_of(std::uint32_t session) {
       const auto what = draw() % 100;
       if (what < 20) control.feed_override(0.02 * static_cast<double>(draw() % 101));
       if (what == 20) control.hold();
+      if (what > 70) control.push_event({events++, 0});
+      if (what == 70) control.push_dwell(0.01);
+      if (what == 69) control.push_stop();
       control.resume();
     }
     control.feed_override(2.0);
+    is_pushed.store(true, std::memory_order_release);
   });
   std::thread planner([&] {
     while (!settings.plans_in_step && !ended.load(std::memory_order_relaxed)) {
@@ -86,10 +104,19 @@ void session_of(std::uint32_t session) {
   });
   std::array<double, max_controller_axes> point{};
   std::size_t steps = 0;
-  while (steps < max_steps && control.state().segments_done < segments.size()) {
-    control.step({point.data(), static_cast<std::size_t>(control.axes())});
-    ++steps;
-    if (!settings.plans_in_step) std::this_thread::yield();
+  std::int64_t last_event = -1;
+  for (bool runs = true; steps < max_steps && runs; ++steps) {
+    const bool all = is_pushed.load(std::memory_order_acquire);
+    if (all) control.resume();
+    const Activity activity = control.step({point.data(), static_cast<std::size_t>(control.axes())});
+    runs = !all || activity != Activity::idle || control.state().segments_waiting > 0;
+    ControllerEvent event;
+    while (control.next_event(event)) {
+      check(event.id > last_event, "an event came twice, or late", session);
+      last_event = event.id;
+    }
+    // Not so fast that every plan comes too late.
+    if (!settings.plans_in_step) std::this_thread::sleep_for(std::chrono::microseconds(50));
   }
   check(steps < max_steps, "the path did not end", session);
   ended.store(true, std::memory_order_relaxed);
