@@ -180,12 +180,13 @@ std::uint64_t OnlinePlanner::look_ahead(const PathPoint& from, std::uint64_t pus
   return end;
 }
 
-bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double ratio) {
+// The place from which the next section starts, if there is a way to go from it.
+std::optional<PathPoint> OnlinePlanner::next_start(std::uint64_t pushed) noexcept {
   PathPoint from = last_->at(static_cast<std::ptrdiff_t>(start_)).point;
   const bool rests = from.state.speed <= 0.0;
-  if (from.segment >= pushed) return false;
+  if (from.segment >= pushed) return std::nullopt;
   if (from.offset >= (*ring_)[from.segment].segment.length_mm - at_end_mm) {
-    if (from.segment + 1 >= pushed) return false;
+    if (from.segment + 1 >= pushed) return std::nullopt;
     from.offset = std::max(0.0, from.offset - (*ring_)[from.segment].segment.length_mm);
     PlannedSegment& next = (*ring_)[++from.segment];
     // There was nothing behind it, or a stop.
@@ -194,7 +195,15 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double 
       from.offset = 0.0;
     }
   }
-  if (rests && waits_at(from)) return false;
+  if (rests && waits_at(from)) return std::nullopt;
+  return from;
+}
+
+bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double ratio) {
+  const std::optional<PathPoint> start = next_start(pushed);
+  if (!start) return false;
+  const PathPoint& from = *start;
+  const bool rests = from.state.speed <= 0.0;
   const PlannedSegment& here = (*ring_)[from.segment];
   if (rests) {
     const bool is_settled = settled_ && periods_ahead() <= 0;

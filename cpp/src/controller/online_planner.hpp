@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "controller/sections.hpp"
 #include "planner/path_motion.hpp"
@@ -47,6 +48,7 @@ class OnlinePlanner {
   [[nodiscard]] bool waits_at(const PathPoint& point) const noexcept;
   [[nodiscard]] bool wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept;
   std::uint64_t look_ahead(const PathPoint& from, std::uint64_t pushed, double ratio) noexcept;
+  std::optional<PathPoint> next_start(std::uint64_t pushed) noexcept;
   bool next_section(Section& section, std::uint64_t pushed, double ratio);
   bool keeps_ahead(Section& section, PathMotion motion) noexcept;
   bool fill(Section& section, double max_speed, int& settle) noexcept;
