@@ -319,7 +319,7 @@ Returns:
     `accepted`, `queue_full` (as many may wait as segments), `aborted`.)")
       .def(
           "push_dwell", [](PyController& self, double time_s) { return self.control().push_dwell(time_s); },
-          py::arg("time_s"), R"(Rest behind the segment that was pushed last. A hold in it begins it anew.
+          py::arg("time_s"), R"(Rest behind the segment that was pushed last. A hold in it restarts it.
 
 Args:
     time_s: For so long the set-points rest, 0 to 1e6.

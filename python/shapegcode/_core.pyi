@@ -1303,7 +1303,7 @@ class MotionController:
         """
     def push_dwell(self, time_s: typing.SupportsFloat | typing.SupportsIndex) -> PushResult:
         """
-        Rest behind the segment that was pushed last. A hold in it begins it anew.
+        Rest behind the segment that was pushed last. A hold in it restarts it.
         
         Args:
             time_s: For so long the set-points rest, 0 to 1e6.

@@ -12,6 +12,7 @@
 
 #include <doctest/doctest.h>
 
+#include "limited_settings.hpp"
 #include "random_motion.hpp"
 #include "shapegcode/controller.hpp"
 #include "shapegcode/error.hpp"
@@ -23,18 +24,6 @@ using namespace shapegcode::tests;
 namespace {
 
 constexpr double period_s = 0.001;
-constexpr double max_speed = 200.0;
-constexpr double most_acceleration = 1000.0;
-constexpr double most_jerk = 50000.0;
-
-ControllerSettings limited() {
-  ControllerSettings settings;
-  settings.limits.law = AccelerationLaw::jerk_limited;
-  settings.limits.max_feed_mm_per_s.setConstant(max_speed);
-  settings.limits.max_acceleration_mm_per_s2.setConstant(most_acceleration);
-  settings.limits.max_jerk_mm_per_s3.setConstant(most_jerk);
-  return settings;
-}
 
 struct Run {
   std::vector<Vector3> set_points;
@@ -81,8 +70,8 @@ TEST_CASE("a path that is pushed at once is run as a whole path is planned: a sh
       const Run online = run_until_idle(control);
       TrajectoryLimits limits;
       limits.max_feed_mm_per_s.setConstant(max_speed);
-      limits.max_acceleration_mm_per_s2.setConstant(most_acceleration);
-      limits.max_jerk_mm_per_s3.setConstant(most_jerk);
+      limits.max_acceleration_mm_per_s2.setConstant(max_acceleration);
+      limits.max_jerk_mm_per_s3.setConstant(max_jerk);
       limits.contour_tolerance_mm = settings.contour_tolerance_mm;
       const Samples offline = time_optimal_trajectory(Path(segments), limits, period_s);
       const auto count = static_cast<std::size_t>(offline.positions_mm.rows()) - 1;  // the first one is the start
@@ -135,8 +124,8 @@ TEST_CASE("limits are kept at every set-point, whatever the operator does") {
     }
     CHECK((point == segments.back().end_mm));
     CHECK(differences.speed() <= 1.001 * max_speed);
-    CHECK(differences.acceleration() <= 1.001 * most_acceleration);
-    CHECK(differences.jerk() <= 1.001 * most_jerk + 100.0);  // a coordinate of 100 mm is rounded to 1.4e-14
+    CHECK(differences.acceleration() <= 1.001 * max_acceleration);
+    CHECK(differences.jerk() <= 1.001 * max_jerk + 100.0);  // a coordinate of 100 mm is rounded to 1.4e-14
   }
 }
 
@@ -223,7 +212,7 @@ TEST_CASE("what cannot be run is refused, and says why") {
     differences.add(values_of(point));
   }
   CHECK(activity == Activity::aborted);
-  CHECK(differences.acceleration() <= 1.001 * most_acceleration);
+  CHECK(differences.acceleration() <= 1.001 * max_acceleration);
   CHECK(control.push(make_line({4, 0, 0}, {5, 0, 0}, 10.0)) == PushResult::aborted);
   CHECK(control.step(values_of(point)) == Activity::aborted);
   for (const double value : {std::nan(""), MotionLimits::none}) {
@@ -275,8 +264,8 @@ TEST_CASE("limits hold for any later override, whatever the control begins with"
           differences.add(values_of(point));
         }
         CHECK(differences.speed() <= 1.001 * max_speed);
-        CHECK(differences.acceleration() <= 1.001 * most_acceleration);
-        CHECK(differences.jerk() <= 1.001 * most_jerk);
+        CHECK(differences.acceleration() <= 1.001 * max_acceleration);
+        CHECK(differences.jerk() <= 1.001 * max_jerk);
       }
     }
   }
@@ -326,7 +315,7 @@ TEST_CASE("axes that follow end where they are told to, within their limits") {
   CHECK(point[1] == doctest::Approx(40.0));
   CHECK(point[3] == doctest::Approx(70.0));
   CHECK(point[4] == doctest::Approx(2.0));
-  CHECK(differences.jerk() <= 1.001 * most_jerk);
+  CHECK(differences.jerk() <= 1.001 * max_jerk);
   CHECK(turning.speed() <= 1.001 * 30.0);
   CHECK(turning.acceleration() <= 1.001 * 100.0);
   CHECK(turning.jerk() <= 1.001 * 5000.0);

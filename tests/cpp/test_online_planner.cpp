@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include "limited_settings.hpp"
 #include "random_motion.hpp"
 #include "shapegcode/controller.hpp"
 
@@ -17,17 +18,11 @@ using namespace shapegcode::tests;
 namespace {
 
 constexpr double period_s = 0.001;
-constexpr double max_acceleration = 1000.0;
-constexpr double max_jerk = 50000.0;
 // Periods of the longest section.
 constexpr int longest_section = 32;
 
-ControllerSettings limited(std::size_t window) {
-  ControllerSettings settings;
-  settings.limits.law = AccelerationLaw::jerk_limited;
-  settings.limits.max_feed_mm_per_s.setConstant(200.0);
-  settings.limits.max_acceleration_mm_per_s2.setConstant(max_acceleration);
-  settings.limits.max_jerk_mm_per_s3.setConstant(max_jerk);
+ControllerSettings limited_to(std::size_t window) {
+  ControllerSettings settings = limited();
   settings.window = window;
   settings.queue = 2 * window;
   return settings;
@@ -82,7 +77,7 @@ class Watched {
 TEST_CASE("a new override acts behind the section that is being run") {
   for (const std::size_t window : {32, 1024}) {
     CAPTURE(window);
-    Watched watched(limited(window), circle(40'000, 0.2, 60.0));
+    Watched watched(limited_to(window), circle(40'000, 0.2, 60.0));
     watched.steps(1500);
     CHECK(watched.speed() == doctest::Approx(60.0).epsilon(1e-3));
     watched.control.feed_override(0.5);
@@ -108,7 +103,7 @@ TEST_CASE("a new override acts behind the section that is being run") {
 TEST_CASE("a hold brakes behind the section that is being run, and the motion goes on from there") {
   for (int when = 100; when < 1500; when += 61) {
     CAPTURE(when);
-    Watched watched(limited(64), circle(1000, 0.2, 100.0));
+    Watched watched(limited_to(64), circle(1000, 0.2, 100.0));
     watched.steps(when);
     watched.control.hold();
     const double before = watched.speed();
@@ -126,7 +121,7 @@ TEST_CASE("a hold brakes behind the section that is being run, and the motion go
 }
 
 TEST_CASE("an override that is turned without rest keeps no motion from its end") {
-  Watched watched(limited(64), circle(1000, 0.2, 100.0));
+  Watched watched(limited_to(64), circle(1000, 0.2, 100.0));
   int step = 0;
   Activity activity = Activity::moving;
   for (; activity != Activity::idle && step < 20'000; ++step) {
@@ -139,7 +134,7 @@ TEST_CASE("an override that is turned without rest keeps no motion from its end"
 }
 
 TEST_CASE("where plan() comes too late the motion stops within the limits, counts it, and goes on") {
-  ControllerSettings settings = limited(64);
+  ControllerSettings settings = limited_to(64);
   settings.plans_in_step = false;
   settings.lead_periods = 20;
   Watched watched(settings, circle(600, 0.2, 100.0));
@@ -164,7 +159,7 @@ TEST_CASE("where plan() comes too late the motion stops within the limits, count
 TEST_CASE("planned ahead by another caller it is the same motion, and nothing is late") {
   std::vector<std::vector<Vector3>> runs;
   for (const bool in_step : {true, false}) {
-    ControllerSettings settings = limited(128);
+    ControllerSettings settings = limited_to(128);
     settings.queue = 1024;
     settings.plans_in_step = in_step;
     Watched watched(settings, circle(400, 0.2, 100.0));
@@ -189,7 +184,7 @@ TEST_CASE("the path is left by no more than the tolerance") {
   for (unsigned seed = 0; seed < 12; ++seed) {
     CAPTURE(seed);
     std::mt19937 random(seed);
-    ControllerSettings settings = limited(16);
+    ControllerSettings settings = limited_to(16);
     settings.contour_tolerance_mm = 0.02;
     const std::vector<Segment> segments = random_segments(random, 30, 150.0, seed % 2 == 0);
     Watched watched(settings, segments);
@@ -217,7 +212,7 @@ TEST_CASE("the same pushes at the same periods give the same bits") {
     for (int pass = 0; pass < 2; ++pass) {
       std::mt19937 random(seed);
       std::uniform_real_distribution<double> uniform(0.0, 1.0);
-      MotionController control(limited(16 + 8 * seed));
+      MotionController control(limited_to(16 + 8 * seed));
       const std::vector<Segment> segments = random_segments(random, 60, 200.0, true);
       std::size_t pushed = 0;
       std::size_t different = 0;

@@ -85,7 +85,7 @@ class Browser:
         return self.driver.find_element("css selector", selector)
 
     def click_line(self, program: str, line: int) -> None:
-        """On a line of a program's text, whose rows are built anew in a later frame where the text was scrolled."""
+        """On a line of a program's text, whose rows are built again in a later frame where the text was scrolled."""
 
         def clicked(_: webdriver.Chrome) -> bool:
             self.one(f"[data-program={program}] [data-line='{line}']").click()

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 import shapegcode as sg
+from planned_steps import planned_steps
 
 Rows = npt.NDArray[np.float64]
 
@@ -455,12 +456,7 @@ def test_a_programmed_stop_waits_for_the_operator(lead: int | None) -> None:
     made = control(lead_periods=lead, shaper=sg.Fir([0, 11], [0.5, 0.5]))
 
     def step(periods: int) -> Rows:
-        rows = []
-        for _ in range(periods):
-            if lead is not None:
-                made.plan()
-            rows.append(made.step())
-        return np.concatenate(rows)
+        return planned_steps(made, periods, plans=lead is not None)
 
     made.push_line([10, 0, 0], FEED)
     assert made.push_stop() == sg.PushResult.accepted

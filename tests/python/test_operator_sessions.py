@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 import shapegcode as sg
+from planned_steps import planned_steps
 
 Rows = npt.NDArray[np.float64]
 
@@ -68,9 +69,7 @@ class Session:
         self.latched: Rows | None = None
 
     def step(self) -> None:
-        if self.lead is not None:
-            self.made.plan()
-        self.rows.append(self.made.step())
+        self.rows.append(planned_steps(self.made, 1, plans=self.lead is not None))
         for event in self.made.take_events():
             self.reached.append((event.id, event.step))
 
@@ -178,12 +177,7 @@ def test_a_probe_stops_the_motion_on_its_path(filters: dict[str, Any], lead: int
     made = control(lead_periods=lead, **filters)
 
     def step(periods: int) -> Rows:
-        rows = []
-        for _ in range(periods):
-            if lead is not None:
-                made.plan()
-            rows.append(made.step())
-        return np.concatenate(rows)
+        return planned_steps(made, periods, plans=lead is not None)
 
     made.push_line([100, 0, 0], 100.0)
     made.push_event(1)

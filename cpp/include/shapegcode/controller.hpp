@@ -152,7 +152,7 @@ class MotionController {
   /// An event behind the segment that was pushed last, from the planning thread, as a push. As many may wait as
   /// segments.
   PushResult push_event(const ControllerEvent& event) noexcept;
-  /// Likewise a dwell: what leaves the control rests there for so long. A hold in it begins it anew.
+  /// Likewise a dwell: what leaves the control rests there for so long. A hold in it restarts it.
   PushResult push_dwell(double time_s) noexcept;
   /// Likewise a programmed stop (M00): at rest there the control is held until resume().
   PushResult push_stop() noexcept;

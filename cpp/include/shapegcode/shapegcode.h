@@ -190,7 +190,7 @@ shapegcode_status shapegcode_controller_push_arc(shapegcode_controller* controll
 /// An event behind the segment that was pushed last, from the planning thread; as many may wait as segments.
 shapegcode_status shapegcode_controller_push_event(shapegcode_controller* controller, uint32_t id, uint64_t word);
 
-/// Likewise a dwell: what leaves the control rests there for so long. A hold in it begins it anew.
+/// Likewise a dwell: what leaves the control rests there for so long. A hold in it restarts it.
 shapegcode_status shapegcode_controller_push_dwell(shapegcode_controller* controller, double time_s);
 
 /// Likewise a programmed stop (M00): at rest there the control is held until resume.

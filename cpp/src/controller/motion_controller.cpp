@@ -131,14 +131,14 @@ class MotionController::Implementation {
   Activity step() noexcept {
     const Flush flush = flush_.load(std::memory_order_acquire);
     if (flush == Flush::at_rest) return rest_on();
-    if (flush == Flush::over || flush == Flush::asked_anew) begin_anew();
+    if (flush == Flush::over || flush == Flush::asked_again) go_on();
     Sections& sections = planner_.sections();
     if (plans_in_step_ && sections.wants_more()) plan();
     const PlannedPoint& point = sections.step(is_stopping());
     if (sections.was_late()) ++state_.late_plans;
     const bool rests = sections.at_rest();
     rest_periods_ = rests ? std::min(rest_periods_ + 1, settled_periods()) : 0;
-    settled_.store(rest_periods_ == settled_periods(), std::memory_order_relaxed);
+    settled_.store(is_settled(), std::memory_order_relaxed);
     const std::size_t n = axes();
     const auto value = [this, n](std::size_t order) {
       return values_.begin() + static_cast<std::ptrdiff_t>(order * n);
@@ -157,7 +157,7 @@ class MotionController::Implementation {
       std::copy_n(point.position.begin(), n, value(0));
     }
     publish(activity, point);
-    if (rest_periods_ == settled_periods() && flush_.load(std::memory_order_relaxed) == Flush::asked) {
+    if (is_settled() && flush_.load(std::memory_order_relaxed) == Flush::asked) {
       rest_ = point;
       done_ = sections.current().done - first_;
       flush_.store(Flush::at_rest, std::memory_order_release);
@@ -183,7 +183,7 @@ class MotionController::Implementation {
   void flush() noexcept {
     Flush now = flush_.load(std::memory_order_relaxed);
     while (now == Flush::none || now == Flush::over) {
-      const Flush next = now == Flush::none ? Flush::asked : Flush::asked_anew;
+      const Flush next = now == Flush::none ? Flush::asked : Flush::asked_again;
       if (flush_.compare_exchange_weak(now, next, std::memory_order_seq_cst)) return;
     }
   }
@@ -194,12 +194,8 @@ class MotionController::Implementation {
   bool flushed(std::span<double> position) noexcept {
     if (flush_.load(std::memory_order_seq_cst) != Flush::at_rest) return false;
     if (is_planning_.load(std::memory_order_seq_cst)) return false;
-    const std::uint64_t head = head_.load(std::memory_order_relaxed);
-    intake_.restart({rest_.position.data(), axes()});
-    planner_.restart(head, rest_.position);
-    new_first_ = head - done_;
+    new_head_ = push_from(rest_.position);
     events_from_ = events_pushed_.load(std::memory_order_relaxed);
-    rests_at_.store(head, std::memory_order_relaxed);
     std::copy_n(rest_.position.begin(), std::min(position.size(), axes()), position.begin());
     flush_.store(Flush::over, std::memory_order_seq_cst);
     return true;
@@ -207,7 +203,6 @@ class MotionController::Implementation {
 
   bool restart(std::span<const double> position) noexcept {
     if (!std::ranges::all_of(position, [](double value) { return std::isfinite(value); })) return false;
-    const std::uint64_t head = head_.load(std::memory_order_relaxed);
     hold_.store(false, std::memory_order_relaxed);
     abort_.store(false, std::memory_order_relaxed);
     flush_.store(Flush::none, std::memory_order_relaxed);
@@ -215,18 +210,13 @@ class MotionController::Implementation {
     std::copy_n(position.begin(), std::min(position.size(), axes()), rest.begin());
     std::ranges::fill(values_, 0.0);
     std::copy_n(rest.begin(), axes(), values_.begin());
-    intake_.restart(values(0));
-    planner_.restart(head, rest);
+    const std::uint64_t head = push_from(rest);
     filters_.reset(values(0));
-    std::ranges::fill(passed_, Passed{0.0, head, 0, true});
-    events_taken_.store(events_pushed_.load(std::memory_order_relaxed), std::memory_order_release);
-    rests_at_.store(head, std::memory_order_relaxed);
-    waits_before_.store(0, std::memory_order_relaxed);
+    step_from(head, 0, events_pushed_.load(std::memory_order_relaxed));
     rest_periods_ = settled_periods();
     settled_.store(true, std::memory_order_relaxed);
     state_ = {};
     first_ = head;
-    runs_out_ = false;
     publish(Activity::idle, planner_.sections().current().before[0]);
     return true;
   }
@@ -238,7 +228,7 @@ class MotionController::Implementation {
 
  private:
   // Asked for by anybody, at_rest is said by the thread that steps, over by the one that pushes, none by the former.
-  enum class Flush : std::uint8_t { none, asked, at_rest, over, asked_anew };
+  enum class Flush : std::uint8_t { none, asked, at_rest, over, asked_again };
 
   [[nodiscard]] PushResult closed_to_pushes() const noexcept {
     if (abort_.load(std::memory_order_relaxed)) return PushResult::aborted;
@@ -250,37 +240,54 @@ class MotionController::Implementation {
   Activity rest_on() noexcept {
     ++state_.steps;
     state_.segments_waiting = 0;
-    state_.activity = at_rest_now();
+    state_.activity = rest_of(abort_.load(std::memory_order_relaxed), hold_.load(std::memory_order_relaxed));
     shared_.write(state_);
     return state_.activity;
   }
-  void begin_anew() noexcept {
-    first_ = new_first_;
-    runs_out_ = false;
-    std::ranges::fill(passed_, Passed{0.0, first_ + done_, rest_.line, true});
-    events_taken_.store(events_from_, std::memory_order_release);
-    waits_before_.store(0, std::memory_order_relaxed);
+  void go_on() noexcept {
+    first_ = new_head_ - done_;
+    step_from(new_head_, rest_.line, events_from_);
     Flush over = Flush::over;
     if (!flush_.compare_exchange_strong(over, Flush::none, std::memory_order_seq_cst)) flush_.store(Flush::asked);
   }
-  [[nodiscard]] Activity at_rest_now() const noexcept {
-    if (abort_.load(std::memory_order_relaxed)) return Activity::aborted;
-    return hold_.load(std::memory_order_relaxed) ? Activity::held : Activity::idle;
+  // Segments follow from a position, the first of them with the number that is returned. Nobody plans or looks at
+  // sections.
+  std::uint64_t push_from(const AxisValues& rest) noexcept {
+    const std::uint64_t head = head_.load(std::memory_order_relaxed);
+    intake_.restart({rest.data(), axes()});
+    planner_.restart(head, rest);
+    rests_at_.store(head, std::memory_order_relaxed);
+    return head;
+  }
+  // At rest before a segment; events before `events` are dropped.
+  void step_from(std::uint64_t segment, std::uint32_t line, std::uint64_t events) noexcept {
+    runs_out_ = false;
+    std::ranges::fill(passed_, Passed{0.0, segment, line, true});
+    events_taken_.store(events, std::memory_order_release);
+    waits_before_.store(0, std::memory_order_relaxed);
+  }
+
+  [[nodiscard]] static Activity rest_of(bool aborts, bool holds) noexcept {
+    if (aborts) return Activity::aborted;
+    return holds ? Activity::held : Activity::idle;
   }
 
   // At rest for so long what leaves the filters is at rest: the first period counts.
   [[nodiscard]] int settled_periods() const noexcept { return filters_.duration_samples() + 1; }
+  [[nodiscard]] bool is_settled() const noexcept { return rest_periods_ == settled_periods(); }
   [[nodiscard]] bool is_stopping() const noexcept {
     return hold_.load(std::memory_order_relaxed) || abort_.load(std::memory_order_relaxed) ||
            override_.load(std::memory_order_relaxed) <= 0.0 || flush_.load(std::memory_order_relaxed) == Flush::asked;
   }
 
   Activity activity_now(const Section& section) noexcept {
-    const bool rests = planner_.sections().at_rest();
-    const bool settled = rests && rest_periods_ == settled_periods();
-    if (abort_.load(std::memory_order_relaxed)) return settled ? Activity::aborted : Activity::stopping;
-    if (flush_.load(std::memory_order_relaxed) == Flush::asked) return settled ? at_rest_now() : Activity::stopping;
-    if (hold_.load(std::memory_order_relaxed)) return settled ? Activity::held : Activity::stopping;
+    const bool settled = is_settled();
+    // Each once: another thread may change them meanwhile.
+    const bool aborts = abort_.load(std::memory_order_relaxed);
+    const bool holds = hold_.load(std::memory_order_relaxed);
+    if (aborts || holds || flush_.load(std::memory_order_relaxed) == Flush::asked) {
+      return settled ? rest_of(aborts, holds) : Activity::stopping;
+    }
     if (waits_at_stop(settled)) return Activity::held;
     const bool is_last = section.done == head_.load(std::memory_order_relaxed);
     const bool runs_out = section.runs_out && is_last && section.done != rests_at_.load(std::memory_order_relaxed);
@@ -354,9 +361,9 @@ class MotionController::Implementation {
     shared_.write(state_);
   }
 
-  // For segments that are done with, but whose roundings may reach what follows.
   static constexpr double longest_dwell_s = 1e6;
   static constexpr double dwell_rounding = 1e-12;
+  // For segments that are done with, but whose roundings may reach what follows.
   static constexpr std::size_t room_behind = RoundedPath::lookback + 1;
 
   std::size_t n_following_;
@@ -373,9 +380,10 @@ class MotionController::Implementation {
   std::atomic<bool> settled_{true};
   std::atomic<Flush> flush_{Flush::none};
   std::atomic<bool> is_planning_{false};
-  PlannedPoint rest_;                              // of a flush, with what was done before it
-  std::uint64_t done_ = 0;                         // segments
-  std::uint64_t new_first_ = 0, events_from_ = 0;  // behind it
+  // Of a flush: where it rests, segments done before it, and what comes behind it.
+  PlannedPoint rest_;
+  std::uint64_t done_ = 0;
+  std::uint64_t new_head_ = 0, events_from_ = 0;
 
   // Of the real-time thread.
   std::uint64_t first_ = 0;

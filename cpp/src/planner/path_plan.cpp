@@ -101,7 +101,7 @@ bool is_same(const ControllableSet& one, const ControllableSet& other) noexcept 
 
 }  // namespace
 
-// Of an exact round, those that depend on tangents that were laid anew; of the slow one, those that differ from the
+// Of an exact round, those that depend on tangents that were laid again; of the slow one, those that differ from the
 // sets that approach valleys.
 void PathPlan::make_sets(Round round) noexcept {
   const bool is_slow = round == Round::slow;

@@ -118,7 +118,7 @@ def _read(program: Program | str | Path, machine: Machine) -> tuple[Program, boo
 def _emission_lines(machine: Machine, radii_mm: dict[int, float]) -> list[str]:
     """The lines that `convert` writes around shaped cuts for this machine, as the core compares them."""
     emission = machine.emission
-    locks = (*emission.locking, *emission.unlocking) if emission.override == "lock" else ()
+    locks = (*emission.locking, *emission.unlocking)
     lines = [*emission.prologue, *emission.epilogue, *locks, *emission.prefill_lines, *guard_lines(radii_mm, machine)]
     return ["".join(re.sub(r"\([^)]*\)", "", line).split()) for line in lines]
 

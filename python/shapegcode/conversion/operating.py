@@ -191,7 +191,7 @@ def _restarts(
         yield _restart_lines(emitted, placed)
     count = sum(len(each.marks) for each in restarts)
     if count:
-        before = [line for line in (*emission.prologue, *(emission.locking if emission.override == "lock" else ()))]
+        before = (*emission.prologue, *emission.locking)
         shakes_um = max(mark.vibration_um for each in restarts for mark in each.marks)
         switched = f", by MDI {' '.join(before)}" if before else ""
         yield (

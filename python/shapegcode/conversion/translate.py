@@ -20,7 +20,7 @@ from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.result import Conversion, DialectNotes
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
-from shapegcode.machine.dialects import Dialect, code_name, dialect_of, fanuc_meaning
+from shapegcode.machine.dialects import CODE, Dialect, code_name, dialect_of, fanuc_meaning
 from shapegcode.program import Program, located_error
 from shapegcode.program.stamp import plain_comment, text_mark
 
@@ -41,7 +41,6 @@ _CYCLES = {"G73", "G81", "G82", "G83", "G85"}
 _GROUPS = ({"G20", "G21"}, {"G93", "G94", "G95"}, {"G61", "G64"}, {f"G{code}" for code in range(54, 60)})
 _WITH_AXES = {"G10", "G27", "G28", "G29", "G30", "G31", "G52", "G53", "G92"}
 _COORDINATE = re.compile(rf"(?<![A-Z])([XYZ])({_NUMBER})")
-_CODE = re.compile(r"[GM]\d+(\.\d)?")
 _MARK_LINE = re.compile(r"\(TEXT [0-9A-F]{8}\)")
 
 
@@ -208,7 +207,7 @@ class _Translator:
         if state.percents > 1 or (state.ended_at and line.lstrip()[:1] not in ("%", "(", "")):
             return self._left_out(number)
         if (place := _PLACE.fullmatch(line)) is not None:
-            first, *rest = getattr(self._machine.emission, _EMISSION[place[2]])
+            first, *rest = self._machine.emission.around_cuts[place[2]]
             return [(place[1] or "") + first, *rest] if not self._dialect.one_code else [first, *rest]
         compact = line.replace(" ", "")
         if state.is_open and (move := _MOVE.fullmatch(compact)) is not None and "K" not in line:
@@ -342,7 +341,7 @@ class _Translator:
     def _taken(self, codes: Sequence[str]) -> bool:
         """Whether what takes the place of a code like G28 takes that of its axes too."""
         own = [self._own[code] for code in codes if code in self._own and code in _WITH_AXES]
-        return any(not _CODE.fullmatch(text) for text in own)
+        return any(not CODE.fullmatch(text) for text in own)
 
     def _note(self, code: str) -> None:
         """Keep what a code puts into force."""
@@ -419,7 +418,7 @@ class _Translator:
         return self._seconds(number, self._dwells[number], self._dialect.dwell)
 
     def _cycle_dwell(self, number: int, value: str, codes: Sequence[str]) -> str:
-        if not {"G82"} & {*codes}:
+        if "G82" not in codes:
             raise self._error(number, f"P{value}: only in a block with G82 is it known what it means there")
         return self._seconds(number, int(value) * 1e-3, self._dialect.dwell.partition("G04")[2])
 
@@ -546,7 +545,6 @@ class _Translator:
 
 _BEHIND_THE_MOVE = {"M00", "M01", "M02", "M05", "M09", "M30"}
 _CURE = ": take it out of the program, or say what it becomes there (emission.words)"
-_EMISSION = {"PROLOGUE": "prologue", "EPILOGUE": "epilogue", "LOCK": "locking", "UNLOCK": "unlocking"}
 
 
 def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:

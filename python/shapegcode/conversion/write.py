@@ -433,9 +433,7 @@ def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, 
 
 def _own(emission: Emission, kind: str) -> tuple[str, ...]:
     """Lines of the machine file around a cut; in another dialect a mark of their place, which `translate` fills."""
-    lines = {"PROLOGUE": emission.prologue, "EPILOGUE": emission.epilogue}.get(kind)
-    if lines is None:
-        lines = () if emission.override != "lock" else emission.locking if kind == "LOCK" else emission.unlocking
+    lines = emission.around_cuts[kind]
     return lines if emission.dialect == "fanuc" or not lines else (f"(EMISSION {kind})",)
 
 

@@ -20,7 +20,7 @@ from shapegcode._core import Mode
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine.axes import Axes
 from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Times
-from shapegcode.machine.dialects import code_name, dialect_of, fanuc_meaning
+from shapegcode.machine.dialects import CODE, code_name, dialect_of, fanuc_meaning
 from shapegcode.machine.programs import Emission, Input, Price, Shaping, Tolerance, Verdict
 from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml, values_of
 from shapegcode.settings.load import (
@@ -45,7 +45,6 @@ from shapegcode.settings.remarks import (
 
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
 _VARIABLE = re.compile(r"#\d+")
-_CODE = re.compile(r"[GM]\d+(?:\.\d)?")
 _USUAL_DIAL_PERCENT = (70.0, 120.0)  # as far as operators turn it without thinking
 
 
@@ -100,11 +99,14 @@ class Machine(TomlTable):
                 f"{own.facts['least block'].text}",
             )
         emission = self.emission
-        written = {"prologue": emission.prologue, "epilogue": emission.epilogue}
-        if emission.override == "lock":
-            written |= {"lock_lines": emission.locking, "unlock_lines": emission.unlocking}
+        written = {
+            "prologue": emission.prologue,
+            "epilogue": emission.epilogue,
+            "lock_lines": emission.locking,
+            "unlock_lines": emission.unlocking,
+        }
         for name, lines in written.items():
-            for code in map(code_name, _CODE.findall(" ".join(lines))):
+            for code in map(code_name, CODE.findall(" ".join(lines))):
                 if own is not None and code in own.means:
                     raise KeyProblem(
                         f"emission.{name}",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
@@ -282,15 +283,27 @@ class Emission(TomlTable):
 
     @property
     def locking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override off: `lock_lines`, or the dialect's own where they are FANUC's."""
+        """Lines that switch the feed override off: `lock_lines`, or the dialect's own where they are FANUC's.
+
+        None where it is not locked.
+        """
+        if self.override != "lock":
+            return ()
         own = dialect_of(self.dialect)
         return self.lock_lines if own is None or self.lock_lines != _FANUC_LOCK[0] else own.lock[0]
 
     @property
     def unlocking(self) -> tuple[str, ...]:
         """Lines that switch it on again, likewise."""
+        if self.override != "lock":
+            return ()
         own = dialect_of(self.dialect)
         return self.unlock_lines if own is None or self.unlock_lines != _FANUC_LOCK[1] else own.lock[1]
+
+    @property
+    def around_cuts(self) -> Mapping[str, tuple[str, ...]]:
+        """Lines before and behind a shaped cut, by what they are for."""
+        return {"PROLOGUE": self.prologue, "EPILOGUE": self.epilogue, "LOCK": self.locking, "UNLOCK": self.unlocking}
 
     @property
     def position_decimals(self) -> int | None:
