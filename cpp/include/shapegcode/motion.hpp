@@ -19,6 +19,14 @@ enum class AccelerationLaw : std::uint8_t {
   jerk_limited,   ///< the acceleration of the axes, smoothed by the jerk time
 };
 
+/// What a programmed feed counts in, and what changes it.
+enum class FeedRate : std::uint8_t {
+  per_time,        ///< per s; the feed override
+  rapid,           ///< per s; the rapid override
+  per_revolution,  ///< per revolution of the spindle; the feed override
+  synchronous,     ///< likewise, bound to the angle of the spindle from rest to rest; no override
+};
+
 /// What look-ahead keeps. Infinity switches a limit off.
 struct MotionLimits {
   static constexpr double none = std::numeric_limits<double>::infinity();
