@@ -1,0 +1,114 @@
+#include "job.hpp"
+
+#include "shapegcode/error.hpp"
+#include "shapegcode/program.hpp"
+
+using namespace shapegcode;
+
+namespace {
+
+/// Appends what the reader found, in the order in which the machine does it.
+class JobWriter {
+ public:
+  JobWriter(Job& job, const Machine& machine, const Vector3& start) : job_(job), machine_(machine), home_(start) {
+    job_.end_mm = start;
+  }
+
+  void add_region(const Region& region) {
+    if (region.incremental) {
+      throw Error(ErrorKind::program, "an axis moves whose position is not known", region.first_line);
+    }
+    for (Segment segment : region.path->segments()) add_segment(segment);
+    if (region.exact_stop_at_end) last_segment_stops();
+  }
+
+  void add_move(const OtherMove& move) {
+    if (move.dwell_s > 0.0) {
+      job_.items.emplace_back(Dwell{move.dwell_s});
+    } else if (move.segment.length_mm > 0.0) {
+      add_segment(move.segment);
+    }
+  }
+
+  /// M, S and T words of a block. False: the program ends here.
+  bool add_function(const MachineFunction& function, std::uint32_t line) {
+    Vector3 to = job_.end_mm;  // G28: the axes go to the reference point
+    for (int axis = 0; axis < axis_count; ++axis) {
+      if (function.unknown_move[static_cast<std::size_t>(axis)]) to[axis] = home_[axis];
+    }
+    go_to(to, line);
+    for (int k = 0; k < function.m_count; ++k) {
+      const auto m = static_cast<std::uint32_t>(function.m_codes[static_cast<std::size_t>(k)]);
+      if (m == 2 || m == 30) return false;
+      const double speed = std::max(function.spindle_rev_per_min, 0.0);
+      if (m != 0 && m != 1) job_.items.emplace_back(ControllerEvent{m, static_cast<std::uint64_t>(speed)});
+      if (m == 0 || m == 1 || m == tool_change) job_.items.emplace_back(ProgramStop{});  // until the operator resumes
+      if (m == 3 || m == 4) job_.items.emplace_back(Dwell{machine_.spindle_time_s});
+    }
+    return true;
+  }
+
+  /// Behind the last segment nothing comes: to come to rest there is no starvation.
+  void last_segment_stops() {
+    for (auto item = job_.items.rbegin(); item != job_.items.rend(); ++item) {
+      if (auto* segment = std::get_if<Segment>(&*item)) {
+        segment->stop_at_end = true;
+        return;
+      }
+    }
+  }
+
+ private:
+  void go_to(const Vector3& to, std::uint32_t line) {
+    if ((to - job_.end_mm).norm() < 1e-6) return;
+    Segment rapid = make_line(job_.end_mm, to, machine_.rapid_mm_per_s, line);
+    rapid.stop_at_end = true;
+    job_.items.emplace_back(rapid);
+    job_.end_mm = to;
+  }
+
+  void add_segment(Segment segment) {
+    go_to(segment.start_mm, segment.line);  // behind a move to a position that the reader does not know
+    if (segment.kind == SegmentKind::rapid) {
+      segment.kind = SegmentKind::line;
+      segment.feed_mm_per_s = machine_.rapid_mm_per_s;
+      segment.stop_at_end = true;  // in-position check
+    }
+    job_.items.emplace_back(segment);
+    job_.end_mm = segment.end_mm;
+  }
+
+  Job& job_;
+  const Machine& machine_;
+  Vector3 home_;
+};
+
+}  // namespace
+
+Job read_job(const std::string& text, const Vector3& start_mm, const Machine& machine) {
+  ReaderOptions options;
+  options.power_on.position_mm = start_mm;
+  options.power_on.known = {true, true, true};
+  options.unknown_after_tool_change = {false, false, false};  // the tool is changed where the machine stands
+  const Program program = read_program(text, options);
+  Job job;
+  JobWriter writer(job, machine, start_mm);
+  for (const ProgramStep& step : program.steps) {
+    if (step.kind == StepKind::region) writer.add_region(*program.regions[step.index]);
+    if (step.kind == StepKind::move) writer.add_move(program.other_moves[step.index]);
+    if (step.kind == StepKind::function && !writer.add_function(program.functions[step.index], step.line)) break;
+  }
+  writer.last_segment_stops();
+  for (const Finding& warning : program.warnings) {
+    job.warnings.push_back("line " + std::to_string(warning.line) + ": " + warning.message);
+  }
+  return job;
+}
+
+Path path_of(const Job& job) {
+  PathBuilder path;
+  for (const Item& item : job.items) {
+    if (const auto* segment = std::get_if<Segment>(&item)) path.add(*segment);
+  }
+  return path.path();
+}
