@@ -1,5 +1,7 @@
 #include "machine.hpp"
 
+#include <cmath>
+
 #include "shapegcode/shaper.hpp"
 
 using namespace shapegcode;
@@ -34,9 +36,11 @@ FeedDriveParameters drive_of(const Machine& machine, int axis) {
   return drive;
 }
 
-Drive::Drive(const Machine& machine, int axis) : drive_(drive_of(machine, axis), machine.period_s) {
+Drive::Drive(const Machine& machine, int axis)
+    : drive_(drive_of(machine, axis), machine.period_s), feed_forward_ratio_(machine.feed_forward_ratio) {
   const FeedDriveParameters drive = drive_of(machine, axis);
-  const double mass_kg = drive.motor_mass_kg + drive.table_mass_kg;
-  lag_s_ = machine.feed_forward_ratio / drive.position_gain_per_s;
-  lag_s2_ = lag_s_ * mass_kg / drive.velocity_gain_n_s_per_m;
+  position_gain_per_s_ = drive.position_gain_per_s;
+  lag_by_acceleration_s_ = (drive.motor_mass_kg + drive.table_mass_kg) / drive.velocity_gain_n_s_per_m;
+  lag_by_velocity_ = drive.motor_friction.viscous_n_s_per_m / drive.velocity_gain_n_s_per_m;
+  integral_share_ = 1.0 - std::exp(-machine.period_s / drive.velocity_integral_time_s);
 }

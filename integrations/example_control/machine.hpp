@@ -33,14 +33,21 @@ class Drive {
  public:
   Drive(const Machine& machine, int axis);
 
-  /// Position in mm, with the speed and the acceleration that belong to it. What is fed forward is added as the lag
-  /// that the loops would have: v/K of the position loop, and a m/(Kv K) of the speed loop.
+  /// Position in mm, with the speed and the acceleration that belong to it. What is fed forward is the speed, and by
+  /// how much more the speed loop must be asked for so that it gives the force m a + c v: its integral gives a part of
+  /// that by itself, with its time constant. As the drive takes nothing but positions, all of it is asked for as a
+  /// lead.
   double step(double position, double velocity, double acceleration) noexcept {
-    return drive_.step(position + lag_s_ * velocity + lag_s2_ * acceleration);
+    const double asked = lag_by_acceleration_s_ * acceleration + lag_by_velocity_ * velocity;  // mm/s
+    const double lead = velocity + asked - integral_;
+    integral_ += integral_share_ * (asked - integral_);
+    return drive_.step(position + feed_forward_ratio_ / position_gain_per_s_ * lead);
   }
   void reset(double position_mm) noexcept { drive_.reset(position_mm); }
 
  private:
   shapegcode::FeedDriveRealTime drive_;
-  double lag_s_, lag_s2_;
+  double feed_forward_ratio_, position_gain_per_s_;
+  double lag_by_acceleration_s_, lag_by_velocity_, integral_share_;
+  double integral_ = 0.0;
 };

@@ -79,8 +79,7 @@ bool read_options(int count, char** words, Options& options) {
   return !options.program.empty();
 }
 
-// --- The real-time thread: a deadline per period
-// -----------------------------------------------------------------------
+// --- The real-time thread: a deadline per period ---------------------------------------------------------------------
 
 struct Punctuality {
   long periods = 0, missed = 0;
@@ -115,8 +114,7 @@ void run_periods(Control& control, double period_s, const std::atomic<bool>& end
   }
 }
 
-// --- The operator
-// --------------------------------------------------------------------------------------------------------
+// --- The operator ----------------------------------------------------------------------------------------------------
 
 void print_status(const Control& control) {
   const ControllerState s = control.state();
@@ -184,8 +182,7 @@ bool attend(Control& control, Terminal& terminal, Recorder& recorder, double tim
   return goes_on && !(terminal.is_over() && control.is_done());
 }
 
-// --- Both ways to run
-// ----------------------------------------------------------------------------------------------------
+// --- Both ways to run ------------------------------------------------------------------------------------------------
 
 /// One thread stands for all of them, and a second is as long as it takes.
 void run_fast(Control& control, Terminal& terminal, Recorder& recorder, double period_s) {
