@@ -100,6 +100,11 @@ void Control::period() noexcept {
 
 // --- The operator's thread -------------------------------------------------------------------------------------------
 
+void Control::resume() noexcept {
+  resumed_at_ = motion_.state().steps;
+  motion_.resume();
+}
+
 void Control::flush() noexcept {
   is_cut_short_ = true;
   motion_.flush();
@@ -124,4 +129,10 @@ bool Control::is_done() const noexcept {
   if (state.activity == Activity::aborted) return true;
   if (!is_pushed_ || flushes_ || touches_ || state.steps < pushed_at_ + 2) return false;
   return state.activity == Activity::idle && state.segments_waiting == 0;
+}
+
+// The state is that of the last step, which may not know of the last resume() yet.
+bool Control::is_held() const noexcept {
+  const ControllerState state = motion_.state();
+  return state.activity == Activity::held && !flushes_ && !touches_ && state.steps >= resumed_at_ + 2;
 }

@@ -28,7 +28,7 @@ class Control {
 
   // The operator's thread.
   void hold() noexcept { motion_.hold(); }
-  void resume() noexcept { motion_.resume(); }
+  void resume() noexcept;
   void feed_override(double ratio) noexcept { motion_.feed_override(ratio); }
   void abort() noexcept { is_cut_short_ = true, motion_.abort(); }
   void flush() noexcept;
@@ -39,6 +39,9 @@ class Control {
   std::optional<std::string> take_message();
   /// At rest, and nothing left to do.
   [[nodiscard]] bool is_done() const noexcept;
+  /// At rest until the operator resumes.
+  [[nodiscard]] bool is_held() const noexcept;
+  [[nodiscard]] bool is_at_rest() const noexcept { return is_done() || is_held(); }
   [[nodiscard]] bool is_cut_short() const noexcept { return is_cut_short_; }
   [[nodiscard]] shapegcode::ControllerState state() const noexcept { return motion_.state(); }
   [[nodiscard]] RowQueue& rows() noexcept { return rows_; }
@@ -56,6 +59,8 @@ class Control {
   // The planning thread's.
   Job job_;
   std::size_t next_ = 0;  // item to push
+
+  std::uint64_t resumed_at_ = 0;  // the operator's thread: in which period
 
   std::atomic<bool> touches_ = false;       // operator or probe -> real-time thread
   std::atomic<bool> flushes_ = false;       // operator or real-time thread -> planning thread

@@ -39,10 +39,9 @@ constexpr const char* usage =
     "  --start X Y Z   where the machine stands, in mm of the program (0 0 100)\n"
     "  --feed-forward  share of the lag of the drives that is fed forward, 0 to 1 (1)\n"
     "  --friction      in the guideways\n"
-    "commands, one in a line: hold (!), resume (~), override PERCENT, probe, flush, abort, status (?), quit; at rest\n"
-    "  also mdi BLOCK, jog x+ 20. With `at SECONDS` in front a command waits for that time of the run; `wait` waits "
-    "for\n"
-    "  rest. The run is over with quit, or where program and commands are at their end.\n"
+    "commands, one in a line: hold (!), resume (~), override PERCENT, probe, flush, abort, status (?), quit;\n"
+    "  at rest also mdi BLOCK, jog x+ 20. With `at SECONDS` in front a command waits for that time of the run,\n"
+    "  `wait` waits for rest. The run is over with quit, or where program and commands are at their end.\n"
     "Exit code 0: the whole program was run; 1: not all of it; 2: bad input\n";
 
 bool read_number(const char* text, double low, double high, double& value) {
@@ -171,7 +170,7 @@ bool carry_out(const Command& command, Control& control) {
 /// Commands whose time it is, rows to the recorder. False: the run is over.
 bool attend(Control& control, Terminal& terminal, Recorder& recorder, double time_s) {
   bool goes_on = true;
-  while (const auto command = terminal.take(time_s, control.is_done())) {
+  while (const auto command = terminal.take(time_s, control.is_at_rest())) {
     std::printf("%.3f s: %s\n", time_s, command->line.c_str());
     goes_on = carry_out(*command, control) && goes_on;
   }
@@ -179,6 +178,10 @@ bool attend(Control& control, Terminal& terminal, Recorder& recorder, double tim
   for (Row row; control.rows().take(row);) recorder.write(row);
   std::fflush(stdout);
   if (control.state().activity == Activity::aborted) return false;
+  if (terminal.is_over() && control.is_held()) {
+    std::puts("held, and no command will come any more");
+    control.abort();
+  }
   return goes_on && !(terminal.is_over() && control.is_done());
 }
 

@@ -256,6 +256,15 @@ def test_by_the_clock_it_is_the_same_path(built: Path, tmp_path: Path) -> None:
     assert "periods" in found.said
 
 
+def test_a_stop_without_an_operator_ends_the_run(built: Path, fast_contour: Path, tmp_path: Path) -> None:
+    """`wait` waits for it, too; where nobody is left to resume the run is over."""
+    found = run(built, fast_contour, "wait\nresume\nat 3 hold\n", tmp_path / "run.csv", "--fast")
+    assert found.exit_code == 1
+    assert "no command will come" in found.said
+    assert found.rows["activity"][-1] == "aborted"
+    assert found.rows["activity"][at_second(found, 0.1)] == "moving", "the tool is changed at once"
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
