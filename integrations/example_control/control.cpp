@@ -95,6 +95,7 @@ void Control::period() noexcept {
   row.feed_override = state.feed_override;
   row.line = state.set_point_line;
   row.is_on_path = is_on_path_;
+  idle_periods_ = row.activity == Activity::idle ? idle_periods_ + 1 : 0;
   rows_.put(row);
 }
 
@@ -128,7 +129,8 @@ bool Control::is_done() const noexcept {
   const ControllerState state = motion_.state();
   if (state.activity == Activity::aborted) return true;
   if (!is_pushed_ || flushes_ || touches_ || state.steps < pushed_at_ + 2) return false;
-  return state.activity == Activity::idle && state.segments_waiting == 0;
+  // Where a stop comes last, behind events, a period is idle until they are read.
+  return idle_periods_ >= 3 && state.segments_waiting == 0;
 }
 
 // The state is that of the last step, which may not know of the last resume() yet.

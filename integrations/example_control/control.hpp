@@ -63,6 +63,7 @@ class Control {
   std::uint64_t resumed_at_ = 0;  // the operator's thread: in which period
 
   std::atomic<bool> touches_ = false;       // operator or probe -> real-time thread
+  std::atomic<int> idle_periods_ = 0;       // real-time thread -> operator: in a row
   std::atomic<bool> flushes_ = false;       // operator or real-time thread -> planning thread
   std::atomic<bool> is_pushed_ = false;     // planning thread: all of the job
   std::atomic<std::uint64_t> pushed_at_{};  // and in which period

@@ -1,5 +1,7 @@
 #include "job.hpp"
 
+#include <algorithm>
+
 #include "shapegcode/error.hpp"
 #include "shapegcode/program.hpp"
 
@@ -10,9 +12,7 @@ namespace {
 /// Appends what the reader found, in the order in which the machine does it.
 class JobWriter {
  public:
-  JobWriter(Job& job, const Machine& machine, const Vector3& start) : job_(job), machine_(machine), home_(start) {
-    job_.end_mm = start;
-  }
+  JobWriter(Job& job, const Machine& machine) : job_(job), machine_(machine) {}
 
   void add_region(const Region& region) {
     if (region.incremental) {
@@ -30,13 +30,17 @@ class JobWriter {
     }
   }
 
-  /// M, S and T words of a block. False: the program ends here.
-  bool add_function(const MachineFunction& function, std::uint32_t line) {
-    Vector3 to = job_.end_mm;  // G28: the axes go to the reference point
+  /// A move from where the reader does not know the position any more, behind G28: it knows where it ends.
+  void add_unknown_move(const MoveEnd& end) {
+    Vector3 to = job_.end_mm;
     for (int axis = 0; axis < axis_count; ++axis) {
-      if (function.unknown_move[static_cast<std::size_t>(axis)]) to[axis] = home_[axis];
+      if (end.known[static_cast<std::size_t>(axis)]) to[axis] = end.position_mm[axis];
     }
-    go_to(to, line);
+    go_to(to, end.line);
+  }
+
+  /// M, S and T words of a block. False: the program ends here.
+  bool add_function(const MachineFunction& function) {
     for (int k = 0; k < function.m_count; ++k) {
       const auto m = static_cast<std::uint32_t>(function.m_codes[static_cast<std::size_t>(k)]);
       if (m == 2 || m == 30) return false;
@@ -80,7 +84,6 @@ class JobWriter {
 
   Job& job_;
   const Machine& machine_;
-  Vector3 home_;
 };
 
 }  // namespace
@@ -91,12 +94,18 @@ Job read_job(const std::string& text, const Vector3& start_mm, const Machine& ma
   options.power_on.known = {true, true, true};
   options.unknown_after_tool_change = {false, false, false};  // the tool is changed where the machine stands
   const Program program = read_program(text, options);
-  Job job;
-  JobWriter writer(job, machine, start_mm);
+  Job job{{}, {}, start_mm};
+  JobWriter writer(job, machine);
+  auto end = program.move_ends.begin();
   for (const ProgramStep& step : program.steps) {
     if (step.kind == StepKind::region) writer.add_region(*program.regions[step.index]);
     if (step.kind == StepKind::move) writer.add_move(program.other_moves[step.index]);
-    if (step.kind == StepKind::function && !writer.add_function(program.functions[step.index], step.line)) break;
+    if (step.kind != StepKind::function) continue;
+    const MachineFunction& function = program.functions[step.index];
+    end = std::find_if(end, program.move_ends.end(), [&](const MoveEnd& one) { return one.line >= step.line; });
+    const bool is_unknown = std::ranges::find(function.unknown_move, true) != function.unknown_move.end();
+    if (is_unknown && end != program.move_ends.end() && end->line == step.line) writer.add_unknown_move(*end);
+    if (!writer.add_function(function)) break;
   }
   writer.last_segment_stops();
   for (const Finding& warning : program.warnings) {

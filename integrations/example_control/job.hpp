@@ -26,8 +26,8 @@ struct Job {
   shapegcode::Vector3 end_mm = shapegcode::Vector3::Zero();
 };
 
-/// Reads a program that begins at `start_mm`, which is also the reference point (G28). Throws shapegcode::Error with
-/// line and message on what cannot be read or run.
+/// Reads a program that begins at `start_mm`. G28 leaves the machine where it is: where the reference point lies is not
+/// known here. Throws shapegcode::Error with line and message on what cannot be read or run.
 Job read_job(const std::string& text, const shapegcode::Vector3& start_mm, const Machine& machine);
 
 /// All segments of a job as one path, against which the deviation is measured.

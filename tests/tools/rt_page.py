@@ -210,13 +210,9 @@ SYMBOLS = {
         "pow",
         "remainder",
         "round",
-        "sin",
         "sincos",
         "sinh",
-        "sqrt",
-        "tan",
         "__divdc3",
-        "__muldc3",
     ],
     "numbers in messages": [
         "std::to_chars(char*, char*, double, std::chars_format)",
