@@ -92,7 +92,7 @@ test-all:
 	$(MAKE) test-all-core
 	$(MAKE) tidy-all
 	$(MAKE) test-all-python
-	$(MAKE) test-linuxcnc
+	$(MAKE) test-linuxcnc LINUXCNC_TESTS=
 	$(MAKE) docs
 	$(BIN)/python tests/tools/full_pass.py write
 
@@ -108,8 +108,10 @@ test-all-python: package dev
 	$(PYTEST) -m slow
 
 # LinuxCNC is installed for it, with a user that may run it where this is root, and the component into its modules.
+# `test-all` also unloads the component a thousand times under load.
+LINUXCNC_TESTS ?= -m 'not slow'
 test-linuxcnc: package dev
-	$(BIN)/python -m pytest tests/linuxcnc
+	$(BIN)/python -m pytest tests/linuxcnc $(LINUXCNC_TESTS)
 
 lint: test-packages dev
 	$(BIN)/ruff check .
@@ -262,11 +264,12 @@ sanitize: test-packages
 	cmake --build --preset $@
 	ctest --preset $@
 
-# The controller with a thread for each of its parts, under ThreadSanitizer.
+# The controller with a thread for each of its parts, and LinuxCNC's component as it is unloaded, under ThreadSanitizer.
 threads: test-packages .venv/.runtime
 	$(CONFIGURE_RELEASE)
-	cmake --build --preset release --target thread_tests
+	cmake --build --preset release --target thread_tests hal_thread_tests
 	TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/thread_tests
+	TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/hal_thread_tests --source-file='*test_linuxcnc_shaper.cpp'
 
 # Each source and public header by itself, with Clang's warnings as errors: read, not compiled, as GCC compiles them all.
 plain: .venv/.runtime

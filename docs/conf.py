@@ -59,13 +59,15 @@ nb_execution_timeout = 120
 nb_execution_show_tb = True
 nb_merge_streams = True
 nb_execution_in_temp = True
-# For the page on C++: where the library was built, and the example that is built against it.
+# For the pages on C++: where the library was built, the examples that are built against it, and programs.
 os.environ.setdefault("SHAPEGCODE_BUILD", str(ROOT / "build" / "release"))
 os.environ["IPYTHONDIR"] = str(ROOT / "build" / "docs" / "ipython")
 _start = Path(os.environ["IPYTHONDIR"], "profile_default", "startup", "book.py")
 _start.parent.mkdir(parents=True, exist_ok=True)
 shutil.copy(ROOT / "docs" / "notebook_start.py", _start)
 os.environ["SHAPEGCODE_EXAMPLE"] = str(ROOT / "cpp" / "examples" / "controller_prototype")
+os.environ["SHAPEGCODE_CONTROL"] = str(ROOT / "integrations" / "example_control")
+os.environ["SHAPEGCODE_PROGRAMS"] = str(ROOT / "tests" / "golden" / "programs")
 
 # --- Python and C++ ---------------------------------------------------------------------------------------------------
 autodoc_typehints = "signature"

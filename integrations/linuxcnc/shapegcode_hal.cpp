@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
@@ -28,6 +29,10 @@ using namespace shapegcode::linuxcnc;
 static_assert(Wish::max_modes == SHAPEGCODE_HAL_MODES);
 
 constexpr std::chrono::milliseconds between_looks(10);
+constexpr std::chrono::microseconds between_polls(50);
+constexpr double periods_waited = 20.0;  // for a run of the real-time thread
+constexpr std::chrono::duration<double> min_wait(0.01);
+constexpr std::chrono::duration<double> max_wait(1.0);
 
 /// A wish as plain words that can be compared and handed over one by one.
 using Words = std::array<std::uint64_t, 3 + 2 * Wish::max_modes>;
@@ -136,6 +141,11 @@ struct shapegcode_hal {
     }
   }
 
+  void end_designer() {
+    designer.request_stop();
+    if (designer.joinable()) designer.join();
+  }
+
   void fulfil(const Words& words, std::uint64_t number) {
     try {
       Fir fir = design(wish_of(words), std::bit_cast<double>(words[2]));
@@ -165,25 +175,102 @@ struct shapegcode_hal {
   std::jthread designer;  // the last: it uses all of the above
 };
 
-extern "C" {
+namespace {
 
-shapegcode_hal* shapegcode_hal_create(int joints, void (*report)(const char* line)) {
-  try {
-    return new shapegcode_hal(joints, report);
-  } catch (const std::exception& error) {
-    report(error.what());
-    return nullptr;
+// The slot is plain C memory, shared by two threads. A run first says that it has begun and then looks for the filter;
+// who closes first takes the filter out and then looks which runs have begun: in the one order of these four, a run
+// that is not seen does not see the filter.
+template <class Value>
+std::atomic_ref<Value> shared(Value& value) noexcept {
+  static_assert(std::atomic_ref<Value>::is_always_lock_free);
+  return std::atomic_ref<Value>(value);
+}
+
+using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
+
+unsigned long long runs_ended(shapegcode_hal_slot& slot) noexcept {
+  return shared(slot.ended).load(std::memory_order_acquire);
+}
+
+/// Whether so many runs have ended, looked at for at most so long.
+bool wait_for_runs(shapegcode_hal_slot& slot, unsigned long long count, Seconds at_most) {
+  const auto end = Clock::now() + at_most;
+  while (runs_ended(slot) < count) {
+    if (Clock::now() > end) return false;
+    std::this_thread::sleep_for(between_polls);
+  }
+  return true;
+}
+
+/// Lets a part of a period pass; a short one without giving the processor away, for it might not come back in time.
+void let_pass(Seconds time) {
+  if (time > between_polls) return std::this_thread::sleep_for(time);
+  for (const auto end = Clock::now() + time; Clock::now() < end;) {
   }
 }
 
-void shapegcode_hal_destroy(shapegcode_hal* hal) {
-  std::this_thread::sleep_for(2 * between_looks);  // a step takes some microseconds
-  delete hal;
+/// Waits for the middle of the pause between two runs of a thread that is on time: LinuxCNC takes the function out of
+/// the thread's list next, and does not look whether the thread is there.
+void wait_for_pause(shapegcode_hal_slot& slot, Seconds period, Seconds at_most) {
+  const auto begin = Clock::now();
+  auto last = begin - at_most;  // when the run before was seen to have ended
+  unsigned long long seen = runs_ended(slot);
+  while (Clock::now() < begin + at_most) {
+    const auto before = Clock::now();
+    let_pass(period / 20);
+    const unsigned long long number = runs_ended(slot);
+    if (number == seen) continue;
+    const bool is_next = number == std::exchange(seen, number) + 1;
+    const Seconds since_last = before - std::exchange(last, before);
+    const bool is_on_time = is_next && since_last > 0.75 * period && since_last < 1.25 * period;
+    let_pass(period / 5);
+    if (is_on_time && Clock::now() < before + period / 2 && shared(slot.begun).load() == number) return;
+  }
 }
 
-void shapegcode_hal_step(shapegcode_hal* hal, const shapegcode_hal_settings* settings, const double* in, double* out,
-                         shapegcode_hal_status* status) {
-  hal->step(*settings, in, out, *status);
+}  // namespace
+
+extern "C" {
+
+int shapegcode_hal_open(shapegcode_hal_slot* slot, int joints, void (*report)(const char* line)) {
+  try {
+    auto hal = std::make_unique<shapegcode_hal>(joints, report);
+    shared(slot->hal).store(hal.release());
+    return 0;
+  } catch (const std::exception& error) {
+    report(error.what());
+    return -1;
+  }
+}
+
+void shapegcode_hal_run(shapegcode_hal_slot* slot, int joints, const shapegcode_hal_settings* settings,
+                        const double* in, double* out, shapegcode_hal_status* status) {
+  const unsigned long long number = shared(slot->ended).load(std::memory_order_relaxed) + 1;
+  shared(slot->period_s).store(settings->period_s, std::memory_order_relaxed);
+  shared(slot->begun).store(number);
+  if (shapegcode_hal* hal = shared(slot->hal).load(); hal != nullptr) {
+    hal->step(*settings, in, out, *status);
+  } else {
+    std::copy_n(in, joints, out);
+    *status = {1, 0, 0.0, 0.0};
+  }
+  shared(slot->ended).store(number, std::memory_order_release);
+}
+
+shapegcode_hal_closed shapegcode_hal_close(shapegcode_hal_slot* slot) {
+  if (shapegcode_hal* hal = shared(slot->hal).exchange(nullptr); hal != nullptr) slot->leaving = hal;
+  const unsigned long long begun = shared(slot->begun).load();
+  const bool is_free = wait_for_runs(*slot, begun, max_wait);
+  if (slot->leaving != nullptr) slot->leaving->end_designer();
+  if (!is_free) return SHAPEGCODE_HAL_IN_USE;
+  delete std::exchange(slot->leaving, nullptr);
+  if (begun == 0) return SHAPEGCODE_HAL_NOT_RUNNING;
+  const Seconds period(shared(slot->period_s).load(std::memory_order_relaxed));
+  const Seconds patience = std::clamp(periods_waited * period, min_wait, max_wait);
+  if (!wait_for_runs(*slot, begun + 1, patience)) return SHAPEGCODE_HAL_NOT_RUNNING;
+  wait_for_pause(*slot, period, patience);
+  return SHAPEGCODE_HAL_ACKNOWLEDGED;
 }
 
 }  // extern "C"

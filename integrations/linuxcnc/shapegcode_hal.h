@@ -30,18 +30,34 @@ struct shapegcode_hal_status {
 
 struct shapegcode_hal;
 
-/* A filter for that many joints that passes its input on, or NULL. `report` gets a line that says why settings are
- * impossible, from the other thread. Not real-time. */
-struct shapegcode_hal* shapegcode_hal_create(int joints, void (*report)(const char* line));
+/* Where a function of the real-time thread finds its filter. It outlives filter and thread; all zero at first. What is
+ * in it belongs to the functions below. */
+struct shapegcode_hal_slot {
+  struct shapegcode_hal* hal;     /* NULL: commands are passed on */
+  struct shapegcode_hal* leaving; /* taken out, may be in use still */
+  unsigned long long begun;       /* runs of the real-time thread */
+  unsigned long long ended;
+  double period_s; /* of its last run */
+};
 
-/* Ends the thread and frees everything. A shapegcode_hal_step that is running may end first, none may begin. Not
- * real-time. */
-void shapegcode_hal_destroy(struct shapegcode_hal* hal);
+/* A filter for that many joints that passes its input on, into an empty slot: 0, or -1 where that cannot be. `report`
+ * gets a line that says why settings are impossible, from the other thread. Not real-time. */
+int shapegcode_hal_open(struct shapegcode_hal_slot* slot, int joints, void (*report)(const char* line));
 
-/* One sample of every joint. Real-time: no allocation, no lock, no system call, bounded work. `in` and `out` may be the
- * same memory. */
-void shapegcode_hal_step(struct shapegcode_hal* hal, const struct shapegcode_hal_settings* settings, const double* in,
-                         double* out, struct shapegcode_hal_status* status);
+/* One sample of every joint: through the filter, or passed on where there is none. Real-time, one thread for each slot:
+ * no allocation, no lock, no system call, bounded work. `in` and `out` may be the same memory. */
+void shapegcode_hal_run(struct shapegcode_hal_slot* slot, int joints, const struct shapegcode_hal_settings* settings,
+                        const double* in, double* out, struct shapegcode_hal_status* status);
+
+enum shapegcode_hal_closed {
+  SHAPEGCODE_HAL_ACKNOWLEDGED, /* a run that began without the filter has ended since */
+  SHAPEGCODE_HAL_NOT_RUNNING,  /* there is none, and no run came for 20 periods (10 ms at least, 1 s at most) */
+  SHAPEGCODE_HAL_IN_USE        /* a run that began with the filter does not end (1 s): it is not freed, close again */
+};
+
+/* Takes the filter out, waits until no run has it, ends its thread and frees it. The real-time thread may run on
+ * meanwhile and afterwards. Not real-time. */
+enum shapegcode_hal_closed shapegcode_hal_close(struct shapegcode_hal_slot* slot);
 
 #ifdef __cplusplus
 }

@@ -35,8 +35,8 @@ license "MIT";
 include "shapegcode_hal.h";
 ;;
 
-static struct shapegcode_hal *made[64];
-static int made_count;
+static struct shapegcode_hal_slot slots[64];
+static int slot_count;
 
 static void report(const char *line) { rtapi_print_msg(RTAPI_MSG_ERR, "shapegcode_shaper: %s\n", line); }
 
@@ -44,38 +44,30 @@ EXTRA_SETUP() {
   int joints = personality ? personality : 1;
   (void)prefix;
   (void)extra_arg;
-  if (joints < 1 || joints > 9 || made_count == 64) {
+  if (joints < 1 || joints > 9 || slot_count == 64) {
     rtapi_print_msg(RTAPI_MSG_ERR, "shapegcode_shaper: personality %d, 1 to 9 joints needed\n", joints);
     return -EINVAL;
   }
-  shaper = shapegcode_hal_create(joints, report);
-  if (!shaper) return -ENOMEM;
-  made[made_count++] = shaper;
+  if (shapegcode_hal_open(&slots[slot_count], joints, report)) return -ENOMEM;
+  shaper = &slots[slot_count++];
   return 0;
 }
 
 EXTRA_CLEANUP() {
-  struct __comp_state *__comp_inst; /* the name that halcompile's `shaper` stands for a member of */
-  /* The servo thread may run still: it passes commands on from here on. */
-  for (__comp_inst = __comp_first_inst; __comp_inst; __comp_inst = __comp_inst->_next)
-    __atomic_store_n(&shaper, (void *)0, __ATOMIC_RELEASE);
-  while (made_count > 0) shapegcode_hal_destroy(made[--made_count]);
+  /* The servo thread may run still: from here on it passes commands on, and has just said so when LinuxCNC takes the
+   * functions out of the thread, which nothing guards: a whole period before it comes again. */
+  while (slot_count > 0) {
+    if (shapegcode_hal_close(&slots[--slot_count]) == SHAPEGCODE_HAL_IN_USE)
+      rtapi_print_msg(RTAPI_MSG_ERR, "shapegcode_shaper: a run of its function does not end, memory is not freed\n");
+  }
 }
 
 FUNCTION(_) {
   double command[9], shaped[9];
   struct shapegcode_hal_settings wish;
   struct shapegcode_hal_status status;
-  struct shapegcode_hal *hal = __atomic_load_n(&shaper, __ATOMIC_ACQUIRE);
   int joints = personality ? personality : 1, i;
 
-  if (!hal) {
-    for (i = 0; i < joints; i++) {
-      out(i) = in(i);
-      lag(i) = 0.0;
-    }
-    return;
-  }
   wish.enabled = enable;
   wish.family_number = family;
   wish.fade_s = fade;
@@ -85,7 +77,7 @@ FUNCTION(_) {
     wish.damping_ratio[i] = damping(i);
   }
   for (i = 0; i < joints; i++) command[i] = in(i);
-  shapegcode_hal_step(hal, &wish, command, shaped, &status);
+  shapegcode_hal_run(shaper, joints, &wish, command, shaped, &status);
   for (i = 0; i < joints; i++) {
     out(i) = shaped[i];
     lag(i) = command[i] - shaped[i];

@@ -188,6 +188,7 @@ int main() {
   });
 
   check_motion_controller();
+  check_program_items();
   check_c_interface();
   if (failures != 0) std::printf("%d real-time form(s) allocate, lock or did not run\n", failures);
   return failures == 0 && sink == sink ? 0 : 1;

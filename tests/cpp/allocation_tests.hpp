@@ -27,3 +27,4 @@ inline void expect(bool holds, const char* what) {
 
 void check_motion_controller();
 void check_c_interface();
+void check_program_items();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -155,15 +156,15 @@ TEST_CASE("linuxcnc filter: of several offers the last one counts, and one that 
 }
 
 TEST_CASE("linuxcnc C interface: a design comes from the other thread, one that is impossible does not") {
-  shapegcode_hal* hal = shapegcode_hal_create(2, report);
-  REQUIRE(hal != nullptr);
+  shapegcode_hal_slot slot{};
+  REQUIRE(shapegcode_hal_open(&slot, 2, report) == 0);
   shapegcode_hal_settings settings{1, 0, {46.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, period_s};
   shapegcode_hal_status status{};
   std::array<double, 2> in{1.0, 2.0};
   std::array<double, 2> out{};
   const auto step_until = [&](auto&& done) {
     for (int k = 0; k < 10'000; ++k) {
-      shapegcode_hal_step(hal, &settings, in.data(), out.data(), &status);
+      shapegcode_hal_run(&slot, 2, &settings, in.data(), out.data(), &status);
       if (done()) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -176,7 +177,7 @@ TEST_CASE("linuxcnc C interface: a design comes from the other thread, one that 
   CHECK(status.possible == 1);
   CHECK(status.duration_s == doctest::Approx(0.011));
   CHECK(status.delay_s == doctest::Approx(0.25 / 46.0).epsilon(0.01));
-  for (int k = 0; k < 20; ++k) shapegcode_hal_step(hal, &settings, in.data(), out.data(), &status);  // what it held
+  for (int k = 0; k < 20; ++k) shapegcode_hal_run(&slot, 2, &settings, in.data(), out.data(), &status);  // what it held
   // In rounding only: how long the other thread took decides what it is of.
   for (std::size_t axis = 0; axis < in.size(); ++axis) CHECK(out[axis] == doctest::Approx(in[axis]).epsilon(1e-12));
   settings.family_number = 12;
@@ -187,6 +188,59 @@ TEST_CASE("linuxcnc C interface: a design comes from the other thread, one that 
   settings.enabled = 0;
   CHECK(step_until([&] { return status.possible == 1 && status.waiting == 0; }));
   CHECK(status.delay_s == 0.0);
-  shapegcode_hal_destroy(hal);
-  CHECK(shapegcode_hal_create(0, report) == nullptr);
+  CHECK(shapegcode_hal_close(&slot) == SHAPEGCODE_HAL_NOT_RUNNING);
+  CHECK(shapegcode_hal_open(&slot, 0, report) == -1);
+  CHECK(slot.hal == nullptr);
+}
+
+// Under ThreadSanitizer as `make threads`, under the address sanitizer with the others.
+TEST_CASE("linuxcnc slot: a filter is opened and closed a thousand times while a thread runs it") {
+  shapegcode_hal_slot slot{};
+  std::atomic<bool> ends = false;
+  std::atomic<int> wrong = 0;
+  std::thread real_time([&] {
+    shapegcode_hal_settings settings{1, 0, {46.0, 0.0, 0.0}, {0.02, 0.0, 0.0}, 0.0, period_s};
+    shapegcode_hal_status status{};
+    for (int run = 0; !ends; ++run) {
+      settings.frequency_hz[0] = 40.0 + run / 100 % 20;
+      std::array values{1.0, 2.0};  // at rest: any filter passes it on
+      shapegcode_hal_run(&slot, 2, &settings, values.data(), values.data(), &status);
+      if (std::abs(values[0] - 1.0) > 1e-12 || std::abs(values[1] - 2.0) > 1e-12) ++wrong;
+    }
+  });
+  int acknowledged = 0;
+  for (int k = 0; k < 1000; ++k) {
+    REQUIRE(shapegcode_hal_open(&slot, 2, report) == 0);
+    // Some while a design is on its way, too.
+    if (k % 20 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(25));
+    acknowledged += shapegcode_hal_close(&slot) == SHAPEGCODE_HAL_ACKNOWLEDGED ? 1 : 0;
+  }
+  ends = true;
+  real_time.join();
+  CHECK(acknowledged >= 990);  // where the thread got no processor for 20 ms there is no answer in time
+  CHECK(wrong == 0);
+  CHECK(slot.begun == slot.ended);
+}
+
+TEST_CASE("linuxcnc slot: closing ends where nothing runs any more, and frees nothing that is in use") {
+  shapegcode_hal_slot slot{};
+  shapegcode_hal_settings settings{0, 0, {}, {}, 0.0, period_s};
+  shapegcode_hal_status status{};
+  std::array values{1.0, 2.0};
+  REQUIRE(shapegcode_hal_open(&slot, 2, report) == 0);
+  CHECK(shapegcode_hal_close(&slot) == SHAPEGCODE_HAL_NOT_RUNNING);  // never run
+  REQUIRE(shapegcode_hal_open(&slot, 2, report) == 0);
+  shapegcode_hal_run(&slot, 2, &settings, values.data(), values.data(), &status);
+  CHECK(shapegcode_hal_close(&slot) == SHAPEGCODE_HAL_NOT_RUNNING);  // no longer
+  REQUIRE(shapegcode_hal_open(&slot, 2, report) == 0);
+  ++slot.begun;  // as if the thread stood still within a run
+  CHECK(shapegcode_hal_close(&slot) == SHAPEGCODE_HAL_IN_USE);
+  CHECK(slot.hal == nullptr);
+  CHECK(slot.leaving != nullptr);
+  ++slot.ended;
+  CHECK(shapegcode_hal_close(&slot) == SHAPEGCODE_HAL_NOT_RUNNING);
+  CHECK(slot.leaving == nullptr);
+  shapegcode_hal_run(&slot, 2, &settings, values.data(), values.data(), &status);  // passed on
+  CHECK(values == std::array{1.0, 2.0});
+  CHECK(status.possible == 1);
 }

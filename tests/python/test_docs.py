@@ -71,6 +71,21 @@ def test_every_how_to_ends_with_what_can_go_wrong(page: Path) -> None:
     assert title not in head
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if "{literalinclude}" in page.read_text(encoding="utf-8")])
+def test_every_included_piece_of_a_file_is_there(page: Path) -> None:
+    """Its file is linked from the page, by which it comes into the book; where it begins and ends is in it."""
+    text = page.read_text(encoding="utf-8")
+    linked = {os.path.normpath(page.parent / target.partition("#")[0]) for *_, target in book.links(text)}
+    included = re.findall(r"^```\{literalinclude\} /files/(\S+)\n((?::.*\n)*)", text, re.MULTILINE)
+    assert included
+    for name, options in included:
+        source = (ROOT / name).read_text(encoding="utf-8")
+        assert str(ROOT / name) in linked, name
+        marks = re.findall(r"^:(start-at|start-after|end-at|end-before): *\"?(.*?)\"? *$", options, re.MULTILINE)
+        places = [source.index(mark) for _, mark in marks]
+        assert places == sorted(places), (name, marks)
+
+
 def test_every_picture_that_a_result_draws_is_in_the_gallery() -> None:
     """By the names in the functions that offer pictures; those of `KEPT` are drawn once and stand in docs/images."""
     offered = set()

@@ -26,4 +26,6 @@ echo 'Python:'
 echo 'C++:'
 "$python" -m gcovr --root . --filter cpp/src --filter cpp/include --object-directory "$out" \
   --gcov-ignore-parse-errors=all --gcov-ignore-errors=all --print-summary --txt "$out/gcovr.txt" | head -1
+echo 'C++, of that shapegcode_rt:'
+"$python" tests/tools/rt_coverage.py "$out"
 rm -f .coverage
