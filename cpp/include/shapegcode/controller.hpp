@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "shapegcode/filter.hpp"
-#include "shapegcode/motion.hpp"
+#include "shapegcode/limits.hpp"
 #include "shapegcode/path.hpp"
 
 // What the author of a control needs: blocks come while the machine moves, the operator turns the override and presses

@@ -12,7 +12,7 @@
 #include "base/refuse.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/filter.hpp"
-#include "shapegcode/motion.hpp"
+#include "shapegcode/limits.hpp"
 
 namespace shapegcode::c {
 namespace {

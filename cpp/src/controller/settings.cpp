@@ -5,7 +5,7 @@
 
 #include "base/checks.hpp"
 #include "base/refuse.hpp"
-#include "motion/speed_limits.hpp"
+#include "limits/speed_limits.hpp"
 
 namespace shapegcode {
 namespace {

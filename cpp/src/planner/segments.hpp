@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "shapegcode/motion.hpp"
+#include "shapegcode/limits.hpp"
 #include "shapegcode/path.hpp"
 
 namespace shapegcode {
