@@ -237,7 +237,12 @@ CALLS = (
     ),
     Call(("abort",), "any", "a word", ("allocation", "abort")),
     Call(("restart",), "while none pushes or steps", "the filters", ("allocation", "abort")),
-    Call(("state",), "any", "a copy, again only where three steps were done meanwhile", ("allocation", "threads", "state")),
+    Call(
+        ("state",),
+        "any",
+        "a copy, again only where three steps were done meanwhile",
+        ("allocation", "threads", "state"),
+    ),
     Call(("axes", "delay_periods", "correction_delay"), "any", "a number", ("delay",)),
 )
 
