@@ -168,7 +168,7 @@ fuzz-merge: build/fuzz/tests/fuzz/fuzz_reader
 stubs: package dev
 	$(BIN)/pybind11-stubgen shapegcode._core --output-dir python --exit-code \
 	  --ignore-invalid-expressions '<shapegcode\._core\..*>' \
-	  --enum-class-locations '(ChipThickness|SpindleSense):shapegcode._core'
+	  --enum-class-locations '(ChipThickness|SpindleSense|FeedRate|FeedOf):shapegcode._core'
 
 schemas: package dev
 	$(BIN)/python tests/tools/write_schemas.py build/schemas --keys

@@ -57,7 +57,10 @@ PyController make_controller(double period_s, const std::optional<MotionLimits>&
                              const AxisLimit& max_acceleration, const AxisLimit& max_jerk,
                              std::vector<FollowingLimits> following, double contour_tolerance_mm,
                              double smoothing_time_s, const AnyShaper& shaper, bool contour_correction,
-                             py::ssize_t window, py::ssize_t queue, std::optional<int> lead_periods) {
+                             py::ssize_t window, py::ssize_t queue, std::optional<int> lead_periods,
+                             const std::vector<std::pair<double, double>>& travel, std::vector<OffsetLimits> offset,
+                             std::vector<double> emergency_acceleration, double spindle_bandwidth_hz,
+                             py::ssize_t retrace_periods) {
   ControllerSettings settings;
   settings.period_s = period_s;
   if (limits) {
@@ -77,6 +80,11 @@ PyController make_controller(double period_s, const std::optional<MotionLimits>&
   settings.queue = count_of(queue, "queue");
   settings.plans_in_step = !lead_periods.has_value();
   settings.lead_periods = lead_periods.value_or(settings.lead_periods);
+  for (const auto& [low, high] : travel) settings.travel.push_back({low, high});
+  settings.offset = std::move(offset);
+  settings.emergency_acceleration = std::move(emergency_acceleration);
+  settings.spindle_bandwidth_hz = spindle_bandwidth_hz;
+  settings.retrace_periods = count_of(retrace_periods, "retrace_periods");
   return PyController(settings);
 }
 
@@ -84,9 +92,11 @@ std::string shown(const py::handle& value) { return py::repr(value).cast<std::st
 
 std::string shown(double value) { return shown(py::float_(value)); }
 
-py::array_t<double> set_point_of(const PyState& self) {
-  return py::array_t<double>(static_cast<py::ssize_t>(self.axes), self.state.set_point.data());
+py::array_t<double> axis_values(const PyState& self, const std::array<double, max_controller_axes>& values) {
+  return py::array_t<double>(static_cast<py::ssize_t>(self.axes), values.data());
 }
+
+py::array_t<double> set_point_of(const PyState& self) { return axis_values(self, self.state.set_point); }
 
 void register_answers(py::module_& module) {
   py::enum_<PushResult>(module, "PushResult", "Answer of a MotionController to a segment that was pushed.")
@@ -100,7 +110,82 @@ void register_answers(py::module_& module) {
       .value("wrong_axes", PushResult::wrong_axes, "Not as many following axes as the control has.")
       .value("aborted", PushResult::aborted, "Nothing is taken between abort() and restart().")
       .value("flushing", PushResult::flushing, "Between flush() and flushed() nothing is taken.")
-      .value("no_time", PushResult::no_time, "A dwell below zero, above 1e6 s, or no number.");
+      .value("no_time", PushResult::no_time, "A dwell below zero, above 1e6 s, or no number.")
+      .value("beyond_travel", PushResult::beyond_travel, "It leads out of the travel of an axis.")
+      .value("bad_limit", PushResult::bad_limit, "A limit of the segment that is not above zero.")
+      .value("not_straight", PushResult::not_straight, "Bound to the spindle, and no line.");
+
+  py::enum_<JogResult>(module, "JogResult", "Answer of a MotionController to a jog.")
+      .value("accepted", JogResult::accepted, "The axis goes.")
+      .value("path_moves", JogResult::path_moves,
+             "The control is neither held nor flushed nor aborted, or does not rest yet.")
+      .value("no_axis", JogResult::no_axis, "There is no such axis.")
+      .value("not_finite", JogResult::not_finite, "A number that is not finite.")
+      .value("no_speed", JogResult::no_speed, "Of a distance: the speed is not above zero.")
+      .value("beyond_travel", JogResult::beyond_travel,
+             "The distance leads out of the travel, or the axis is at its end already.")
+      .value("no_record", JogResult::no_record, "No periods are kept for retrace().");
+
+  py::enum_<FeedRate>(module, "FeedRate", "What a programmed feed counts in, and what changes it.")
+      .value("per_time", FeedRate::per_time, "Per s; the feed override.")
+      .value("rapid", FeedRate::rapid, "Per s; the rapid override.")
+      .value("per_revolution", FeedRate::per_revolution, "Per revolution of the spindle; the feed override.")
+      .value("synchronous", FeedRate::synchronous,
+             "Likewise, bound to the angle of the spindle from rest to rest; no override.");
+
+  py::enum_<FeedOf>(module, "FeedOf", "What a feed is of, where X, Y and Z move together with axes that follow.")
+      .value("path", FeedOf::path,
+             "X, Y and Z along their path; where these do not move (1e-9 mm), the axis that moves the furthest.")
+      .value("all_axes", FeedOf::all_axes, "The root of the squares of all, degrees counted as mm.")
+      .value("dominant", FeedOf::dominant,
+             "That of X, Y and Z along their path and the others which moves the furthest.")
+      .value("time", FeedOf::time, "Inverse time: the segment lasts one over the feed, s or revolutions.");
+
+  py::class_<SegmentRules>(module, "SegmentRules",
+                           R"(How a segment is run, beside its geometry and its feed. Immutable.
+
+Args:
+    feed_rate: What its feed counts in.
+    feed_of: What its feed is of.
+    max_acceleration: Along its path, beside the limits of the axes, mm/s^2.
+    max_jerk: Likewise, mm/s^3.)")
+      .def(py::init([](FeedRate feed_rate, FeedOf feed_of, double max_acceleration, double max_jerk) {
+             return SegmentRules{feed_rate, feed_of, max_acceleration, max_jerk};
+           }),
+           py::kw_only(), py::arg("feed_rate") = FeedRate::per_time, py::arg("feed_of") = FeedOf::path,
+           py::arg("max_acceleration") = MotionLimits::none, py::arg("max_jerk") = MotionLimits::none,
+           "Checked by the control that takes them.")
+      .def_readonly("feed_rate", &SegmentRules::feed_rate, "What its feed counts in.")
+      .def_readonly("feed_of", &SegmentRules::feed_of, "What its feed is of.")
+      .def_readonly("max_acceleration", &SegmentRules::max_acceleration, "mm/s^2.")
+      .def_readonly("max_jerk", &SegmentRules::max_jerk, "mm/s^3.")
+      .def("__repr__", [](const SegmentRules& self) {
+        return "SegmentRules(feed_rate=" + shown(py::cast(self.feed_rate)) +
+               ", feed_of=" + shown(py::cast(self.feed_of)) + ", max_acceleration=" + shown(self.max_acceleration) +
+               ", max_jerk=" + shown(self.max_jerk) + ")";
+      });
+
+  py::class_<OffsetLimits>(module, "OffsetLimits",
+                           R"(Limits of an offset that is added to an axis while the path is run. Immutable.
+
+Args:
+    max_feed: Highest speed in the axis' unit (mm or degrees) per s; 0: no offset.
+    max_acceleration: Likewise per s^2.
+    max_jerk: Likewise per s^3.
+    backlash: Of the drive: taken up by the offset where the axis goes down; the control begins as after a motion upwards.)")
+      .def(py::init([](double max_feed, double max_acceleration, double max_jerk, double backlash) {
+             return OffsetLimits{max_feed, max_acceleration, max_jerk, backlash};
+           }),
+           py::kw_only(), py::arg("max_feed") = 0.0, py::arg("max_acceleration") = 0.0, py::arg("max_jerk") = 0.0,
+           py::arg("backlash") = 0.0, "Checked by the control that takes them.")
+      .def_readonly("max_feed", &OffsetLimits::max_feed, "Unit per s.")
+      .def_readonly("max_acceleration", &OffsetLimits::max_acceleration, "Unit per s^2.")
+      .def_readonly("max_jerk", &OffsetLimits::max_jerk, "Unit per s^3.")
+      .def_readonly("backlash", &OffsetLimits::backlash, "Unit.")
+      .def("__repr__", [](const OffsetLimits& self) {
+        return "OffsetLimits(max_feed=" + shown(self.max_feed) + ", max_acceleration=" + shown(self.max_acceleration) +
+               ", max_jerk=" + shown(self.max_jerk) + ", backlash=" + shown(self.backlash) + ")";
+      });
 
   py::enum_<Activity>(module, "Activity", "What a MotionController does in a period.")
       .value("idle", Activity::idle, "At rest, nothing left to do.")
@@ -109,7 +194,8 @@ void register_answers(py::module_& module) {
       .value("held", Activity::held, "At rest after hold(), or at a stop that was pushed.")
       .value("starved", Activity::starved,
              "Coming to rest: the segments ran out before one that stops. At rest it is idle.")
-      .value("aborted", Activity::aborted, "At rest after abort(); the path is gone.");
+      .value("aborted", Activity::aborted, "At rest after abort() or emergency_stop(); the path is gone.")
+      .value("jogging", Activity::jogging, "Away from where the path rests, or back onto it.");
 
   py::class_<FollowingLimits>(module, "FollowingLimits", R"(Limits of an axis that follows the path. Immutable.
 
@@ -179,6 +265,17 @@ void register_state(py::module_& module) {
           "`distance_mm` of the set-point that was given: behind smoothing and shaper, `delay_periods` later, rounded.")
       .def_property_readonly(
           "set_point_line", [](const PyState& self) { return self.state.set_point_line; }, "Likewise its line.")
+      .def_property_readonly(
+          "travel_stops", [](const PyState& self) { return self.state.travel_stops; },
+          "How often it was held because the path would have left the travel.")
+      .def_property_readonly(
+          "spindle_speed", [](const PyState& self) { return self.state.spindle_speed; }, "Revolutions per s.")
+      .def_property_readonly(
+          "spindle_error_mm", [](const PyState& self) { return self.state.spindle_error_mm; },
+          "Of a synchronous segment: the motion less what the angle asks for.")
+      .def_property_readonly(
+          "offset", [](const PyState& self) { return axis_values(self, self.state.offset); },
+          "Offset of each axis before smoothing and shaper, (n_axes,), mm or the axis' unit.")
       .def("__repr__", [](const PyState& self) {
         const ControllerState& state = self.state;
         return "ControllerState(activity=" + std::string(text_of(state.activity)) +
@@ -190,7 +287,10 @@ void register_state(py::module_& module) {
                ", steps=" + std::to_string(state.steps) + ", starvations=" + std::to_string(state.starvations) +
                ", late_plans=" + std::to_string(state.late_plans) +
                ", set_point_distance_mm=" + shown(state.set_point_distance_mm) +
-               ", set_point_line=" + std::to_string(state.set_point_line) + ")";
+               ", set_point_line=" + std::to_string(state.set_point_line) +
+               ", travel_stops=" + std::to_string(state.travel_stops) +
+               ", spindle_speed=" + shown(state.spindle_speed) + ", spindle_error_mm=" + shown(state.spindle_error_mm) +
+               ", offset=" + shown(axis_values(self, state.offset).attr("tolist")()) + ")";
       });
 }
 
@@ -220,6 +320,11 @@ Args:
     queue: Segments that may wait in all; rounded up to a power of two, and holds the window.
     lead_periods: Another thread calls plan(), which plans so many periods ahead of the motion. None: step() plans when what
         is planned runs out.
+    travel: Where each axis may be, (low, high) of each; empty: anywhere.
+    offset: Limits of the offset of each axis, which the path leaves to it; empty: none.
+    emergency_acceleration: What each axis can do at the most, for emergency_stop(); empty: it brakes as abort() does.
+    spindle_bandwidth_hz: With which a spindle is followed.
+    retrace_periods: Periods of motion that are kept for retrace().
 
 Raises:
     ArgumentError: A value outside its range.
@@ -230,12 +335,14 @@ Source: this project, as time_optimal_trajectory.)";
 void register_pushes(py::class_<PyController>& controller) {
   controller
       .def("push", &PyController::push, py::arg("segment"), py::arg("following") = py::none(),
+           py::arg("rules") = py::none(),
            R"(Hand over the next segment; never waits.
 
 Args:
     segment: It starts where the one before ended, the first at rest.
     following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the path length. None: they
         stay.
+    rules: How it is run. None: the feed is per s along the path.
 
 Returns:
     PushResult; nothing was taken unless it is `accepted`.)")
@@ -253,13 +360,15 @@ Returns:
 Raises:
     ArgumentError: `first` below 0.)")
       .def("push_line", &PyController::push_line, py::arg("end_mm"), py::arg("feed_mm_per_s"),
-           py::arg("following") = py::none(), py::kw_only(), py::arg("line") = 0, py::arg("stop_at_end") = false,
+           py::arg("following") = py::none(), py::kw_only(), py::arg("rules") = py::none(), py::arg("line") = 0,
+           py::arg("stop_at_end") = false,
            R"(A straight move from the end of the segment before, at first from rest.
 
 Args:
     end_mm: Shape (3,), mm.
-    feed_mm_per_s: Along the path.
+    feed_mm_per_s: Along the path, as far as `rules` do not say otherwise.
     following: As in push().
+    rules: How it is run. None: the feed is per s along the path.
     line: What the state shows while it is run.
     stop_at_end: Exact stop; on the last segment of a program it says that none is missing.
 
@@ -267,7 +376,7 @@ Returns:
     PushResult; nothing was taken unless it is `accepted`.)")
       .def("push_arc", &PyController::push_arc, py::arg("end_mm"), py::arg("centre_mm"), py::arg("sweep_rad"),
            py::arg("feed_mm_per_s"), py::arg("normal") = 2, py::arg("following") = py::none(), py::kw_only(),
-           py::arg("line") = 0, py::arg("stop_at_end") = false,
+           py::arg("rules") = py::none(), py::arg("line") = 0, py::arg("stop_at_end") = false,
            R"(The same along an arc or helix, as Segment.arc makes it.
 
 Args:
@@ -277,6 +386,7 @@ Args:
     feed_mm_per_s: Along the path.
     normal: Axis across its plane: 0 X, 1 Y, 2 Z.
     following: As in push().
+    rules: How it is run. None: the feed is per s along the path.
     line: What the state shows while it is run.
     stop_at_end: Exact stop.
 
@@ -300,7 +410,10 @@ void register_controller(py::module_& module) {
                  py::arg("smoothing_time_s") = ControllerSettings{}.smoothing_time_s, py::arg("shaper") = py::none(),
                  py::arg("contour_correction") = false, py::arg("window") = ControllerSettings{}.window,
                  py::arg("queue") = ControllerSettings{}.queue, py::arg("lead_periods") = py::none(),
-                 "ArgumentError if it is not what the class asks for.");
+                 py::arg("travel") = py::tuple(), py::arg("offset") = py::tuple(),
+                 py::arg("emergency_acceleration") = py::tuple(),
+                 py::arg("spindle_bandwidth_hz") = ControllerSettings{}.spindle_bandwidth_hz,
+                 py::arg("retrace_periods") = 0, "ArgumentError if it is not what the class asks for.");
   register_pushes(controller);
   controller
       .def(
@@ -336,16 +449,18 @@ motion rests when the set-points come to rest.
 
 Returns:
     In the order of their pushes, each with its step.)")
-      .def("step", &PyController::step, py::arg("periods") = 1, R"(The next set-points, one for each period.
+      .def("step", &PyController::step, py::arg("periods") = 1, py::arg("spindle") = py::none(),
+           R"(The next set-points, one for each period.
 
 Args:
     periods: How many, >= 0.
+    spindle: Where the spindle is in each period, revolutions that go on counting, (periods,). None: it is not measured.
 
 Returns:
     (periods, n_axes), mm or the unit of a following axis; `state.activity` says what the last one was.
 
 Raises:
-    ArgumentError: Periods below 0.)")
+    ArgumentError: Periods below 0, or not as many angles.)")
       .def("step_motion", &PyController::step_motion, py::arg("periods") = 1,
            R"(The next set-points with what a drive's feed-forward wants.
 
@@ -390,12 +505,84 @@ Raises:
           "Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. It acts on what is not "
           "planned yet, after 8 to 32 periods and the lead; 0 is a hold.")
       .def(
+          "rapid_override", [](PyController& self, double ratio) { self.control().rapid_override(ratio); },
+          py::arg("ratio"), "The same of rapids, which the feed override leaves alone.")
+      .def(
           "hold", [](PyController& self) { self.control().hold(); }, "Come to rest along the path.")
       .def(
           "resume", [](PyController& self) { self.control().resume(); }, "Go on after hold().")
       .def(
           "abort", [](PyController& self) { self.control().abort(); },
           "Come to rest along the path and forget the rest of it.")
+      .def(
+          "emergency_stop", [](PyController& self) { self.control().emergency_stop(); },
+          "Come to rest along the path with all that `emergency_acceleration` allows, whatever the jerk; then as "
+          "abort().")
+      .def(
+          "jog", [](PyController& self, int axis, double speed) { return self.control().jog(axis, speed); },
+          py::arg("axis"), py::arg("speed"), R"(Moves an axis by hand while the path rests.
+
+That is after hold(), at a stop that was pushed, after flush() until flushed(), after abort(). resume() leads back onto the path, each axis as
+fast as it was jogged last; flushed() and restart() begin at the new place.
+
+Args:
+    axis: Its index, from 0.
+    speed: With its sign, unit per s; given anew it counts from the next period; 0: to rest.
+
+Returns:
+    JogResult; unless it is `accepted` nothing has happened. It comes to rest at the end of the travel.)")
+      .def(
+          "jog_by",
+          [](PyController& self, int axis, double distance, double speed) {
+            return self.control().jog_by(axis, distance, speed);
+          },
+          py::arg("axis"), py::arg("distance"), py::arg("speed"), R"(Likewise by a distance.
+
+Args:
+    axis: Its index, from 0.
+    distance: With its sign; those that are given before it ends add up.
+    speed: Unit per s.
+
+Returns:
+    JogResult; unless it is `accepted` nothing has happened.)")
+      .def(
+          "retrace", [](PyController& self, double distance_mm) { return self.control().retrace(distance_mm); },
+          py::arg("distance_mm"), R"(Back along the path, at half the speed with which it was run.
+
+When a jog may; resume() leads to where the path rests, then it goes on.
+
+Args:
+    distance_mm: From where it rests, as far as it is kept; less than before: forward.
+
+Returns:
+    JogResult; unless it is `accepted` nothing has happened.)")
+      .def(
+          "offset", [](PyController& self, int axis, double value) { return self.control().offset(axis, value); },
+          py::arg("axis"), py::arg("value"),
+          R"(An offset of an axis: it goes there within its own limits, at rest and while the path is run.
+
+Args:
+    axis: Its index, from 0.
+    value: mm or the axis' unit.
+
+Returns:
+    False: the axis has no such limits, or the value is not finite.)")
+      .def(
+          "travel",
+          [](PyController& self, int axis, double low, double high) {
+            return self.control().travel(axis, {low, high});
+          },
+          py::arg("axis"), py::arg("low"), py::arg("high"), R"(Where an axis may be from now on.
+
+Where the path that is planned would leave it, the control is held, with the stop that is planned.
+
+Args:
+    axis: Its index, from 0.
+    low: mm or the axis' unit.
+    high: Likewise.
+
+Returns:
+    False: there is no such axis, or `low` is above `high`.)")
       .def("restart", &PyController::restart, py::arg("position"),
            "At rest at a position (n_axes,), the queue empty. ArgumentError on another shape or a value that is not "
            "finite.")

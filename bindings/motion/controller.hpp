@@ -31,6 +31,9 @@ inline std::size_t count_of(pybind11::ssize_t value, const char* name) {
   throw Error(ErrorKind::argument, std::string(name) + " is " + std::to_string(value) + ", must not be below 0");
 }
 
+/// Angles of a spindle, copied where they are no array of numbers in a row.
+using Angles = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
+
 /// An event, and with which step it was reached.
 struct PyEvent {
   ControllerEvent event;
@@ -62,9 +65,10 @@ class PyController {
   }
   const Vector3& end() const noexcept { return end_; }
 
-  PushResult push(const Segment& segment, const std::optional<std::vector<double>>& following) {
+  PushResult push(const Segment& segment, const std::optional<std::vector<double>>& following,
+                  const std::optional<SegmentRules>& rules) {
     const std::vector<double>& ends = following ? *following : following_;
-    const PushResult result = control_.push(segment, ends);
+    const PushResult result = control_.push(segment, ends, rules.value_or(SegmentRules{}));
     if (result == PushResult::accepted) {
       end_ = segment.end_mm;
       following_ = ends;
@@ -73,17 +77,18 @@ class PyController {
   }
 
   PushResult push_line(const Vector3& end, double feed, const std::optional<std::vector<double>>& following,
-                       std::uint32_t line, bool stop_at_end) {
+                       const std::optional<SegmentRules>& rules, std::uint32_t line, bool stop_at_end) {
     Segment segment = make_line(end_, end, feed, line);
     segment.stop_at_end = stop_at_end;
-    return push(segment, following);
+    return push(segment, following, rules);
   }
 
   PushResult push_arc(const Vector3& end, const Vector3& centre, double sweep, double feed, int normal,
-                      const std::optional<std::vector<double>>& following, std::uint32_t line, bool stop_at_end) {
+                      const std::optional<std::vector<double>>& following, const std::optional<SegmentRules>& rules,
+                      std::uint32_t line, bool stop_at_end) {
     Segment segment = make_arc(end_, end, centre, sweep, normal, feed, line);
     segment.stop_at_end = stop_at_end;
-    return push(segment, following);
+    return push(segment, following, rules);
   }
 
   /// Segments from `first` on, as many as are taken: the next one, and what the last one was answered.
@@ -91,19 +96,26 @@ class PyController {
     std::size_t i = count_of(first, "first");
     PushResult result = PushResult::accepted;
     while (i < path.size() && result == PushResult::accepted) {
-      result = push(path[i], std::nullopt);
+      result = push(path[i], std::nullopt, std::nullopt);
       if (result == PushResult::accepted) ++i;
     }
     return {static_cast<pybind11::ssize_t>(i), result};
   }
 
-  pybind11::array_t<double> step(pybind11::ssize_t periods) {
+  pybind11::array_t<double> step(pybind11::ssize_t periods, const std::optional<Angles>& spindle) {
     const std::size_t rows = count_of(periods, "periods");
+    const auto angles = spindle ? static_cast<std::size_t>(spindle->size()) : rows;
+    const double* const angle = spindle ? spindle->data() : nullptr;
+    if (angles != rows) {
+      throw Error(ErrorKind::argument,
+                  std::to_string(angles) + " angles of the spindle for " + std::to_string(rows) + " periods");
+    }
     pybind11::array_t<double> out({static_cast<pybind11::ssize_t>(rows), static_cast<pybind11::ssize_t>(axes_)});
     double* to = out.mutable_data();
     const pybind11::gil_scoped_release release;
     const std::lock_guard lock(*stepping_);
     for (std::size_t i = 0; i < rows; ++i) {
+      if (angle != nullptr) control_.spindle(angle[i]);
       control_.step({to + i * axes_, axes_});
       note_events();
     }

@@ -28,6 +28,9 @@ class Control {
 
   // The operator's thread.
   void hold() noexcept { motion_.hold(); }
+  shapegcode::JogResult jog_by(int axis, double distance_mm) noexcept {
+    return motion_.jog_by(axis, distance_mm, jog_speed_mm_per_s);
+  }
   void resume() noexcept;
   void feed_override(double ratio) noexcept { motion_.feed_override(ratio); }
   void abort() noexcept { is_cut_short_ = true, motion_.abort(); }
@@ -47,6 +50,7 @@ class Control {
   [[nodiscard]] RowQueue& rows() noexcept { return rows_; }
 
  private:
+  static constexpr double jog_speed_mm_per_s = 50.0;
   bool push(const Item& item) noexcept;
   void begin_block(const std::string& text);
 

@@ -149,7 +149,12 @@ bool carry_out(const Command& command, Control& control) {
     case Key::abort:
       control.abort();
       break;
-    case Key::jog:  // an increment, as a block; what MotionController can jog by itself belongs here
+    case Key::jog:  // from hold beside the path, back with resume; at the end an increment is a block
+      if (!control.is_done()) {
+        const JogResult result = control.jog_by(command.axis, command.value);
+        if (result != JogResult::accepted) std::puts(text_of(result));
+        break;
+      }
       block = std::string("G91 G01 ") + "XYZ"[command.axis] + std::to_string(command.value) + " F3000.";
       [[fallthrough]];
     case Key::mdi:

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedOf', 'FeedRate', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'JogResult', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OffsetLimits', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'SegmentRules', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -963,16 +963,25 @@ class PushResult:
       flushing : Between flush() and flushed() nothing is taken.
     
       no_time : A dwell below zero, above 1e6 s, or no number.
+    
+      beyond_travel : It leads out of the travel of an axis.
+    
+      bad_limit : A limit of the segment that is not above zero.
+    
+      not_straight : Bound to the spindle, and no line.
     """
     __members__: typing.ClassVar[dict[str, PushResult]]
     aborted: typing.ClassVar[PushResult]
     accepted: typing.ClassVar[PushResult]
+    bad_limit: typing.ClassVar[PushResult]
+    beyond_travel: typing.ClassVar[PushResult]
     flushing: typing.ClassVar[PushResult]
     no_feed: typing.ClassVar[PushResult]
     no_length: typing.ClassVar[PushResult]
     no_time: typing.ClassVar[PushResult]
     not_connected: typing.ClassVar[PushResult]
     not_finite: typing.ClassVar[PushResult]
+    not_straight: typing.ClassVar[PushResult]
     queue_full: typing.ClassVar[PushResult]
     wrong_axes: typing.ClassVar[PushResult]
     @typing.overload
@@ -1009,6 +1018,246 @@ class PushResult:
     @property
     def value(self) -> int:
         ...
+class JogResult:
+    """
+    Answer of a MotionController to a jog.
+    
+    Members:
+    
+      accepted : The axis goes.
+    
+      path_moves : The control is neither held nor flushed nor aborted, or does not rest yet.
+    
+      no_axis : There is no such axis.
+    
+      not_finite : A number that is not finite.
+    
+      no_speed : Of a distance: the speed is not above zero.
+    
+      beyond_travel : The distance leads out of the travel, or the axis is at its end already.
+    
+      no_record : No periods are kept for retrace().
+    """
+    __members__: typing.ClassVar[dict[str, JogResult]]
+    accepted: typing.ClassVar[JogResult]
+    beyond_travel: typing.ClassVar[JogResult]
+    no_axis: typing.ClassVar[JogResult]
+    no_record: typing.ClassVar[JogResult]
+    no_speed: typing.ClassVar[JogResult]
+    not_finite: typing.ClassVar[JogResult]
+    path_moves: typing.ClassVar[JogResult]
+    @typing.overload
+    def __eq__(self, other: JogResult) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: JogResult) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FeedRate:
+    """
+    What a programmed feed counts in, and what changes it.
+    
+    Members:
+    
+      per_time : Per s; the feed override.
+    
+      rapid : Per s; the rapid override.
+    
+      per_revolution : Per revolution of the spindle; the feed override.
+    
+      synchronous : Likewise, bound to the angle of the spindle from rest to rest; no override.
+    """
+    __members__: typing.ClassVar[dict[str, FeedRate]]
+    per_revolution: typing.ClassVar[FeedRate]
+    per_time: typing.ClassVar[FeedRate]
+    rapid: typing.ClassVar[FeedRate]
+    synchronous: typing.ClassVar[FeedRate]
+    @typing.overload
+    def __eq__(self, other: FeedRate) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: FeedRate) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FeedOf:
+    """
+    What a feed is of, where X, Y and Z move together with axes that follow.
+    
+    Members:
+    
+      path : X, Y and Z along their path; where these do not move (1e-9 mm), the axis that moves the furthest.
+    
+      all_axes : The root of the squares of all, degrees counted as mm.
+    
+      dominant : That of X, Y and Z along their path and the others which moves the furthest.
+    
+      time : Inverse time: the segment lasts one over the feed, s or revolutions.
+    """
+    __members__: typing.ClassVar[dict[str, FeedOf]]
+    all_axes: typing.ClassVar[FeedOf]
+    dominant: typing.ClassVar[FeedOf]
+    path: typing.ClassVar[FeedOf]
+    time: typing.ClassVar[FeedOf]
+    @typing.overload
+    def __eq__(self, other: FeedOf) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: FeedOf) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class SegmentRules:
+    """
+    How a segment is run, beside its geometry and its feed. Immutable.
+    
+    Args:
+        feed_rate: What its feed counts in.
+        feed_of: What its feed is of.
+        max_acceleration: Along its path, beside the limits of the axes, mm/s^2.
+        max_jerk: Likewise, mm/s^3.
+    """
+    def __init__(self, *, feed_rate: FeedRate = FeedRate.per_time, feed_of: FeedOf = FeedOf.path, max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., max_jerk: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
+        """
+        Checked by the control that takes them.
+        """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def feed_of(self) -> FeedOf:
+        """
+        What its feed is of.
+        """
+    @property
+    def feed_rate(self) -> FeedRate:
+        """
+        What its feed counts in.
+        """
+    @property
+    def max_acceleration(self) -> float:
+        """
+        mm/s^2.
+        """
+    @property
+    def max_jerk(self) -> float:
+        """
+        mm/s^3.
+        """
+class OffsetLimits:
+    """
+    Limits of an offset that is added to an axis while the path is run. Immutable.
+    
+    Args:
+        max_feed: Highest speed in the axis' unit (mm or degrees) per s; 0: no offset.
+        max_acceleration: Likewise per s^2.
+        max_jerk: Likewise per s^3.
+        backlash: Of the drive: taken up by the offset where the axis goes down; the control begins as after a motion upwards.
+    """
+    def __init__(self, *, max_feed: typing.SupportsFloat | typing.SupportsIndex = 0.0, max_acceleration: typing.SupportsFloat | typing.SupportsIndex = 0.0, max_jerk: typing.SupportsFloat | typing.SupportsIndex = 0.0, backlash: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        Checked by the control that takes them.
+        """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def backlash(self) -> float:
+        """
+        Unit.
+        """
+    @property
+    def max_acceleration(self) -> float:
+        """
+        Unit per s^2.
+        """
+    @property
+    def max_feed(self) -> float:
+        """
+        Unit per s.
+        """
+    @property
+    def max_jerk(self) -> float:
+        """
+        Unit per s^3.
+        """
 class Activity:
     """
     What a MotionController does in a period.
@@ -1025,12 +1274,15 @@ class Activity:
     
       starved : Coming to rest: the segments ran out before one that stops. At rest it is idle.
     
-      aborted : At rest after abort(); the path is gone.
+      aborted : At rest after abort() or emergency_stop(); the path is gone.
+    
+      jogging : Away from where the path rests, or back onto it.
     """
     __members__: typing.ClassVar[dict[str, Activity]]
     aborted: typing.ClassVar[Activity]
     held: typing.ClassVar[Activity]
     idle: typing.ClassVar[Activity]
+    jogging: typing.ClassVar[Activity]
     moving: typing.ClassVar[Activity]
     starved: typing.ClassVar[Activity]
     stopping: typing.ClassVar[Activity]
@@ -1158,6 +1410,11 @@ class ControllerState:
         Of the segment that is being run.
         """
     @property
+    def offset(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Offset of each axis before smoothing and shaper, (n_axes,), mm or the axis' unit.
+        """
+    @property
     def segments_done(self) -> int:
         """
         Run to their ends.
@@ -1188,6 +1445,16 @@ class ControllerState:
         Along the path, before smoothing and shaper.
         """
     @property
+    def spindle_error_mm(self) -> float:
+        """
+        Of a synchronous segment: the motion less what the angle asks for.
+        """
+    @property
+    def spindle_speed(self) -> float:
+        """
+        Revolutions per s.
+        """
+    @property
     def starvations(self) -> int:
         """
         How often the segments ran out.
@@ -1196,6 +1463,11 @@ class ControllerState:
     def steps(self) -> int:
         """
         Set-points given so far.
+        """
+    @property
+    def travel_stops(self) -> int:
+        """
+        How often it was held because the path would have left the travel.
         """
 class MotionController:
     """
@@ -1224,6 +1496,11 @@ class MotionController:
         queue: Segments that may wait in all; rounded up to a power of two, and holds the window.
         lead_periods: Another thread calls plan(), which plans so many periods ahead of the motion. None: step() plans when what
             is planned runs out.
+        travel: Where each axis may be, (low, high) of each; empty: anywhere.
+        offset: Limits of the offset of each axis, which the path leaves to it; empty: none.
+        emergency_acceleration: What each axis can do at the most, for emergency_stop(); empty: it brakes as abort() does.
+        spindle_bandwidth_hz: With which a spindle is followed.
+        retrace_periods: Periods of motion that are kept for retrace().
     
     Raises:
         ArgumentError: A value outside its range.
@@ -1231,13 +1508,17 @@ class MotionController:
     
     Source: this project, as time_optimal_trajectory.
     """
-    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limits: MotionLimits | None = None, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, following: collections.abc.Sequence[FollowingLimits] = (), contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = 0.05, smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, shaper: Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode] | FollowingFir | None = None, contour_correction: bool = False, window: typing.SupportsInt | typing.SupportsIndex = 128, queue: typing.SupportsInt | typing.SupportsIndex = 1024, lead_periods: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limits: MotionLimits | None = None, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, following: collections.abc.Sequence[FollowingLimits] = (), contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = 0.05, smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, shaper: Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode] | FollowingFir | None = None, contour_correction: bool = False, window: typing.SupportsInt | typing.SupportsIndex = 128, queue: typing.SupportsInt | typing.SupportsIndex = 1024, lead_periods: typing.SupportsInt | typing.SupportsIndex | None = None, travel: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = (), offset: collections.abc.Sequence[OffsetLimits] = (), emergency_acceleration: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = (), spindle_bandwidth_hz: typing.SupportsFloat | typing.SupportsIndex = 20.0, retrace_periods: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
         ArgumentError if it is not what the class asks for.
         """
     def abort(self) -> None:
         """
         Come to rest along the path and forget the rest of it.
+        """
+    def emergency_stop(self) -> None:
+        """
+        Come to rest along the path with all that `emergency_acceleration` allows, whatever the jerk; then as abort().
         """
     def feed_override(self, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
@@ -1258,6 +1539,43 @@ class MotionController:
         """
         Come to rest along the path.
         """
+    def jog(self, axis: typing.SupportsInt | typing.SupportsIndex, speed: typing.SupportsFloat | typing.SupportsIndex) -> JogResult:
+        """
+        Moves an axis by hand while the path rests.
+        
+        That is after hold(), at a stop that was pushed, after flush() until flushed(), after abort(). resume() leads back onto the path, each axis as
+        fast as it was jogged last; flushed() and restart() begin at the new place.
+        
+        Args:
+            axis: Its index, from 0.
+            speed: With its sign, unit per s; given anew it counts from the next period; 0: to rest.
+        
+        Returns:
+            JogResult; unless it is `accepted` nothing has happened. It comes to rest at the end of the travel.
+        """
+    def jog_by(self, axis: typing.SupportsInt | typing.SupportsIndex, distance: typing.SupportsFloat | typing.SupportsIndex, speed: typing.SupportsFloat | typing.SupportsIndex) -> JogResult:
+        """
+        Likewise by a distance.
+        
+        Args:
+            axis: Its index, from 0.
+            distance: With its sign; those that are given before it ends add up.
+            speed: Unit per s.
+        
+        Returns:
+            JogResult; unless it is `accepted` nothing has happened.
+        """
+    def offset(self, axis: typing.SupportsInt | typing.SupportsIndex, value: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        """
+        An offset of an axis: it goes there within its own limits, at rest and while the path is run.
+        
+        Args:
+            axis: Its index, from 0.
+            value: mm or the axis' unit.
+        
+        Returns:
+            False: the axis has no such limits, or the value is not finite.
+        """
     def plan(self) -> bool:
         """
         Plans on until enough lies ahead; with `lead_periods`, from one thread. False: there was nothing to do.
@@ -1269,7 +1587,7 @@ class MotionController:
         Returns:
             The set-point of that period, (n_axes,).
         """
-    def push(self, segment: Segment, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None) -> PushResult:
+    def push(self, segment: Segment, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: SegmentRules | None = None) -> PushResult:
         """
         Hand over the next segment; never waits.
         
@@ -1277,11 +1595,12 @@ class MotionController:
             segment: It starts where the one before ended, the first at rest.
             following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the path length. None: they
                 stay.
+            rules: How it is run. None: the feed is per s along the path.
         
         Returns:
             PushResult; nothing was taken unless it is `accepted`.
         """
-    def push_arc(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], sweep_rad: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, normal: typing.SupportsInt | typing.SupportsIndex = 2, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
+    def push_arc(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], sweep_rad: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, normal: typing.SupportsInt | typing.SupportsIndex = 2, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, rules: SegmentRules | None = None, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
         """
         The same along an arc or helix, as Segment.arc makes it.
         
@@ -1292,6 +1611,7 @@ class MotionController:
             feed_mm_per_s: Along the path.
             normal: Axis across its plane: 0 X, 1 Y, 2 Z.
             following: As in push().
+            rules: How it is run. None: the feed is per s along the path.
             line: What the state shows while it is run.
             stop_at_end: Exact stop.
         
@@ -1322,14 +1642,15 @@ class MotionController:
         Returns:
             `accepted`, `queue_full` (as many may wait as segments), `aborted`.
         """
-    def push_line(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
+    def push_line(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, rules: SegmentRules | None = None, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
         """
         A straight move from the end of the segment before, at first from rest.
         
         Args:
             end_mm: Shape (3,), mm.
-            feed_mm_per_s: Along the path.
+            feed_mm_per_s: Along the path, as far as `rules` do not say otherwise.
             following: As in push().
+            rules: How it is run. None: the feed is per s along the path.
             line: What the state shows while it is run.
             stop_at_end: Exact stop; on the last segment of a program it says that none is missing.
         
@@ -1355,6 +1676,10 @@ class MotionController:
         """
         A programmed stop (M00) behind the segment that was pushed last: at rest there it is held until resume().
         """
+    def rapid_override(self, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        The same of rapids, which the feed override leaves alone.
+        """
     def restart(self, position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         """
         At rest at a position (n_axes,), the queue empty. ArgumentError on another shape or a value that is not finite.
@@ -1362,6 +1687,18 @@ class MotionController:
     def resume(self) -> None:
         """
         Go on after hold().
+        """
+    def retrace(self, distance_mm: typing.SupportsFloat | typing.SupportsIndex) -> JogResult:
+        """
+        Back along the path, at half the speed with which it was run.
+        
+        When a jog may; resume() leads to where the path rests, then it goes on.
+        
+        Args:
+            distance_mm: From where it rests, as far as it is kept; less than before: forward.
+        
+        Returns:
+            JogResult; unless it is `accepted` nothing has happened.
         """
     def run(self, max_periods: typing.SupportsInt | typing.SupportsIndex = 1000000) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1376,18 +1713,19 @@ class MotionController:
         Raises:
             ArgumentError: Periods below 0.
         """
-    def step(self, periods: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+    def step(self, periods: typing.SupportsInt | typing.SupportsIndex = 1, spindle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         The next set-points, one for each period.
         
         Args:
             periods: How many, >= 0.
+            spindle: Where the spindle is in each period, revolutions that go on counting, (periods,). None: it is not measured.
         
         Returns:
             (periods, n_axes), mm or the unit of a following axis; `state.activity` says what the last one was.
         
         Raises:
-            ArgumentError: Periods below 0.
+            ArgumentError: Periods below 0, or not as many angles.
         """
     def step_motion(self, periods: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
@@ -1413,6 +1751,20 @@ class MotionController:
         
         Returns:
             In the order of their pushes, each with its step.
+        """
+    def travel(self, axis: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        """
+        Where an axis may be from now on.
+        
+        Where the path that is planned would leave it, the control is held, with the stop that is planned.
+        
+        Args:
+            axis: Its index, from 0.
+            low: mm or the axis' unit.
+            high: Likewise.
+        
+        Returns:
+            False: there is no such axis, or `low` is above `high`.
         """
     @property
     def correction_delay(self) -> int:

@@ -75,6 +75,7 @@ bool run(const Options& options) {
       report.free_run(free_run, window, load.cores());
     }
     report.pushes();
+    report.other_calls(other_calls(100));
     report.repeated(repeated(std::min<std::size_t>(options.steps, 200'000), 10));
   }
   if (options.minutes > 0.0) report.periodic(periodic(options.minutes), options.minutes);

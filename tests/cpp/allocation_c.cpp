@@ -8,14 +8,14 @@
 namespace {
 
 shapegcode_controller* make_control() {
-  shapegcode_settings settings;
-  shapegcode_settings_init(&settings, sizeof settings);
-  settings.limits.law = SHAPEGCODE_JERK_LIMITED;
-  for (double& limit : settings.limits.max_acceleration_mm_per_s2) limit = 2000.0;
-  settings.window = 8;
-  settings.queue = 8;
+  shapegcode_settings* settings = shapegcode_settings_create();
+  for (int axis = 0; axis < 3; ++axis)
+    shapegcode_settings_set_axis(settings, SHAPEGCODE_MAX_ACCELERATION, axis, 2000.0);
+  shapegcode_settings_set(settings, SHAPEGCODE_WINDOW, 8);
+  shapegcode_settings_set(settings, SHAPEGCODE_QUEUE, 8);
   shapegcode_controller* control = nullptr;
-  shapegcode_controller_create(&settings, &control, nullptr, 0);
+  shapegcode_controller_create(settings, &control, nullptr, 0);
+  shapegcode_settings_destroy(settings);
   return control;
 }
 
@@ -26,13 +26,13 @@ long push_all(shapegcode_controller* control, long& taken) {
   const shapegcode_arc half = {{10.0, 0.0, 0.0}, std::numbers::pi, 2};
   const shapegcode_arc none = {{0.0, 0.0, 0.0}, 0.0, 5};
   const auto next = [&] {
-    return taken % 2 == 0 ? shapegcode_controller_push_line(control, there, 100.0, 1, 0)
-                          : shapegcode_controller_push_arc(control, back, &half, 100.0, 2, 0);
+    return taken % 2 == 0 ? shapegcode_controller_push_line(control, there, 100.0, nullptr)
+                          : shapegcode_controller_push_arc(control, back, &half, 100.0, nullptr);
   };
   while (next() == SHAPEGCODE_OK) ++taken;
   long refused = next() == SHAPEGCODE_QUEUE_FULL ? 1 : 0;
-  refused += shapegcode_controller_push_arc(control, there, &none, 100.0, 0, 0) == SHAPEGCODE_NO_ARC ? 1 : 0;
-  refused += shapegcode_controller_push_line(control, nullptr, 100.0, 0, 0) == SHAPEGCODE_ERROR_NULL ? 1 : 0;
+  refused += shapegcode_controller_push_arc(control, there, &none, 100.0, nullptr) == SHAPEGCODE_NO_ARC ? 1 : 0;
+  refused += shapegcode_controller_push_line(control, nullptr, 100.0, nullptr) == SHAPEGCODE_ERROR_NULL ? 1 : 0;
   return refused;
 }
 

@@ -67,6 +67,48 @@ class ProgramRun {
     return steps;
   }
 
+  /// What an operator does while the path rests, a thread, and an end.
+  long by_hand() noexcept {
+    long steps = 0;
+    control_.restart(std::array<double, axis_count>{});
+    at_ = Vector3::Zero();
+    push(6);
+    for (int part = 0; part < 30; ++part) {
+      plan();
+      control_.offset(part % 3, 0.01 * part);
+      control_.rapid_override(0.5 + 0.01 * part);
+      control_.travel(part % 3, {-500.0 - part, 500.0});
+      steps += step(10);
+    }
+    control_.hold();
+    steps += step(400);
+    for (int axis = 0; axis < 3; ++axis) jogs += control_.jog(axis, 20.0 - 15.0 * axis) == JogResult::accepted ? 1 : 0;
+    steps += step(200);
+    for (int axis = 0; axis < 3; ++axis) control_.jog(axis, 0.0);
+    steps += step(200);
+    for (int axis = 0; axis < 3; ++axis) jogs += control_.jog_by(axis, 1.5, 30.0) == JogResult::accepted ? 1 : 0;
+    steps += step(400);
+    jogs += control_.retrace(2.0) == JogResult::accepted ? 1 : 0;
+    steps += step(600);
+    control_.flush();
+    steps += step(50);
+    std::array<double, axis_count> position{};
+    if (control_.flushed(position)) ++flushes;
+    control_.resume();
+    const Vector3 here(position[0], position[1], position[2]);
+    SegmentRules rules;
+    rules.feed_rate = FeedRate::synchronous;
+    control_.push(make_line(here, here + Vector3(0, 0, 20), 1.0), {}, rules);
+    for (int k = 0; k < 600; ++k) {
+      control_.spindle(0.01 * k);
+      plan();
+      steps += step(1);
+    }
+    control_.emergency_stop();
+    return steps + step(300);
+  }
+
+  long jogs = 0;
   long planned = 0, stops = 0, events = 0, flushes = 0;
 
  private:
@@ -80,6 +122,10 @@ class ProgramRun {
     settings.plans_in_step = false;
     settings.window = 16;
     settings.queue = 32;
+    settings.travel.assign(axis_count, {-500.0, 500.0});
+    settings.offset.assign(axis_count, {10.0, 200.0, 5000.0, 0.01});
+    settings.emergency_acceleration.assign(axis_count, 5000.0);
+    settings.retrace_periods = 500;
     return settings;
   }
 
@@ -95,4 +141,6 @@ void check_program_items() {
   expect_none("MotionController: plan, events, dwells, stops, probe, flush", [&] { return run.live(); });
   expect(run.planned > 100 && run.stops > 0 && run.events > 20 && run.flushes == 8,
          "a program was run with its events, dwells, stops, touches and flushes");
+  expect_none("MotionController: axes by hand, offset, spindle, emergency stop", [&] { return run.by_hand(); });
+  expect(run.jogs == 7 && run.flushes == 9, "axes were jogged, the path retraced and flushed");
 }

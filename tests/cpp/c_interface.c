@@ -20,27 +20,48 @@ static const double period_s = 0.001;
 static const double feed_mm_per_s = 100.0;
 static const double tolerance_mm = 0.05;
 
-static shapegcode_settings plain_settings(void) {
-  shapegcode_settings settings;
+static shapegcode_settings* plain_settings(void) {
+  shapegcode_settings* settings = shapegcode_settings_create();
   int axis;
-  CHECK(shapegcode_settings_init(&settings, sizeof settings) == SHAPEGCODE_OK);
-  settings.period_s = period_s;
-  settings.limits.law = SHAPEGCODE_JERK_LIMITED;
+  CHECK(settings != NULL);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_PERIOD_S, period_s) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_CONTOUR_TOLERANCE_MM, tolerance_mm) == SHAPEGCODE_OK);
   for (axis = 0; axis < 3; ++axis) {
-    settings.limits.max_acceleration_mm_per_s2[axis] = 1000.0;
-    settings.limits.max_jerk_mm_per_s3[axis] = 50000.0;
+    CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_MAX_ACCELERATION, axis, 1000.0) == SHAPEGCODE_OK);
+    CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_MAX_JERK, axis, 50000.0) == SHAPEGCODE_OK);
   }
-  settings.contour_tolerance_mm = tolerance_mm;
   return settings;
 }
 
-static shapegcode_controller* made(const shapegcode_settings* settings) {
+/* Of settings that it frees. */
+static shapegcode_controller* made(shapegcode_settings* settings) {
   shapegcode_controller* control = NULL;
   char message[200];
   const shapegcode_status status = shapegcode_controller_create(settings, &control, message, sizeof message);
   if (status != SHAPEGCODE_OK) fprintf(stderr, "create: %s: %s\n", shapegcode_status_text(status), message);
   CHECK(status == SHAPEGCODE_OK && control != NULL && message[0] == '\0');
+  CHECK(shapegcode_settings_destroy(settings) == SHAPEGCODE_OK);
   return control;
+}
+
+static shapegcode_rules rules_of(uint32_t line, int stop_at_end) {
+  shapegcode_rules rules;
+  CHECK(shapegcode_rules_init(&rules, sizeof rules) == SHAPEGCODE_OK);
+  rules.line = line;
+  rules.stop_at_end = stop_at_end;
+  return rules;
+}
+
+static shapegcode_status push_line(shapegcode_controller* control, const double* end, double feed, uint32_t line,
+                                   int stop_at_end) {
+  const shapegcode_rules rules = rules_of(line, stop_at_end);
+  return shapegcode_controller_push_line(control, end, feed, &rules);
+}
+
+static shapegcode_status push_arc(shapegcode_controller* control, const double* end, const shapegcode_arc* arc,
+                                  double feed, uint32_t line, int stop_at_end) {
+  const shapegcode_rules rules = rules_of(line, stop_at_end);
+  return shapegcode_controller_push_arc(control, end, arc, feed, &rules);
 }
 
 static double distance(const double* a, const double* b) { return sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2)); }
@@ -77,7 +98,7 @@ static void square(void) {
   const int32_t delays[2] = {0, 11};
   const double taps[2] = {0.516, 0.484};
   const shapegcode_shaper zv = {delays, taps, 2};
-  shapegcode_settings settings = plain_settings();
+  shapegcode_settings* settings = plain_settings();
   shapegcode_controller* control;
   shapegcode_activity activity = SHAPEGCODE_MOVING;
   double set_point[3] = {0, 0, 0};
@@ -85,16 +106,14 @@ static void square(void) {
   double fastest = 0.0;
   int pushed = 0;
   int step = 0;
-  settings.shapers = &zv;
-  settings.shaper_count = 1;
-  control = made(&settings);
+  CHECK(shapegcode_settings_set_shaper(settings, -1, &zv) == SHAPEGCODE_OK);
+  control = made(settings);
   while (step < 20000 && (pushed < 4 || activity != SHAPEGCODE_IDLE)) {
     double before[3];
     int corner;
     /* Every tenth of a second a side, long before the one before is at its end. */
     if (pushed < 4 && step % 100 == 0) {
-      CHECK(shapegcode_controller_push_line(control, corners[pushed], feed_mm_per_s, (uint32_t)pushed + 1,
-                                            pushed == 3) == SHAPEGCODE_OK);
+      CHECK(push_line(control, corners[pushed], feed_mm_per_s, (uint32_t)pushed + 1, pushed == 3) == SHAPEGCODE_OK);
       ++pushed;
     }
     operate(control, step);
@@ -117,8 +136,7 @@ static void square(void) {
 
 /* With what a drive's feed-forward wants: the second half of a move mirrors the first. */
 static void feed_forward(void) {
-  const shapegcode_settings settings = plain_settings();
-  shapegcode_controller* control = made(&settings);
+  shapegcode_controller* control = made(plain_settings());
   const double end[3] = {10, 0, 0};
   double set_point[3];
   double velocity[3];
@@ -126,10 +144,10 @@ static void feed_forward(void) {
   double sum = 0.0;
   double fastest = 0.0;
   shapegcode_activity activity = SHAPEGCODE_MOVING;
-  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 7, 1) == SHAPEGCODE_OK);
+  CHECK(push_line(control, end, feed_mm_per_s, 7, 1) == SHAPEGCODE_OK);
   while (activity != SHAPEGCODE_IDLE && state_of(control).steps < 10000) {
     CHECK(shapegcode_controller_step_motion(control, set_point, velocity, acceleration, &activity) == SHAPEGCODE_OK);
-    sum += velocity[0] * settings.period_s;
+    sum += velocity[0] * period_s;
     fastest = fmax(fastest, velocity[0]);
   }
   CHECK(fabs(sum - end[0]) < 1e-6 && fastest <= 1.001 * feed_mm_per_s);
@@ -142,8 +160,7 @@ static void feed_forward(void) {
 
 /* Something at a corner, a dwell there, and a stop that waits. */
 static void events(void) {
-  const shapegcode_settings settings = plain_settings();
-  shapegcode_controller* control = made(&settings);
+  shapegcode_controller* control = made(plain_settings());
   const double corner[3] = {10, 0, 0};
   const double end[3] = {10, 10, 0};
   double set_point[3];
@@ -151,11 +168,11 @@ static void events(void) {
   uint64_t word = 0;
   int has_event = 1;
   int dwelt = 0;
-  CHECK(shapegcode_controller_push_line(control, corner, feed_mm_per_s, 1, 0) == SHAPEGCODE_OK);
+  CHECK(push_line(control, corner, feed_mm_per_s, 1, 0) == SHAPEGCODE_OK);
   CHECK(shapegcode_controller_push_event(control, 5, 11) == SHAPEGCODE_OK);
   CHECK(shapegcode_controller_push_dwell(control, 0.1) == SHAPEGCODE_OK);
   CHECK(shapegcode_controller_push_dwell(control, -0.1) == SHAPEGCODE_NO_TIME);
-  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 2, 0) == SHAPEGCODE_OK);
+  CHECK(push_line(control, end, feed_mm_per_s, 2, 0) == SHAPEGCODE_OK);
   CHECK(shapegcode_controller_push_stop(control) == SHAPEGCODE_OK);
   while (state_of(control).activity != SHAPEGCODE_HELD && state_of(control).steps < 10000) {
     CHECK(shapegcode_controller_step(control, set_point, NULL) == SHAPEGCODE_OK);
@@ -174,8 +191,7 @@ static void events(void) {
 
 /* A probe touches on the way; the way back begins where the motion has come to rest. */
 static void probing(void) {
-  const shapegcode_settings settings = plain_settings();
-  shapegcode_controller* control = made(&settings);
+  shapegcode_controller* control = made(plain_settings());
   const double end[3] = {100, 0, 0};
   const double start[3] = {0, 0, 0};
   double set_point[3];
@@ -183,16 +199,16 @@ static void probing(void) {
   double rest[3];
   int step;
   int done = 1;
-  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 1, 1) == SHAPEGCODE_OK);
+  CHECK(push_line(control, end, feed_mm_per_s, 1, 1) == SHAPEGCODE_OK);
   for (step = 0; step < 300; ++step) CHECK(shapegcode_controller_step(control, set_point, NULL) == SHAPEGCODE_OK);
   CHECK(shapegcode_controller_flushed(control, rest, &done) == SHAPEGCODE_OK && !done);
   CHECK(shapegcode_controller_probe(control, latched) == SHAPEGCODE_OK);
   CHECK(distance(latched, set_point) == 0.0);
-  CHECK(shapegcode_controller_push_line(control, start, feed_mm_per_s, 2, 1) == SHAPEGCODE_FLUSHING);
+  CHECK(push_line(control, start, feed_mm_per_s, 2, 1) == SHAPEGCODE_FLUSHING);
   run(control, set_point, SHAPEGCODE_IDLE, 2000);
   CHECK(shapegcode_controller_flushed(control, rest, &done) == SHAPEGCODE_OK && done);
   CHECK(distance(rest, set_point) < 1e-9 && rest[0] > latched[0] && rest[0] < end[0] - 1.0);
-  CHECK(shapegcode_controller_push_line(control, start, feed_mm_per_s, 2, 1) == SHAPEGCODE_OK);
+  CHECK(push_line(control, start, feed_mm_per_s, 2, 1) == SHAPEGCODE_OK);
   run(control, set_point, SHAPEGCODE_IDLE, 20000);
   CHECK(distance(set_point, start) == 0.0 && state_of(control).segments_done == 1);
   CHECK(shapegcode_controller_flush(control) == SHAPEGCODE_OK);
@@ -203,7 +219,7 @@ static void probing(void) {
 
 static void arcs(void) {
   const double pi = 3.14159265358979323846;
-  shapegcode_settings settings = plain_settings();
+  shapegcode_settings* settings = plain_settings();
   shapegcode_controller* control;
   shapegcode_arc arc = {{20, 0, 0}, 0, 2};
   const double start[3] = {0, 0, 0};
@@ -212,18 +228,18 @@ static void arcs(void) {
   double highest = -1e9;
   double lowest = 1e9;
   shapegcode_activity activity = SHAPEGCODE_MOVING;
-  settings.smoothing_time_s = 0.0;
-  control = made(&settings);
-  CHECK(shapegcode_controller_push_arc(control, start, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_NO_ARC); /* no sweep */
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_SMOOTHING_TIME_S, 0.0) == SHAPEGCODE_OK);
+  control = made(settings);
+  CHECK(push_arc(control, start, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_NO_ARC); /* no sweep */
   arc.sweep_rad = 0.3;
-  CHECK(shapegcode_controller_push_arc(control, end, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_NO_ARC); /* leads away */
+  CHECK(push_arc(control, end, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_NO_ARC); /* leads away */
   arc.sweep_rad = NAN;
-  CHECK(shapegcode_controller_push_arc(control, end, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_NOT_FINITE);
+  CHECK(push_arc(control, end, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_NOT_FINITE);
   arc.sweep_rad = -2.0 * pi;
-  CHECK(shapegcode_controller_push_arc(control, start, &arc, -1.0, 1, 0) == SHAPEGCODE_NO_FEED);
-  CHECK(shapegcode_controller_push_arc(control, start, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_OK); /* a circle */
+  CHECK(push_arc(control, start, &arc, -1.0, 1, 0) == SHAPEGCODE_NO_FEED);
+  CHECK(push_arc(control, start, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_OK); /* a circle */
   arc.sweep_rad = -0.5 * pi + 1e-5; /* rounded: the end is met all the same */
-  CHECK(shapegcode_controller_push_arc(control, end, &arc, feed_mm_per_s, 2, 1) == SHAPEGCODE_OK);
+  CHECK(push_arc(control, end, &arc, feed_mm_per_s, 2, 1) == SHAPEGCODE_OK);
   while (activity != SHAPEGCODE_IDLE && state_of(control).steps < 10000) {
     CHECK(shapegcode_controller_step(control, set_point, &activity) == SHAPEGCODE_OK);
     highest = fmax(highest, set_point[1]);
@@ -235,118 +251,185 @@ static void arcs(void) {
 }
 
 static void following_axis(void) {
-  shapegcode_settings settings = plain_settings();
+  shapegcode_settings* settings = plain_settings();
   shapegcode_controller* control;
   const double end[4] = {10, 0, 0, 90};
   const double turned[4] = {10, 0, 0, 45};
   double set_point[4];
   int32_t axes = 0;
-  settings.following_count = 1;
-  control = made(&settings);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_FOLLOWING_AXES, 1.0) == SHAPEGCODE_OK);
+  control = made(settings);
   CHECK(shapegcode_controller_axes(control, &axes) == SHAPEGCODE_OK && axes == 4);
-  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 1, 1) == SHAPEGCODE_OK);
-  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 2, 1) == SHAPEGCODE_NO_LENGTH);
-  CHECK(shapegcode_controller_push_line(control, turned, feed_mm_per_s, 2, 1) == SHAPEGCODE_OK);
+  CHECK(push_line(control, end, feed_mm_per_s, 1, 1) == SHAPEGCODE_OK);
+  CHECK(push_line(control, end, feed_mm_per_s, 2, 1) == SHAPEGCODE_NO_LENGTH);
+  CHECK(push_line(control, turned, feed_mm_per_s, 2, 1) == SHAPEGCODE_OK);
   run(control, set_point, SHAPEGCODE_IDLE, 10000);
   CHECK(set_point[0] == 10.0 && set_point[3] == 45.0);
   CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
 }
 
 static void abort_and_restart(void) {
-  const shapegcode_settings settings = plain_settings();
-  shapegcode_controller* control = made(&settings);
+  shapegcode_controller* control = made(plain_settings());
   const double far_away[3] = {100, 0, 0};
   const double wrong[3] = {INFINITY, 0, 0};
   double set_point[3];
-  CHECK(shapegcode_controller_push_line(control, far_away, feed_mm_per_s, 7, 1) == SHAPEGCODE_OK);
+  CHECK(push_line(control, far_away, feed_mm_per_s, 7, 1) == SHAPEGCODE_OK);
   run(control, set_point, SHAPEGCODE_MOVING, 1);
   while (set_point[0] < 30.0 && failures == 0) run(control, set_point, SHAPEGCODE_MOVING, 1);
   CHECK(state_of(control).line == 7);
   CHECK(shapegcode_controller_abort(control) == SHAPEGCODE_OK);
   run(control, set_point, SHAPEGCODE_ABORTED, 1000);
   CHECK(set_point[0] > 30.0 && set_point[0] < 60.0);
-  CHECK(shapegcode_controller_push_line(control, far_away, feed_mm_per_s, 8, 1) == SHAPEGCODE_AFTER_ABORT);
+  CHECK(push_line(control, far_away, feed_mm_per_s, 8, 1) == SHAPEGCODE_AFTER_ABORT);
   CHECK(shapegcode_controller_restart(control, wrong) == SHAPEGCODE_NOT_FINITE);
   CHECK(shapegcode_controller_restart(control, set_point) == SHAPEGCODE_OK);
-  CHECK(shapegcode_controller_push_line(control, far_away, feed_mm_per_s, 8, 1) == SHAPEGCODE_OK);
+  CHECK(push_line(control, far_away, feed_mm_per_s, 8, 1) == SHAPEGCODE_OK);
   run(control, set_point, SHAPEGCODE_IDLE, 10000);
   CHECK(set_point[0] == 100.0);
   CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
 }
 
 static void refused_settings(void) {
-  shapegcode_settings settings = plain_settings();
+  shapegcode_settings* settings = plain_settings();
   shapegcode_controller* control = (shapegcode_controller*)&settings;
   const int32_t delays[2] = {0, 11};
   const double taps[2] = {0.5, 0.4};
+  const double places[2] = {10.0, 0.0};
   const shapegcode_shaper not_one = {delays, taps, 2};
+  const shapegcode_shaper no_taps = {delays, NULL, 2};
   char message[200] = "before";
   char short_message[8];
-  settings.period_s = -1.0;
-  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_PERIOD_S, -1.0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_create(settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
   CHECK(control == NULL && strstr(message, "-1") != NULL);
-  CHECK(shapegcode_controller_create(&settings, &control, short_message, sizeof short_message) ==
+  CHECK(shapegcode_controller_create(settings, &control, short_message, sizeof short_message) ==
         SHAPEGCODE_ERROR_ARGUMENT);
   CHECK(strlen(short_message) == 7 && strncmp(message, short_message, 7) == 0);
-  CHECK(shapegcode_controller_create(&settings, &control, NULL, 0) == SHAPEGCODE_ERROR_ARGUMENT);
-  settings = plain_settings();
-  settings.shapers = &not_one;
-  settings.shaper_count = 1;
-  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
-  settings.shapers = NULL;
-  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
-  settings = plain_settings();
-  settings.following_count = SHAPEGCODE_MOST_FOLLOWING_AXES + 1;
-  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
-  settings = plain_settings();
-  settings.limits.law = 2;
-  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
-  memset(&settings, 0, sizeof settings); /* nobody initialised it */
-  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_STRUCT_SIZE);
-  CHECK(strcmp(message, shapegcode_status_text(SHAPEGCODE_ERROR_STRUCT_SIZE)) == 0);
-  CHECK(shapegcode_settings_init(&settings, sizeof settings + 8) == SHAPEGCODE_ERROR_STRUCT_SIZE);
+  CHECK(shapegcode_controller_create(settings, &control, NULL, 0) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set_shaper(settings, -1, &not_one) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set_shaper(settings, 0, &no_taps) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_settings_set_shaper(settings, 9, &not_one) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set_following_shaper(settings, 0, places, &not_one, 1) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set_following_shaper(settings, 0, NULL, &not_one, 1) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_settings_set(settings, 0, 1.0) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_FOLLOWING_AXES, 7.0) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_WINDOW, 8.5) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_QUEUE, NAN) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_LAW, 2.0) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_MAX_FEED, -1, 1.0) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_TOLERANCE, 0, 1.0) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_CONTOUR_ACCELERATION, 3, 1.0) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_set(NULL, SHAPEGCODE_PERIOD_S, 0.001) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_settings_set_axis(NULL, SHAPEGCODE_MAX_FEED, 0, 1.0) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_settings_destroy(settings) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_destroy(NULL) == SHAPEGCODE_OK);
+}
+
+/* A thread, an axis by hand, an offset, soft limits, an emergency stop. */
+static void beside_the_path(void) {
+  shapegcode_settings* settings = plain_settings();
+  shapegcode_controller* control;
+  shapegcode_rules thread = rules_of(3, 1);
+  const double depth[3] = {0, 0, -20};
+  const double beyond[3] = {0, 0, -31};
+  double set_point[3];
+  int step;
+  int axis;
+  for (axis = 0; axis < 3; ++axis) {
+    CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_EMERGENCY_ACCELERATION, axis, 4000.0) == SHAPEGCODE_OK);
+  }
+  CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_TRAVEL_LOW, 2, -30.0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_OFFSET_MAX_FEED, 0, 10.0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_OFFSET_MAX_ACCELERATION, 0, 200.0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_OFFSET_MAX_JERK, 0, 5000.0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_SPINDLE_BANDWIDTH_HZ, 15.0) == SHAPEGCODE_OK);
+  control = made(settings);
+  CHECK(shapegcode_controller_push_line(control, beyond, 10.0, NULL) == SHAPEGCODE_BEYOND_TRAVEL);
+  thread.feed_rate = SHAPEGCODE_SYNCHRONOUS;
+  CHECK(shapegcode_controller_push_line(control, depth, 1.5, &thread) == SHAPEGCODE_OK);
+  for (step = 0; step < 3000; ++step) {
+    CHECK(shapegcode_controller_spindle(control, 10.0 * period_s * step) == SHAPEGCODE_OK);
+    CHECK(shapegcode_controller_step(control, set_point, NULL) == SHAPEGCODE_OK);
+    if (step == 1000) {
+      /* In the thread: so many revolutions from a whole one. */
+      const double turns = -set_point[2] / 1.5 - 10.0 * period_s * step;
+      CHECK(fabs(turns - floor(turns + 0.5)) < 1e-4 && set_point[2] < -5.0);
+      CHECK(fabs(state_of(control).spindle_speed - 10.0) < 1e-6 && state_of(control).line == 3);
+    }
+  }
+  CHECK(state_of(control).activity == SHAPEGCODE_IDLE && set_point[2] == -20.0);
+  CHECK(shapegcode_controller_jog(control, 2, 10.0) == SHAPEGCODE_PATH_MOVES);
+  CHECK(shapegcode_controller_hold(control) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_HELD, 2);
+  CHECK(shapegcode_controller_jog(control, 9, 10.0) == SHAPEGCODE_NO_AXIS);
+  CHECK(shapegcode_controller_jog_by(control, 2, 1.0, 0.0) == SHAPEGCODE_NO_SPEED);
+  CHECK(shapegcode_controller_jog_by(control, 2, -11.0, 5.0) == SHAPEGCODE_BEYOND_TRAVEL);
+  CHECK(shapegcode_controller_jog_by(control, 2, 2.5, 50.0) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_JOGGING, 1);
+  run(control, set_point, SHAPEGCODE_HELD, 1000);
+  CHECK(fabs(set_point[2] + 17.5) < 1e-12);
+  CHECK(shapegcode_controller_resume(control) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_IDLE, 1000);
+  CHECK(fabs(set_point[2] + 20.0) < 1e-12);
+  CHECK(shapegcode_controller_retrace(control, 1.0) == SHAPEGCODE_NO_RECORD);
+  CHECK(shapegcode_controller_offset(control, 1, 1.0) == SHAPEGCODE_NO_AXIS);
+  CHECK(shapegcode_controller_offset(control, 0, NAN) == SHAPEGCODE_NOT_FINITE);
+  CHECK(shapegcode_controller_offset(control, 0, -1.0) == SHAPEGCODE_OK);
+  for (step = 0; step < 1000; ++step) CHECK(shapegcode_controller_step(control, set_point, NULL) == SHAPEGCODE_OK);
+  CHECK(fabs(set_point[0] + 1.0) < 1e-12 && fabs(state_of(control).offset[0] + 1.0) < 1e-12);
+  CHECK(shapegcode_controller_travel(control, 3, 0.0, 1.0) == SHAPEGCODE_NO_AXIS);
+  CHECK(shapegcode_controller_travel(control, 2, 1.0, 0.0) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_controller_travel(control, 2, -100.0, 0.0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_rapid_override(control, 0.5) == SHAPEGCODE_OK);
+  thread.feed_rate = SHAPEGCODE_RAPID;
+  CHECK(shapegcode_controller_push_line(control, beyond, feed_mm_per_s, &thread) == SHAPEGCODE_OK);
+  for (step = 0; step < 100; ++step) CHECK(shapegcode_controller_step(control, set_point, NULL) == SHAPEGCODE_OK);
+  CHECK(fabs(state_of(control).speed_mm_per_s - 0.5 * feed_mm_per_s) < 0.05);
+  CHECK(shapegcode_controller_emergency_stop(control) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_ABORTED, 20); /* 50 mm/s at 4000 mm/s^2 */
+  thread.feed_of = 9;
+  CHECK(shapegcode_controller_push_line(control, beyond, 1.0, &thread) == SHAPEGCODE_ERROR_STRUCT_SIZE);
+  CHECK(shapegcode_rules_init(&thread, sizeof thread + 8) == SHAPEGCODE_ERROR_STRUCT_SIZE);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
 }
 
 static void refused_calls(void) {
-  const shapegcode_settings settings = plain_settings();
   shapegcode_controller* control = NULL;
   shapegcode_state state;
   const double end[3] = {1, 0, 0};
   const double nowhere[3] = {NAN, 0, 0};
-  CHECK(shapegcode_settings_init(NULL, sizeof settings) == SHAPEGCODE_ERROR_NULL);
   CHECK(shapegcode_controller_create(NULL, &control, NULL, 0) == SHAPEGCODE_ERROR_NULL && control == NULL);
-  CHECK(shapegcode_controller_push_line(NULL, end, 1.0, 0, 0) == SHAPEGCODE_ERROR_NULL);
+  CHECK(push_line(NULL, end, 1.0, 0, 0) == SHAPEGCODE_ERROR_NULL);
   CHECK(shapegcode_controller_step(NULL, NULL, NULL) == SHAPEGCODE_ERROR_NULL);
   CHECK(shapegcode_controller_hold(NULL) == SHAPEGCODE_ERROR_NULL);
   CHECK(shapegcode_controller_destroy(NULL) == SHAPEGCODE_OK);
-  control = made(&settings);
-  CHECK(shapegcode_controller_push_line(control, NULL, 1.0, 0, 0) == SHAPEGCODE_ERROR_NULL);
-  CHECK(shapegcode_controller_push_line(control, nowhere, 1.0, 0, 0) == SHAPEGCODE_NOT_FINITE);
-  CHECK(shapegcode_controller_push_line(control, end, 0.0, 0, 0) == SHAPEGCODE_NO_FEED);
+  control = made(plain_settings());
+  CHECK(push_line(control, NULL, 1.0, 0, 0) == SHAPEGCODE_ERROR_NULL);
+  CHECK(push_line(control, nowhere, 1.0, 0, 0) == SHAPEGCODE_NOT_FINITE);
+  CHECK(push_line(control, end, 0.0, 0, 0) == SHAPEGCODE_NO_FEED);
   CHECK(shapegcode_controller_state(control, &state, 3) == SHAPEGCODE_ERROR_STRUCT_SIZE);
-  CHECK(shapegcode_controller_push_line(control, end, 1.0, 0, 0) == SHAPEGCODE_OK);
+  CHECK(push_line(control, end, 1.0, 0, 0) == SHAPEGCODE_OK);
   CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
 }
 
 static void full_queue(void) {
-  shapegcode_settings settings = plain_settings();
+  shapegcode_settings* settings = plain_settings();
   shapegcode_controller* control;
   double end[3] = {0, 0, 0};
   double set_point[3];
   double periods = -1.0;
   int taken = 0;
-  settings.window = 8;
-  settings.queue = 8;
-  control = made(&settings);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_WINDOW, 8) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_QUEUE, 8) == SHAPEGCODE_OK);
+  control = made(settings);
   do {
     end[0] = taken + 1.0;
-  } while (taken < 100 && shapegcode_controller_push_line(control, end, feed_mm_per_s, 0, 1) == SHAPEGCODE_OK &&
-           ++taken);
+  } while (taken < 100 && push_line(control, end, feed_mm_per_s, 0, 1) == SHAPEGCODE_OK && ++taken);
   CHECK(taken >= 8 && taken < 100);
-  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 0, 1) == SHAPEGCODE_QUEUE_FULL);
+  CHECK(push_line(control, end, feed_mm_per_s, 0, 1) == SHAPEGCODE_QUEUE_FULL);
   run(control, set_point, SHAPEGCODE_IDLE, 100000);
   CHECK(set_point[0] == taken); /* what was not taken left no trace */
-  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 0, 1) == SHAPEGCODE_OK);
+  CHECK(push_line(control, end, feed_mm_per_s, 0, 1) == SHAPEGCODE_OK);
   CHECK(shapegcode_controller_delay(control, &periods) == SHAPEGCODE_OK && periods >= 0.0);
   CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
 }
@@ -354,10 +437,10 @@ static void full_queue(void) {
 static void texts(void) {
   int code;
   CHECK(shapegcode_c_version() == SHAPEGCODE_C_VERSION);
-  for (code = SHAPEGCODE_ERROR_INTERNAL; code <= SHAPEGCODE_FLUSHING; ++code) {
+  for (code = SHAPEGCODE_ERROR_INTERNAL; code <= SHAPEGCODE_NO_RECORD; ++code) {
     CHECK(strcmp(shapegcode_status_text(code), shapegcode_status_text(1000)) != 0);
   }
-  for (code = SHAPEGCODE_IDLE; code <= SHAPEGCODE_ABORTED; ++code) {
+  for (code = SHAPEGCODE_IDLE; code <= SHAPEGCODE_JOGGING; ++code) {
     CHECK(strcmp(shapegcode_activity_text(code), shapegcode_activity_text(1000)) != 0);
   }
 }
@@ -372,6 +455,7 @@ int main(void) {
   probing();
   arcs();
   following_axis();
+  beside_the_path();
   abort_and_restart();
   full_queue();
   if (failures == 0) printf("the C interface does what its header says\n");

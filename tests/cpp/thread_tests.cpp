@@ -1,6 +1,6 @@
 // Sessions of the controller with a thread for each of its parts, for ThreadSanitizer: one steps, one plans, one pushes
-// and turns the override, one reads the state. What the sanitizer finds ends the process with its own exit code; what
-// is checked here is that no reader sees half a state.
+// and turns the override, one reads the state and moves axes by hand. What the sanitizer finds ends the process with
+// its own exit code; what is checked here is that no reader sees half a state.
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -42,8 +42,41 @@ ControllerSettings settings_of(std::uint32_t session) {
   settings.window = session % 2 == 0 ? 8 : 64;
   settings.plans_in_step = session % 4 == 0;
   settings.lead_periods = session % 8 < 4 ? 20 : 200;
+  if (session % 2 == 0) settings.offset.resize(3 + settings.following.size(), {10.0, 100.0, 5'000.0, 0.01});
+  settings.retrace_periods = 200;
   settings.queue = 66;  // small: pushing waits for stepping, and places are used again and again
   return settings;
+}
+
+// What an operator does at any time.
+void operate(MotionController& control, std::mt19937& draw) {
+  const int axis = static_cast<int>(draw() % 3);
+  const double size = 0.01 * static_cast<double>(draw() % 1001) - 5.0;
+  switch (draw() % 9) {
+    case 0:
+      control.hold();
+      break;
+    case 1:
+      control.jog(axis, 10.0 * size);
+      break;
+    case 2:
+      control.jog_by(axis, 0.1 * size, 20.0);
+      break;
+    case 3:
+      control.retrace(std::abs(size));
+      break;
+    case 4:
+      control.offset(axis, 0.1 * size);
+      break;
+    case 5:
+      control.travel(axis, {-1000.0 - size, 1000.0});
+      break;
+    case 6:
+      control.rapid_override(0.5 + 0.1 * size);
+      break;
+    default:
+      control.resume();
+  }
 }
 
 void session_of(std::uint32_t session) {
@@ -62,10 +95,10 @@ void session_of(std::uint32_t session) {
       std::array<double, max_controller_axes> rest{};
       if (session % 3 == 0 && draw() % 5 == 0) {
         control.flush();
-        control.resume();
         control.feed_override(1.0);
         while (!control.flushed(std::span(rest).first(static_cast<std::size_t>(control.axes()))) &&
                !ended.load(std::memory_order_relaxed)) {
+          control.resume();
           std::this_thread::yield();
         }
         segment = make_line({rest[0], rest[1], rest[2]}, segment.end_mm, 100.0);
@@ -93,12 +126,14 @@ void session_of(std::uint32_t session) {
   });
   std::thread reader([&] {
     std::uint64_t last = 0;
+    std::mt19937 draw(session + 2000);
     while (!ended.load(std::memory_order_relaxed)) {
       const ControllerState state = control.state();
       check(state.steps >= last, "the state went back", session);
       // All of one step: the path is run from segment 0 on, and nothing is done that was not pushed.
       check(state.segments_done + state.segments_waiting <= segments.size(), "a state of two steps", session);
       check(std::isfinite(state.set_point[0]) && state.feed_override <= 2.0, "no number", session);
+      if (state.steps / 64 != last / 64) operate(control, draw);
       last = state.steps;
     }
   });

@@ -88,10 +88,8 @@ def fast_contour(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def session(built: Path, fast_contour: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Tool changed, then held, the override turned to 50 and 150 % on the long sides, and on behind M01."""
-    commands = (
-        "at 0.5 resume\nat 3.7 hold\nat 4.7 resume\nat 4.75 override 50\nat 6.4 override 150\nat 7.5 status\n"
-        "wait\nresume\n"
-    )
+    commands = "at 0.5 resume\nat 3.7 hold\nat 4.7 resume\nat 4.75 override 50\n"
+    commands += "at 6.4 override 150\nat 7.5 status\nwait\nresume\n"
     return run(built, fast_contour, commands, tmp_path_factory.mktemp("record") / "run.csv", "--fast")
 
 

@@ -27,10 +27,11 @@ PACKAGE = ROOT / "python" / "shapegcode"
 FOLDERS = [
     "base",
     "path",
+    "limits",
     "filter",
-    "motion",
     "planner",
     "controller",
+    "motion",
     "program",
     "shaper",
     "plant",
@@ -44,8 +45,8 @@ FOLDERS = [
     "c",
 ]
 NOT_FROM = {
-    "program": {"filter", "motion", "controller", "planner"},
-    "measure": {"filter", "motion", "controller", "planner", "program", "shaper", "plant"},
+    "program": {"filter", "limits", "motion", "controller", "planner"},
+    "measure": {"filter", "limits", "motion", "controller", "planner", "program", "shaper", "plant"},
 }
 # Public headers whose folder of sources has another name; one that is named like a folder, or lies in it, is its own.
 HEADER_FOLDERS = {

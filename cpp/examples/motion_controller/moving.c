@@ -18,29 +18,29 @@ static void corner(int i, double* end) {
 static shapegcode_controller* make_control(void) {
   const int32_t delays[2] = {0, 11};
   const double taps[2] = {0.516, 0.484};
-  const shapegcode_shaper zv = {delays, taps, 2}; /* of 46 Hz on the grid of 1 ms; create copies it */
-  shapegcode_settings settings;
+  const shapegcode_shaper zv = {delays, taps, 2}; /* of 46 Hz on the grid of 1 ms */
+  shapegcode_settings* settings = shapegcode_settings_create();
   shapegcode_controller* control;
   char message[200];
   int axis;
-  shapegcode_settings_init(&settings, sizeof settings);
-  settings.limits.law = SHAPEGCODE_JERK_LIMITED;
+  if (settings == NULL) return NULL;
   for (axis = 0; axis < 3; ++axis) {
-    settings.limits.max_acceleration_mm_per_s2[axis] = 2000.0;
-    settings.limits.max_jerk_mm_per_s3[axis] = 100000.0;
+    shapegcode_settings_set_axis(settings, SHAPEGCODE_MAX_ACCELERATION, axis, 2000.0);
+    shapegcode_settings_set_axis(settings, SHAPEGCODE_MAX_JERK, axis, 100000.0);
   }
-  settings.contour_tolerance_mm = 0.05;
-  settings.shapers = &zv;
-  settings.shaper_count = 1;
-  if (shapegcode_controller_create(&settings, &control, message, sizeof message) != SHAPEGCODE_OK) {
+  shapegcode_settings_set(settings, SHAPEGCODE_CONTOUR_TOLERANCE_MM, 0.05);
+  shapegcode_settings_set_shaper(settings, -1, &zv);
+  if (shapegcode_controller_create(settings, &control, message, sizeof message) != SHAPEGCODE_OK) {
     fprintf(stderr, "%s\n", message);
   }
+  shapegcode_settings_destroy(settings);
   return control;
 }
 
 int main(void) {
   shapegcode_controller* control = make_control();
   shapegcode_activity activity = SHAPEGCODE_IDLE;
+  shapegcode_rules rules;
   shapegcode_state state;
   double end[3];
   double set_point[3];
@@ -48,14 +48,14 @@ int main(void) {
   int held = 0;
   int period;
   if (control == NULL) return 1;
+  shapegcode_rules_init(&rules, sizeof rules);
   for (period = 0; pushed < sides || activity != SHAPEGCODE_IDLE; ++period) {
     /* The planning thread: a side begins where the one before ended; the last one stops. */
     if (pushed < sides && period % 100 == 0) {
       corner(pushed, end);
-      if (shapegcode_controller_push_line(control, end, 150.0, (uint32_t)pushed + 1, pushed + 1 == sides) ==
-          SHAPEGCODE_OK) {
-        ++pushed;
-      }
+      rules.line = (uint32_t)pushed + 1;
+      rules.stop_at_end = pushed + 1 == sides;
+      if (shapegcode_controller_push_line(control, end, 150.0, &rules) == SHAPEGCODE_OK) ++pushed;
     }
     /* The operator. */
     if (period == 500) shapegcode_controller_feed_override(control, 0.5);

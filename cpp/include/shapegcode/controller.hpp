@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "shapegcode/filter.hpp"
-#include "shapegcode/motion.hpp"
+#include "shapegcode/limits.hpp"
 #include "shapegcode/path.hpp"
 
 // What the author of a control needs: blocks come while the machine moves, the operator turns the override and presses
@@ -40,6 +40,21 @@ struct FollowingLimits {
   /// By how much the axis may deviate where its speed along the path changes at once; 0: the motion comes to rest
   /// there.
   double tolerance = MotionLimits::none;
+};
+
+/// Where an axis may be, in its unit.
+struct AxisTravel {
+  double low = -MotionLimits::none;
+  double high = MotionLimits::none;
+};
+
+/// An offset that is added to an axis while the path is run, with limits of its own, in its unit and seconds; 0: none.
+struct OffsetLimits {
+  double max_feed = 0.0;
+  double max_acceleration = 0.0;
+  double max_jerk = 0.0;
+  /// Of the drive: taken up by the offset where the axis goes down; the control begins as after a motion upwards.
+  double backlash = 0.0;
 };
 
 /// Shapers of a control: one for all axes, one for each, or a set followed along an axis (of X, Y, Z).
@@ -73,6 +88,33 @@ struct ControllerSettings {
   /// another thread calls plan(), `lead_periods` ahead of the motion: a real-time control.
   bool plans_in_step = true;
   int lead_periods = 60;
+  /// Of each axis, or of none. A segment that leads beyond it is not taken.
+  std::vector<AxisTravel> travel;
+  /// Of each axis, or of none. What it takes of the limits is not the path's any more.
+  std::vector<OffsetLimits> offset;
+  /// What each axis can do at the most, for emergency_stop(); none: it brakes as abort() does.
+  std::vector<double> emergency_acceleration;
+  /// Periods of motion that are kept for retrace(), some 150 bytes each.
+  std::size_t retrace_periods = 0;
+  /// With which a spindle is followed; see spindle(). Higher: a faster ripple is followed, and more noise.
+  double spindle_bandwidth_hz = 20.0;
+};
+
+/// What a feed is of, where X, Y and Z move together with axes that follow.
+enum class FeedOf : std::uint8_t {
+  path,      ///< X, Y and Z along their path; where these do not move (1e-9 mm), the axis that moves the furthest
+  all_axes,  ///< the root of the squares of all, degrees counted as mm
+  dominant,  ///< that of X, Y and Z along their path and the others which moves the furthest
+  time,      ///< inverse time: the segment lasts one over the feed, s or revolutions
+};
+
+/// How a segment is run, beside its geometry and its feed.
+struct SegmentRules {
+  FeedRate feed_rate = FeedRate::per_time;
+  FeedOf feed_of = FeedOf::path;
+  /// Along its path, beside the limits of the axes.
+  double max_acceleration = MotionLimits::none;
+  double max_jerk = MotionLimits::none;
 };
 
 /// Answer to a segment that was pushed.
@@ -83,23 +125,39 @@ enum class PushResult : std::uint8_t {
   no_length,
   no_feed,  ///< a feed that is not above zero, or not finite
   not_finite,
-  wrong_axes,  ///< not as many following axes as the settings have
-  aborted,     ///< after abort() nothing is taken until restart()
-  flushing,    ///< between flush() and flushed() nothing is taken
-  no_time,     ///< a dwell below zero, above 1e6 s, or no number
+  wrong_axes,     ///< not as many following axes as the settings have
+  aborted,        ///< after abort() nothing is taken until restart()
+  flushing,       ///< between flush() and flushed() nothing is taken
+  no_time,        ///< a dwell below zero, above 1e6 s, or no number
+  beyond_travel,  ///< it leads out of the travel of an axis
+  bad_limit,      ///< a limit of the segment that is not above zero
+  not_straight,   ///< bound to the spindle, and no line
 };
 [[nodiscard]] const char* text_of(PushResult result) noexcept;
 
 /// What a control does in a period.
-enum class Activity : std::uint8_t {
+enum class Activity : std::uint32_t {
   idle,      ///< at rest, nothing left to do
   moving,    ///< along the path, or the shaper is still giving out what it holds
   stopping,  ///< decelerating for hold(), flush() or abort()
   held,      ///< at rest after hold(), or at a stop that was pushed
   starved,   ///< coming to rest: the segments ran out before one with `stop_at_end`. At rest it is idle
-  aborted,   ///< at rest after abort(); the path is gone
+  aborted,   ///< at rest after abort() or emergency_stop(); the path is gone
+  jogging,   ///< away from where the path rests, or back onto it
 };
 [[nodiscard]] const char* text_of(Activity activity) noexcept;
+
+/// Answer to a jog.
+enum class JogResult : std::uint8_t {
+  accepted,
+  path_moves,  ///< the control is neither held nor flushed nor aborted, or does not rest yet
+  no_axis,
+  not_finite,
+  no_speed,       ///< of a distance: not above zero
+  beyond_travel,  ///< the distance leads out of the travel, or the axis is at its end already
+  no_record,      ///< the settings keep none for retrace()
+};
+[[nodiscard]] const char* text_of(JogResult result) noexcept;
 
 /// What a drive with feed-forward wants in a period: where each axis is at its end, how fast, and how it accelerates,
 /// in mm or the unit of a following axis, and s. All three leave the same filters, so they belong together.
@@ -116,11 +174,11 @@ struct ControllerEvent {
 /// A snapshot for a user interface.
 struct ControllerState {
   Activity activity = Activity::idle;
+  std::uint32_t line = 0;  ///< of the segment that is being run, before smoothing and shaper
   std::array<double, max_controller_axes> set_point{};  ///< last one given; mm, or the unit of a following axis
   double speed_mm_per_s = 0.0;                          ///< along the path, before smoothing and shaper
   double distance_mm = 0.0;                             ///< since the last rest
   double feed_override = 1.0;
-  std::uint32_t line = 0;           ///< of the segment that is being run, before smoothing and shaper
   std::uint64_t segments_done = 0;  ///< run to their ends
   std::uint64_t segments_waiting = 0;
   std::uint64_t steps = 0;
@@ -128,6 +186,10 @@ struct ControllerState {
   std::uint64_t late_plans = 0;        ///< how often the motion slowed down because nothing further was planned in time
   double set_point_distance_mm = 0.0;  ///< `distance_mm` and `line` of the set-point that was given, which has come
   std::uint64_t set_point_line = 0;    ///< through smoothing and shaper: `delay_periods()` later, rounded
+  std::uint64_t travel_stops = 0;      ///< how often it was held because the path would have left the travel
+  double spindle_speed = 0.0;          ///< revolutions per s
+  double spindle_error_mm = 0.0;       ///< of a synchronous segment: the motion less what the angle asks for
+  std::array<double, max_controller_axes> offset{};  ///< of the axes, before smoothing and shaper
 };
 
 /// A path that grows while it is run: look-ahead over a window of segments, motion nearly as fast as the limits of the
@@ -147,7 +209,8 @@ class MotionController {
   /// The next segment, from the planning thread: never blocks, does not allocate. `following_end`: where the following
   /// axes are at its end; they follow in proportion to the path length. A segment of no length in X, Y and Z is one of
   /// the following axes alone if they move: its length is then the largest of their ways, its feed that axis'.
-  PushResult push(const Segment& segment, std::span<const double> following_end = {}) noexcept;
+  PushResult push(const Segment& segment, std::span<const double> following_end = {},
+                  const SegmentRules& rules = {}) noexcept;
 
   /// An event behind the segment that was pushed last, from the planning thread, as a push. As many may wait as
   /// segments.
@@ -175,6 +238,12 @@ class MotionController {
   /// Ratio of the programmed feeds, 0 to 2; what is outside of that, or no number, is taken as the nearer end (no
   /// number: as it was). It acts on what is not planned yet: after 8 to 32 periods and the lead; 0 is a hold.
   void feed_override(double ratio) noexcept;
+  /// The same of rapids, which the feed override leaves alone. One that is 0 stops a motion that it acts on.
+  void rapid_override(double ratio) noexcept;
+  /// Where the spindle is in this period, in revolutions that go on counting (an encoder's counts over those of a
+  /// revolution); from the thread that steps, in front of every step. Feeds per revolution follow its speed in steps of
+  /// .5 %, and rest where it stands; a synchronous segment begins at a whole revolution.
+  void spindle(double revolutions) noexcept;
   /// Come to rest along the path, beginning after 32 periods or an eighth of the lead at the latest; resume() goes on.
   void hold() noexcept;
   void resume() noexcept;  ///< from a stop that was pushed as well
@@ -188,6 +257,29 @@ class MotionController {
   void probe(std::span<double> latched) noexcept;
   /// Come to rest along the path and forget the rest of it, until restart().
   void abort() noexcept;
+  /// Come to rest along the path with all that `emergency_acceleration` allows, whatever the jerk; then as abort().
+  void emergency_stop() noexcept;
+
+  /// Moves an axis by hand while the path rests: after hold(), at a stop that was pushed, after flush() until
+  /// flushed(), after abort(). Any thread, but one for each axis. The limits hold; it comes to rest at the end of the
+  /// travel. A speed that is given anew counts from the next period; 0: to rest. resume() leads back onto the path,
+  /// each axis as fast as it was jogged last, then the path goes on; flushed() and restart() begin at the new place.
+  JogResult jog(int axis, double speed) noexcept;
+  /// Likewise by a distance; those that are given before it ends add up.
+  JogResult jog_by(int axis, double distance, double speed) noexcept;
+
+  /// Back along the path by so many mm from where it rests, as far as it is kept, at half the speed with which it was
+  /// run; less than before: forward. When a jog may; resume() leads to where the path rests, then it goes on. Any
+  /// thread.
+  JogResult retrace(double distance_mm) noexcept;
+
+  /// An offset to which the axis goes within the limits of the settings' `offset`, at rest and while the path is run;
+  /// shaped as the path is. From any thread. False: the axis has no such limits, or the value is not finite.
+  bool offset(int axis, double value) noexcept;
+  /// Where an axis may be from now on. Where the path that is planned would leave it, the control is held, with the
+  /// stop that is planned. From any thread. False: there is no such axis, or `low` is above `high`.
+  bool travel(int axis, const AxisTravel& travel) noexcept;
+
   /// At rest at a position (axes() values), the queue empty. Not while another thread pushes or steps. False, and
   /// nothing is changed: a value is not finite.
   bool restart(std::span<const double> position) noexcept;

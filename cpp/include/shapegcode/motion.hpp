@@ -8,49 +8,11 @@
 #include <vector>
 
 #include "shapegcode/filter.hpp"
+#include "shapegcode/limits.hpp"
 #include "shapegcode/path.hpp"
 #include "shapegcode/samples.hpp"
 
 namespace shapegcode {
-
-/// Law of a change of speed.
-enum class AccelerationLaw : std::uint8_t {
-  constant_time,  ///< a ramp lasts the time constant whatever the speed step, where the path leaves room for it
-  jerk_limited,   ///< the acceleration of the axes, smoothed by the jerk time
-};
-
-/// What look-ahead keeps. Infinity switches a limit off.
-struct MotionLimits {
-  static constexpr double none = std::numeric_limits<double>::infinity();
-
-  AccelerationLaw law = AccelerationLaw::constant_time;
-  double time_constant_s = 0.05;  ///< constant_time: length of a ramp from rest to the programmed feed
-  double jerk_time_s = 0.0;       ///< length of the smoothing of the acceleration; 0 = none
-  Vector3 max_feed_mm_per_s = Vector3::Constant(none);
-  Vector3 max_acceleration_mm_per_s2 = Vector3::Constant(none);
-  Vector3 max_jerk_mm_per_s3 = Vector3::Constant(none);
-  Vector3 corner_speed_difference_mm_per_s = Vector3::Constant(none);  ///< per axis at a corner
-  double corner_stop_angle_rad = none;  ///< a corner that turns by as much or more is a stop
-  double block_time_s = 0.0;            ///< no block is run off faster: what the control needs to read one
-  double junction_deviation_mm = none;  ///< a corner is passed as an arc that cuts it by so much, at its acceleration
-  double centripetal_acceleration_mm_per_s2 = none;                  ///< on arcs (1735)
-  double polyline_acceleration_mm_per_s2 = none;                     ///< the same along polylines
-  Vector3 contour_acceleration_mm_per_s2 = Vector3::Constant(none);  ///< per axis, of a change of direction (1737)
-  double feed_override = 1.0;                                        ///< scales the programmed feeds
-  double arc_feed_ratio = 1.0;                                       ///< feed on arcs relative to the programmed feed
-  /// A lower programmed feed is reached so long before its segment, and left so long behind it: what follows the
-  /// look-ahead mixes the motion of this time to both sides.
-  double feed_spread_s = 0.0;
-  double feed_excess_ratio = 0.0;  ///< by this share a neighbour may be faster without that
-};
-
-/// Within what a filter behind the interpolation must stay at corners and on arcs. Without spread it limits nothing.
-struct FilterTolerance {
-  double contour_tolerance_mm = MotionLimits::none;  ///< deviation that the filter may cause
-  double corner_share = 1.0;      ///< of it for one corner: several may fall into one filter, and then they add up
-  double variance_s2 = 0.0;       ///< second central moment of the filter
-  double mean_deviation_s = 0.0;  ///< its mean absolute deviation from the mean delay
-};
 
 /// One section of constant tangential acceleration.
 struct SpeedPhase {
@@ -116,25 +78,6 @@ struct SpeedCaps {
 /// speed (there the corner limits bound what happens), and jerk on arcs is not bounded.
 [[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const FilterTolerance& filter = {},
                                       const SpeedCaps* caps = nullptr);
-
-/// Highest speed at which no axis of a segment is above its largest feed.
-[[nodiscard]] double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexcept;
-
-/// Highest speed at which a segment may be run under the limits, with such a filter behind.
-[[nodiscard]] double segment_speed_limit(const Segment& segment, const MotionLimits& limits,
-                                         const FilterTolerance& filter = {}) noexcept;
-
-/// Highest speed at the junction of two segments.
-[[nodiscard]] double corner_speed_limit(const Segment& before, const Segment& after, const MotionLimits& limits,
-                                        const FilterTolerance& filter = {}) noexcept;
-
-/// Indices of segments before which the tool must come to rest: sharp corners between the tool axis and the plane
-/// across it (a plunge or retract), which a shaper must not mix; corners that the filter behind cannot pass within the
-/// contour tolerance at any speed; and exact stops. `axis_angle_rad`: how far a side may lean from the tool axis Z and
-/// still count as plunge; `corner_angle_rad`: least change of direction of such a corner.
-[[nodiscard]] std::vector<std::size_t> forced_stops(const Segments& segments, double axis_angle_rad,
-                                                    double corner_angle_rad, const MotionLimits& limits,
-                                                    const FilterTolerance& filter = {});
 
 /// Set-points of a path under a speed profile, one per interpolation period, from the start (first step) to the end.
 /// `step` is the real-time form: no allocation, no exception, no lock, work bounded by the segments and phases that one

@@ -8,6 +8,7 @@
 #include <exception>
 #include <memory>
 #include <new>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -21,6 +22,7 @@
 #include "shapegcode/shapegcode.h"
 
 using shapegcode::Activity;
+using shapegcode::JogResult;
 using shapegcode::MotionController;
 using shapegcode::PushResult;
 using shapegcode::Segment;
@@ -39,8 +41,20 @@ namespace {
 
 // By how much a sweep may miss the end of its arc.
 constexpr double max_sweep_error_mm = 0.01;
-// What the first version of the struct holds.
-constexpr std::size_t first_state_size = offsetof(shapegcode_state, line) + sizeof(std::uint32_t);
+// What version 1.0 of the structs holds.
+constexpr std::size_t first_state_size = offsetof(shapegcode_state, offset) + sizeof(shapegcode_state::offset);
+constexpr std::size_t first_rules_size = offsetof(shapegcode_rules, max_jerk) + sizeof(double);
+
+shapegcode_rules default_rules() noexcept {
+  const shapegcode::SegmentRules rules;
+  return {sizeof(shapegcode_rules),
+          0,
+          0,
+          SHAPEGCODE_PER_TIME,
+          SHAPEGCODE_FEED_OF_PATH,
+          rules.max_acceleration,
+          rules.max_jerk};
+}
 
 void write_message(std::string_view text, char* message, std::size_t size) noexcept {
   if (message == nullptr || size == 0) return;
@@ -91,6 +105,32 @@ shapegcode_status status_of(PushResult result) noexcept {
       return SHAPEGCODE_FLUSHING;
     case PushResult::no_time:
       return SHAPEGCODE_NO_TIME;
+    case PushResult::beyond_travel:
+      return SHAPEGCODE_BEYOND_TRAVEL;
+    case PushResult::bad_limit:
+      return SHAPEGCODE_BAD_LIMIT;
+    case PushResult::not_straight:
+      return SHAPEGCODE_NOT_STRAIGHT;
+  }
+  return SHAPEGCODE_ERROR_INTERNAL;
+}
+
+shapegcode_status status_of(JogResult result) noexcept {
+  switch (result) {
+    case JogResult::accepted:
+      return SHAPEGCODE_OK;
+    case JogResult::path_moves:
+      return SHAPEGCODE_PATH_MOVES;
+    case JogResult::no_axis:
+      return SHAPEGCODE_NO_AXIS;
+    case JogResult::not_finite:
+      return SHAPEGCODE_NOT_FINITE;
+    case JogResult::no_speed:
+      return SHAPEGCODE_NO_SPEED;
+    case JogResult::no_record:
+      return SHAPEGCODE_NO_RECORD;
+    case JogResult::beyond_travel:
+      return SHAPEGCODE_BEYOND_TRAVEL;
   }
   return SHAPEGCODE_ERROR_INTERNAL;
 }
@@ -109,16 +149,32 @@ shapegcode_activity activity_of(Activity activity) noexcept {
       return SHAPEGCODE_STARVED;
     case Activity::aborted:
       return SHAPEGCODE_ABORTED;
+    case Activity::jogging:
+      return SHAPEGCODE_JOGGING;
   }
   return SHAPEGCODE_IDLE;
 }
 
+// Rules as they are meant; nothing: a struct or a code that is none.
+std::optional<shapegcode_rules> whole_rules(const shapegcode_rules* given) noexcept {
+  shapegcode_rules rules = default_rules();
+  if (given == nullptr) return rules;
+  if (given->struct_size < first_rules_size || given->struct_size > sizeof rules) return std::nullopt;
+  std::memcpy(&rules, given, given->struct_size);
+  const bool is_known = rules.feed_rate >= SHAPEGCODE_PER_TIME && rules.feed_rate <= SHAPEGCODE_SYNCHRONOUS &&
+                        rules.feed_of >= SHAPEGCODE_FEED_OF_PATH && rules.feed_of <= SHAPEGCODE_FEED_OF_TIME;
+  return is_known ? std::optional(rules) : std::nullopt;
+}
+
 shapegcode_status push(shapegcode_controller& controller, const double* end, Segment segment,
-                       int stop_at_end) noexcept {
-  segment.stop_at_end = stop_at_end != 0;
+                       const shapegcode_rules& rules) noexcept {
+  segment.stop_at_end = rules.stop_at_end != 0;
   const auto axes = static_cast<std::size_t>(controller.control.axes());
-  const shapegcode_status status =
-      status_of(controller.control.push(segment, {end + shapegcode::axis_count, axes - shapegcode::axis_count}));
+  const shapegcode::SegmentRules run{static_cast<shapegcode::FeedRate>(rules.feed_rate),
+                                     static_cast<shapegcode::FeedOf>(rules.feed_of), rules.max_acceleration,
+                                     rules.max_jerk};
+  const std::span following(end + shapegcode::axis_count, axes - shapegcode::axis_count);
+  const shapegcode_status status = status_of(controller.control.push(segment, following, run));
   if (status == SHAPEGCODE_OK) std::copy_n(end, axes, controller.end.begin());
   return status;
 }
@@ -157,7 +213,6 @@ shapegcode_status shapegcode_controller_create(const shapegcode_settings* settin
     return status;
   };
   if (controller == nullptr || settings == nullptr) return refused(SHAPEGCODE_ERROR_NULL);
-  if (!shapegcode::c::has_known_size(*settings)) return refused(SHAPEGCODE_ERROR_STRUCT_SIZE);
   return guarded(message, message_size, [&] {
     *controller = std::make_unique<shapegcode_controller>(shapegcode::c::settings_of(*settings)).release();
     return SHAPEGCODE_OK;
@@ -176,21 +231,26 @@ shapegcode_status shapegcode_controller_axes(const shapegcode_controller* contro
 }
 
 shapegcode_status shapegcode_controller_push_line(shapegcode_controller* controller, const double* end,
-                                                  double feed_mm_per_s, uint32_t line, int stop_at_end) {
+                                                  double feed_mm_per_s, const shapegcode_rules* rules) {
   if (controller == nullptr || end == nullptr) return SHAPEGCODE_ERROR_NULL;
-  const Segment segment = shapegcode::make_line(vector_of(controller->end.data()), vector_of(end), feed_mm_per_s, line);
-  return push(*controller, end, segment, stop_at_end);
+  const std::optional<shapegcode_rules> whole = whole_rules(rules);
+  if (!whole) return SHAPEGCODE_ERROR_STRUCT_SIZE;
+  const Segment segment =
+      shapegcode::make_line(vector_of(controller->end.data()), vector_of(end), feed_mm_per_s, whole->line);
+  return push(*controller, end, segment, *whole);
 }
 
 shapegcode_status shapegcode_controller_push_arc(shapegcode_controller* controller, const double* end,
-                                                 const shapegcode_arc* arc, double feed_mm_per_s, uint32_t line,
-                                                 int stop_at_end) {
+                                                 const shapegcode_arc* arc, double feed_mm_per_s,
+                                                 const shapegcode_rules* rules) {
   if (controller == nullptr || end == nullptr || arc == nullptr) return SHAPEGCODE_ERROR_NULL;
+  const std::optional<shapegcode_rules> whole = whole_rules(rules);
+  if (!whole) return SHAPEGCODE_ERROR_STRUCT_SIZE;
   return guarded(nullptr, 0, [&] {
     Segment segment;
     const shapegcode_status status =
-        arc_of(vector_of(controller->end.data()), vector_of(end), *arc, feed_mm_per_s, line, segment);
-    return status == SHAPEGCODE_OK ? push(*controller, end, segment, stop_at_end) : status;
+        arc_of(vector_of(controller->end.data()), vector_of(end), *arc, feed_mm_per_s, whole->line, segment);
+    return status == SHAPEGCODE_OK ? push(*controller, end, segment, *whole) : status;
   });
 }
 
@@ -251,6 +311,61 @@ shapegcode_status shapegcode_controller_plan(shapegcode_controller* controller, 
 shapegcode_status shapegcode_controller_feed_override(shapegcode_controller* controller, double ratio) {
   if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
   controller->control.feed_override(ratio);
+  return SHAPEGCODE_OK;
+}
+
+shapegcode_status shapegcode_controller_rapid_override(shapegcode_controller* controller, double ratio) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  controller->control.rapid_override(ratio);
+  return SHAPEGCODE_OK;
+}
+
+shapegcode_status shapegcode_controller_spindle(shapegcode_controller* controller, double revolutions) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  controller->control.spindle(revolutions);
+  return SHAPEGCODE_OK;
+}
+
+shapegcode_status shapegcode_controller_emergency_stop(shapegcode_controller* controller) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  controller->control.emergency_stop();
+  return SHAPEGCODE_OK;
+}
+
+shapegcode_status shapegcode_controller_jog(shapegcode_controller* controller, int axis, double speed) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  return status_of(controller->control.jog(axis, speed));
+}
+
+shapegcode_status shapegcode_controller_jog_by(shapegcode_controller* controller, int axis, double distance,
+                                               double speed) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  return status_of(controller->control.jog_by(axis, distance, speed));
+}
+
+shapegcode_status shapegcode_controller_retrace(shapegcode_controller* controller, double distance_mm) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  return status_of(controller->control.retrace(distance_mm));
+}
+
+shapegcode_status shapegcode_controller_offset(shapegcode_controller* controller, int axis, double value) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  if (!std::isfinite(value)) return SHAPEGCODE_NOT_FINITE;
+  return controller->control.offset(axis, value) ? SHAPEGCODE_OK : SHAPEGCODE_NO_AXIS;
+}
+
+shapegcode_status shapegcode_controller_travel(shapegcode_controller* controller, int axis, double low, double high) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  if (!(low <= high)) return SHAPEGCODE_ERROR_ARGUMENT;
+  return controller->control.travel(axis, {low, high}) ? SHAPEGCODE_OK : SHAPEGCODE_NO_AXIS;
+}
+
+shapegcode_status shapegcode_rules_init(shapegcode_rules* rules, size_t struct_size) {
+  if (rules == nullptr) return SHAPEGCODE_ERROR_NULL;
+  if (struct_size < first_rules_size || struct_size > sizeof *rules) return SHAPEGCODE_ERROR_STRUCT_SIZE;
+  shapegcode_rules defaults = default_rules();
+  defaults.struct_size = struct_size;
+  std::memcpy(rules, &defaults, struct_size);
   return SHAPEGCODE_OK;
 }
 
@@ -320,6 +435,10 @@ shapegcode_status shapegcode_controller_state(const shapegcode_controller* contr
   all.late_plans = now.late_plans;
   all.set_point_distance_mm = now.set_point_distance_mm;
   all.set_point_line = now.set_point_line;
+  all.travel_stops = now.travel_stops;
+  all.spindle_speed = now.spindle_speed;
+  all.spindle_error_mm = now.spindle_error_mm;
+  std::ranges::copy(now.offset, all.offset);
   std::memcpy(state, &all, struct_size);
   return SHAPEGCODE_OK;
 }

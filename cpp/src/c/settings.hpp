@@ -1,5 +1,10 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
 #include "shapegcode/controller.hpp"
 #include "shapegcode/samples.hpp"
 #include "shapegcode/shapegcode.h"
@@ -8,10 +13,27 @@ namespace shapegcode::c {
 
 [[nodiscard]] inline Vector3 vector_of(const double* values) noexcept { return {values[0], values[1], values[2]}; }
 
-/// Whether a struct was initialised, by this header or an older one.
-[[nodiscard]] bool has_known_size(const shapegcode_settings& settings) noexcept;
+/// What is set for an axis, whether the control has it or not.
+struct AxisNumbers {
+  FollowingLimits following;
+  AxisTravel travel;
+  OffsetLimits offset;
+  std::optional<double> emergency_acceleration;
+  std::optional<Fir> shaper;
+};
 
-/// What an older header does not know has its default. Throws Error(argument).
+}  // namespace shapegcode::c
+
+// What the header calls so.
+struct shapegcode_settings {
+  shapegcode::ControllerSettings control;
+  std::size_t following = 0;
+  std::array<shapegcode::c::AxisNumbers, shapegcode::max_controller_axes> axes;
+};
+
+namespace shapegcode::c {
+
+/// Throws Error(argument).
 [[nodiscard]] ControllerSettings settings_of(const shapegcode_settings& given);
 
 }  // namespace shapegcode::c

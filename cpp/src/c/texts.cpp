@@ -27,12 +27,26 @@ const char* shapegcode_status_text(int code) {
       return "a dwell takes 0 to 1e6 s";
     case SHAPEGCODE_FLUSHING:
       return "the motion is flushed: push it again when it rests";
+    case SHAPEGCODE_BEYOND_TRAVEL:
+      return "it leads out of the travel of an axis";
+    case SHAPEGCODE_BAD_LIMIT:
+      return "a limit of the rules is not above zero";
+    case SHAPEGCODE_NOT_STRAIGHT:
+      return "what is bound to the spindle must be a line";
+    case SHAPEGCODE_PATH_MOVES:
+      return "an axis is jogged while the path is held, flushed or aborted and rests";
+    case SHAPEGCODE_NO_AXIS:
+      return "there is no such axis, or it has no such limits";
+    case SHAPEGCODE_NO_SPEED:
+      return "the speed is not above zero";
+    case SHAPEGCODE_NO_RECORD:
+      return "no periods are kept for retrace";
     case SHAPEGCODE_ERROR_ARGUMENT:
       return "a value is outside its range";
     case SHAPEGCODE_ERROR_NULL:
       return "a pointer is NULL that must not be";
     case SHAPEGCODE_ERROR_STRUCT_SIZE:
-      return "a struct that was not initialised, or is of a newer header than the library";
+      return "a struct that was not initialised, holds an unknown code, or is of a newer header than the library";
     case SHAPEGCODE_ERROR_OUT_OF_MEMORY:
       return "out of memory";
     case SHAPEGCODE_ERROR_INTERNAL:
@@ -56,6 +70,8 @@ const char* shapegcode_activity_text(int activity) {
       return "starved";
     case SHAPEGCODE_ABORTED:
       return "aborted";
+    case SHAPEGCODE_JOGGING:
+      return "jogging";
     default:
       return "unknown";
   }

@@ -10,6 +10,9 @@ namespace {
 
 // A corner that may be passed no faster is a stop.
 constexpr double crawl_mm_per_s = 1e-2;
+// What is no travel of X, Y and Z, and a share of what another axis travels that hardly is one.
+constexpr double no_travel_mm = 1e-9;
+constexpr double hardly_moves = 1e-3;
 
 }  // namespace
 
@@ -35,15 +38,22 @@ void Intake::restart(std::span<const double> position) noexcept {
   dwell_ = 0;
 }
 
-PushResult Intake::take(const Segment& segment, std::span<const double> following_end, PlannedSegment& entry) noexcept {
+PushResult Intake::take(const Segment& segment, std::span<const double> following_end, const SegmentRules& rules,
+                        PlannedSegment& entry) noexcept {
   if (following_end.size() != n_following_) return PushResult::wrong_axes;
   const PushResult result = copy(segment, following_end, entry);
   if (result != PushResult::accepted) return result;
+  if (!(rules.max_acceleration > 0.0 && rules.max_jerk > 0.0)) return PushResult::bad_limit;
+  const bool is_bound = rules.feed_rate == FeedRate::synchronous;
+  if (is_bound && segment.kind == SegmentKind::arc) return PushResult::not_straight;
+  set_feed(segment, rules, entry);
   look_at(entry);
+  entry.stop = entry.stop || is_bound;
   entry.stop = entry.stop || rests_;
   entry.dwell = dwell_;
   entry.waits = waits_;
-  rests_ = waits_ = false;
+  rests_ = is_bound;
+  waits_ = false;
   dwell_ = 0;
   last_ = entry;
   has_last_ = true;
@@ -78,13 +88,37 @@ PushResult Intake::copy(const Segment& segment, std::span<const double> followin
   }
   if (!(segment.length_mm > 0.0)) {
     if (longest <= 0.0) return PushResult::no_length;
-    planned.segment.length_mm = longest;
     planned.segment.end_mm = segment.start_mm;
     planned.segment.kind = SegmentKind::line;
+  }
+  // Where X, Y and Z hardly move, what moves is the path.
+  if (planned.segment.kind != SegmentKind::arc && segment.length_mm < hardly_moves * longest) {
+    planned.segment.length_mm = longest;
   }
   for (double& rate : planned.rate) rate /= planned.segment.length_mm;
   entry = planned;
   return PushResult::accepted;
+}
+
+// Its feed along the path parameter.
+void Intake::set_feed(const Segment& segment, const SegmentRules& rules, PlannedSegment& entry) const noexcept {
+  const double length = entry.segment.length_mm;
+  const double xyz = segment.length_mm;
+  double squares = xyz * xyz;
+  double longest = 0.0;
+  for (std::size_t i = axis_count; i < axis_count + n_following_; ++i) {
+    const double travel = std::abs(entry.rate[i]) * length;
+    squares += travel * travel;
+    longest = std::max(longest, travel);
+  }
+  double counted = xyz > no_travel_mm ? xyz : longest;
+  if (rules.feed_of == FeedOf::all_axes) counted = std::sqrt(squares);
+  if (rules.feed_of == FeedOf::dominant) counted = std::max(xyz, longest);
+  if (rules.feed_of == FeedOf::time) counted = 1.0;
+  entry.segment.feed_mm_per_s *= length / counted;
+  entry.rate_of = rules.feed_rate;
+  entry.max_acceleration = rules.max_acceleration;
+  entry.max_jerk = rules.max_jerk;
 }
 
 // What the segment and its junction with the one before allow.
@@ -92,8 +126,9 @@ void Intake::look_at(PlannedSegment& entry) const noexcept {
   Segment fast = entry.segment;
   entry.programmed = fast.feed_mm_per_s * (fast.kind == SegmentKind::arc ? rules_.arc_feed_ratio : 1.0);
   if (rules_.law == AccelerationLaw::constant_time) {
-    entry.max_acceleration = fast.feed_mm_per_s / rules_.time_constant_s;
-    if (rules_.jerk_time_s > 0.0) entry.max_jerk = entry.max_acceleration / rules_.jerk_time_s;
+    entry.max_acceleration = std::min(entry.max_acceleration, fast.feed_mm_per_s / rules_.time_constant_s);
+    if (rules_.jerk_time_s > 0.0)
+      entry.max_jerk = std::min(entry.max_jerk, entry.max_acceleration / rules_.jerk_time_s);
   }
   fast.feed_mm_per_s = MotionLimits::none;
   entry.max_speed = segment_speed_limit(fast, rules_, {});

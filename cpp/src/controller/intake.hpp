@@ -17,7 +17,6 @@ class Intake {
 
   /// The next segment starts at this position, whatever came before.
   void restart(std::span<const double> position) noexcept;
-  /// Fills an entry of the queue; unless it says `accepted`, nothing has happened.
   /// Rest before the next segment.
   void dwell(std::uint32_t periods) noexcept {
     dwell_ += periods;
@@ -25,10 +24,13 @@ class Intake {
   }
   /// Until the motion is let go.
   void wait() noexcept { waits_ = rests_ = true; }
-  PushResult take(const Segment& segment, std::span<const double> following_end, PlannedSegment& entry) noexcept;
+  /// Fills an entry of the queue; unless it says `accepted`, nothing has happened.
+  PushResult take(const Segment& segment, std::span<const double> following_end, const SegmentRules& rules,
+                  PlannedSegment& entry) noexcept;
 
  private:
   PushResult copy(const Segment& segment, std::span<const double> following_end, PlannedSegment& entry) const noexcept;
+  void set_feed(const Segment& segment, const SegmentRules& rules, PlannedSegment& entry) const noexcept;
   void look_at(PlannedSegment& entry) const noexcept;
 
   MotionLimits rules_;  // without those of the axes

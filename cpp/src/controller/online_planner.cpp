@@ -30,6 +30,7 @@ constexpr std::array<double, 4> slower{no_limit, 0.9, 0.6, 0.0};
 constexpr int attempts_at_rest = 12;
 // Plans that are made at once, with less each time where limits would be passed.
 constexpr int plans = 4;
+constexpr double least_ratio = 0.01;
 // A lower override is approached from above.
 constexpr double below_feed = 0.9995;
 // As near as that to the end of a segment is its end, mm.
@@ -84,7 +85,7 @@ void OnlinePlanner::restart(std::uint64_t first, const AxisValues& position) noe
   settle_ = 0;
   failed_ = 0;
   first_ = planned_ = fixed_ = pushed_before_ = first;
-  ratio_ = 1.0;
+  ratios_ = {};
   running_.store(first, std::memory_order_release);
 }
 
@@ -115,7 +116,7 @@ std::ptrdiff_t OnlinePlanner::periods_ahead() const noexcept {
          static_cast<std::ptrdiff_t>(current.first_period + reader.index);
 }
 
-bool OnlinePlanner::plan(std::uint64_t pushed, double ratio, bool settled, std::uint64_t released) {
+bool OnlinePlanner::plan(std::uint64_t pushed, const FeedRatios& ratios, bool settled, std::uint64_t released) {
   bool has_worked = false;
   settled_ = settled;
   released_ = released;
@@ -125,7 +126,7 @@ bool OnlinePlanner::plan(std::uint64_t pushed, double ratio, bool settled, std::
     // On a stop from which no motion was found, it is looked for once in a while.
     if (failed_ == last_number_ + 1 && start_ < retry_ && start_ < last_->whole_count) return has_worked;
     Section* const section = sections_.free_section();
-    if (section == nullptr || !next_section(*section, pushed, ratio)) return has_worked;
+    if (section == nullptr || !next_section(*section, pushed, ratios)) return has_worked;
     has_worked = true;
   }
 }
@@ -136,6 +137,10 @@ int OnlinePlanner::rest_at(const PathPoint& point) const noexcept {
   return rules_.settling_periods + (point.offset <= 0.0 ? static_cast<int>(here.dwell) : 0);
 }
 
+bool OnlinePlanner::begins_bound(const PathPoint& point) const noexcept {
+  return point.offset <= 0.0 && (*ring_)[point.segment].rate_of == FeedRate::synchronous;
+}
+
 bool OnlinePlanner::waits_at(const PathPoint& point) const noexcept {
   return point.offset <= 0.0 && (*ring_)[point.segment].waits && point.segment >= released_;
 }
@@ -144,6 +149,7 @@ bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) cons
   const std::uint64_t end = std::min(pushed, from.segment + rules_.window);
   if (!plan_.is_cut() && planned_ >= end) return false;
   if (motion_.at_end()) return true;
+  if (planned_ < end && (*ring_)[planned_].rate_of == FeedRate::synchronous) return plan_.is_cut();
   // Where no more can be planned than that, another plan has to be worth its work.
   if (plan_.is_cut()) {
     return static_cast<double>(motion_.passed()) >= renewed_share * static_cast<double>(plan_.end());
@@ -157,15 +163,18 @@ bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) cons
 }
 
 // How far is planned: as many of the longest stops ahead as make it worth while, and the segments that this takes.
-std::uint64_t OnlinePlanner::look_ahead(const PathPoint& from, std::uint64_t pushed, double ratio) noexcept {
+std::uint64_t OnlinePlanner::look_ahead(const PathPoint& from, std::uint64_t pushed,
+                                        const FeedRatios& ratios) noexcept {
   const std::uint64_t last = std::max(std::min(pushed, from.segment + rules_.window), fixed_ + 1);
   longest_stop_mm_ = 0.0;
   double ahead = -from.offset;
   std::uint64_t end = from.segment;
   // Not without a rounding that the motion has entered.
   while (end < last && (end <= std::max(fixed_, from.segment) || ahead < stops_planned * longest_stop_mm_)) {
+    // What is bound to the spindle is not planned.
+    if (end > from.segment && (*ring_)[end].rate_of == FeedRate::synchronous) break;
     const PlannedSegment& entry = (*ring_)[end++];
-    const double v = std::max(from.state.speed, std::min(entry.max_speed, entry.programmed * ratio));
+    const double v = std::max(from.state.speed, std::min(entry.max_speed, entry.programmed * ratios.of(entry)));
     double a = least_acceleration_;
     double jerk = least_jerk_;
     if (std::isfinite(entry.max_acceleration)) a = std::min(a, entry.max_acceleration);
@@ -199,27 +208,37 @@ std::optional<PathPoint> OnlinePlanner::next_start(std::uint64_t pushed) noexcep
   return from;
 }
 
-bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double ratio) {
+bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const FeedRatios& asked) {
   const std::optional<PathPoint> start = next_start(pushed);
   if (!start) return false;
   const PathPoint& from = *start;
   const bool rests = from.state.speed <= 0.0;
   const PlannedSegment& here = (*ring_)[from.segment];
+  // What is multiplied with 0 is not begun, and planned with little where it is still ahead.
+  if (rests && asked.of(here) <= 0.0) return false;
+  const FeedRatios ratios = larger(asked, {least_ratio, least_ratio, least_ratio});
   if (rests) {
     const bool is_settled = settled_ && periods_ahead() <= 0;
     const int needed = !here.stop || from.offset > 0.0 ? 0 : rest_at(from) - (is_settled ? rules_.settling_periods : 0);
     settle_ = !has_motion_ || motion_.at_end() ? needed : std::min(settle_, needed);
   }
-  const double feed = here.programmed * here.feed_share * ratio;
+  const double feed = here.programmed * here.feed_share * ratios.of(here);
   const bool is_faster = from.state.speed > std::min(here.max_speed, feed) * kept_feed;
-  const double planned_ratio = is_faster ? std::max(ratio, ratio_) : ratio;
-  bool makes_plan = !has_motion_ || planned_ratio != ratio_ || wants_plan(from, pushed);
+  const FeedRatios planned_ratios = is_faster ? larger(ratios, ratios_) : ratios;
+  bool makes_plan = !has_motion_ || planned_ratios != ratios_ || wants_plan(from, pushed);
   pushed_before_ = pushed;
+  section.is_bound = false;
   section.after = last_number_;
   section.start = start_;
   section.first_period = last_->first_period + start_;
   for (std::size_t i = 0; i < section.before.size(); ++i) {
-    section.before[i] = last_->at(static_cast<std::ptrdiff_t>(start_) - static_cast<std::ptrdiff_t>(i));
+    // What was bound to the spindle has come to rest there long ago.
+    const std::size_t back = last_->is_bound && start_ > 0 ? 0 : i;
+    section.before[i] = last_->at(static_cast<std::ptrdiff_t>(start_) - static_cast<std::ptrdiff_t>(back));
+  }
+  if (rests && begins_bound(from)) {
+    bind_to_spindle(section, from, pushed);
+    return true;
   }
   const int attempts = rests ? attempts_at_rest : static_cast<int>(slower.size());
   PathMotion begin = motion_;
@@ -229,11 +248,11 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, double 
   const PathStart path_start{first_, from.segment, from.offset, goes_on ? motion_.in_station() : 0.0};
   for (int n = 0; n < attempts; ++n) {
     if (makes_plan) {
-      planned_ = look_ahead(from, pushed, planned_ratio);
-      ratio_ = planned_ratio;
+      planned_ = look_ahead(from, pushed, planned_ratios);
+      ratios_ = planned_ratios;
       has_motion_ = false;
       for (int k = 0; k < plans; ++k) {
-        plan_.make(path_start, from.state, planned_, ratio_);
+        plan_.make(path_start, from.state, planned_, ratios_);
         begin = PathMotion(plan_, rules_.period_s, from.state, path_start.in_station);
         if (is_faster || keeps_ahead(section, begin)) break;
       }
@@ -275,7 +294,7 @@ bool OnlinePlanner::fill(Section& section, double max_speed, int& settle) noexce
   std::size_t n = 0;
   while (n < length_ && !motion_.at_end()) {
     const bool rests = motion_.at_stop();
-    if (n > 0 && rests && waits_at(motion_.point())) break;
+    if (n > 0 && rests && (waits_at(motion_.point()) || begins_bound(motion_.point()))) break;
     if (settle > 0 && rests) {
       --settle;
     } else {
@@ -305,6 +324,7 @@ void OnlinePlanner::add(Section& section, std::size_t index, const PathMotion& m
   now.position = motion.position();
   motion.rates(now.velocity, now.acceleration);
   now.line = entry.segment.line;
+  now.rate_of = entry.rate_of;
   const double length = entry.segment.length_mm;
   if (motion.at_end() && now.point.offset >= length - at_end_mm) {
     // To the last bit, whatever distances round to.
@@ -343,7 +363,8 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
                          (std::abs(p0 - 3.0 * p1 + 3.0 * p2 - p3) / (t * t * t) - noise) / rules_.limits.jerk[i]});
     }
     const PlannedSegment& entry = (*ring_)[now.point.segment];
-    const double feed = ratio_ * std::max(entry.programmed, (*ring_)[before.point.segment].programmed);
+    const PlannedSegment& last_entry = (*ring_)[before.point.segment];
+    const double feed = std::max(ratios_.of(entry) * entry.programmed, ratios_.of(last_entry) * last_entry.programmed);
     const double speed = now.point.state.speed;
     const bool is_faster = speed > before.point.state.speed && speed > kept_feed * feed;
     if (beyond <= kept && !is_faster) continue;
@@ -376,10 +397,41 @@ void OnlinePlanner::give_out(Section& section, const PathPoint& from, std::uint6
   const std::size_t shortest =
       std::max(shortest_section, static_cast<std::size_t>(rules_.lead_periods) / sections_ahead);
   length_ = std::clamp(static_cast<std::size_t>(periods), shortest, std::max(shortest, longest_section));
+  has_motion_ = true;
+  publish(section);
+}
+
+// A segment whose motion is not planned: the thread that steps runs it, from rest to rest.
+void OnlinePlanner::bind_to_spindle(Section& section, const PathPoint& from, std::uint64_t pushed) noexcept {
+  const PlannedSegment& entry = (*ring_)[from.segment];
+  PlannedPoint& end = section.points[0];
+  end = {};
+  end.point = {from.segment, entry.segment.length_mm, {}};
+  end.position = entry.end;
+  std::copy_n(entry.segment.end_mm.data(), axis_count, end.position.begin());
+  end.distance = entry.segment.length_mm;
+  end.line = entry.segment.line;
+  end.rate_of = entry.rate_of;
+  section.is_bound = true;
+  section.count = section.whole_count = 1;
+  section.done = from.segment + 1;
+  section.runs_out = section.done == pushed && !entry.segment.stop_at_end;
+  fixed_ = std::max(fixed_, from.segment);
+  has_motion_ = false;
+  publish(section);
+}
+
+void OnlinePlanner::publish(Section& section) noexcept {
+  section.low = section.high = section.before[0].position;
+  for (std::size_t k = 0; k < section.whole_count; ++k) {
+    for (std::size_t i = 0; i < rules_.limits.axes; ++i) {
+      section.low[i] = std::min(section.low[i], section.points[k].position[i]);
+      section.high[i] = std::max(section.high[i], section.points[k].position[i]);
+    }
+  }
   last_ = &section;
   last_number_ = sections_.next_number();
   start_ = section.count;
-  has_motion_ = true;
   sections_.publish();
 }
 

@@ -31,10 +31,10 @@ class OnlinePlanner {
   /// At rest at the start of segment `first`, the next one that will be pushed.
   void restart(std::uint64_t first, const AxisValues& position) noexcept;
 
-  /// Plans until enough periods lie ahead. `pushed`: segments that are known; `ratio`: of the feeds, above 0;
+  /// Plans until enough periods lie ahead. `pushed`: segments that are known; `ratios`: of the feeds, above 0;
   /// `settled`: the filters behind have come to rest; `released`: segments before this one do not wait any more. Does
   /// not allocate. False: there was nothing to do.
-  bool plan(std::uint64_t pushed, double ratio, bool settled, std::uint64_t released);
+  bool plan(std::uint64_t pushed, const FeedRatios& ratios, bool settled, std::uint64_t released);
 
   [[nodiscard]] Sections& sections() noexcept { return sections_; }
   [[nodiscard]] const Sections& sections() const noexcept { return sections_; }
@@ -47,13 +47,16 @@ class OnlinePlanner {
   [[nodiscard]] int rest_at(const PathPoint& point) const noexcept;
   [[nodiscard]] bool waits_at(const PathPoint& point) const noexcept;
   [[nodiscard]] bool wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept;
-  std::uint64_t look_ahead(const PathPoint& from, std::uint64_t pushed, double ratio) noexcept;
+  std::uint64_t look_ahead(const PathPoint& from, std::uint64_t pushed, const FeedRatios& ratios) noexcept;
   std::optional<PathPoint> next_start(std::uint64_t pushed) noexcept;
-  bool next_section(Section& section, std::uint64_t pushed, double ratio);
+  bool next_section(Section& section, std::uint64_t pushed, const FeedRatios& ratios);
+  void bind_to_spindle(Section& section, const PathPoint& from, std::uint64_t pushed) noexcept;
+  [[nodiscard]] bool begins_bound(const PathPoint& point) const noexcept;
   bool keeps_ahead(Section& section, PathMotion motion) noexcept;
   bool fill(Section& section, double max_speed, int& settle) noexcept;
   void add(Section& section, std::size_t index, const PathMotion& motion) const noexcept;
   bool keeps(const Section& section, bool reduces) noexcept;
+  void publish(Section& section) noexcept;
   void give_out(Section& section, const PathPoint& from, std::uint64_t pushed) noexcept;
 
   SegmentRing* ring_;
@@ -62,7 +65,7 @@ class OnlinePlanner {
   PathPlan plan_;
   PathMotion motion_;                      // on the plan, at the end of the last section
   bool has_motion_ = false;                // whether that is where the next one goes on
-  double ratio_ = 1.0;                     // of the plan
+  FeedRatios ratios_;                      // of the plan
   std::uint64_t first_ = 0, planned_ = 0;  // segments: the begin of the path, and the end of what is planned
   std::uint64_t pushed_before_ = 0;        // when a section was planned last
   std::uint64_t fixed_ = 0;                // the last one whose rounding at its start is fixed
@@ -78,7 +81,7 @@ class OnlinePlanner {
   double least_acceleration_ = 0.0, least_jerk_ = 0.0;
   bool is_full_ = false;          // the plan reaches as far as the window
   double longest_stop_mm_ = 0.0;  // of the segments that are planned
-  std::atomic<std::uint64_t> running_{0};
+  alignas(cache_line) std::atomic<std::uint64_t> running_{0};
 };
 
 }  // namespace shapegcode

@@ -16,7 +16,7 @@ void Sections::restart(const PlannedPoint& point) noexcept {
   current_ = 0;
   next_ = 1;
   slot_ = index_ = 0;
-  was_late_ = false;
+  was_late_ = was_refused_ = false;
   published_.store(1, std::memory_order_relaxed);
   say();
 }
@@ -58,12 +58,15 @@ void Sections::publish() noexcept {
   published_.store((number + 1) % numbers, std::memory_order_release);
 }
 
-const PlannedPoint& Sections::step(bool stopping) noexcept {
+const PlannedPoint& Sections::step(bool stopping, const SoftLimits& travel) noexcept {
+  was_refused_ = false;
   const std::uint32_t end = published_.load(std::memory_order_acquire);
   for (; next_ != end; next_ = (next_ + 1) % numbers) {
     const Section& next = section(next_);
     if (next.after != current_ || next.start < index_) continue;
     if (next.start > index_ || stopping) break;
+    was_refused_ = !travel.hold(next.low, next.high, point().position);
+    if (was_refused_) break;
     current_ = next_;
     slot_ = slot_of(next_);
     index_ = 0;
@@ -71,10 +74,10 @@ const PlannedPoint& Sections::step(bool stopping) noexcept {
     break;
   }
   const Section& now = current();
-  was_late_ = !stopping && index_ == now.count && now.whole_count > now.count;
-  if (index_ < now.whole_count) ++index_;
+  was_late_ = !stopping && !was_refused_ && index_ == now.count && now.whole_count > now.count;
+  if (index_ < now.whole_count && !now.is_bound) ++index_;
   say();
-  return now.at(static_cast<std::ptrdiff_t>(index_));
+  return point();
 }
 
 }  // namespace shapegcode

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "controller/beside_path.hpp"
+#include "controller/shared_state.hpp"
 #include "planner/path_motion.hpp"
 
 namespace shapegcode {
@@ -17,6 +19,7 @@ struct PlannedPoint {
   PathPoint point;
   double distance = 0.0;  ///< since the last rest, mm
   std::uint32_t line = 0;
+  FeedRate rate_of = FeedRate::per_time;
 };
 
 /// Some periods of motion, and behind them a stop along the path, all of it within the limits: whoever runs a section
@@ -27,8 +30,10 @@ struct Section {
   std::size_t count = 0;        ///< points that are run if another section follows
   std::size_t whole_count = 0;  ///< with the stop
   std::uint64_t first_period = 0;
-  std::uint64_t done = 0;  ///< segments that have been run to their ends where it comes to rest
-  bool runs_out = false;   ///< it rests there only because no segment follows
+  std::uint64_t done = 0;    ///< segments that have been run to their ends where it comes to rest
+  bool runs_out = false;     ///< it rests there only because no segment follows
+  bool is_bound = false;     ///< to the spindle: its one point is where the motion ends that somebody else runs
+  AxisValues low{}, high{};  ///< of the positions
   /// Points before the first, newest first.
   std::array<PlannedPoint, 3> before{};
   std::vector<PlannedPoint> points;
@@ -72,12 +77,20 @@ class Sections {
 
   // Of the thread that steps.
 
-  /// One period on.
-  const PlannedPoint& step(bool stopping) noexcept;
+  /// One period on; a section that leads out of the travel is not begun.
+  const PlannedPoint& step(bool stopping, const SoftLimits& travel) noexcept;
+  /// Whether motion that is bound to the spindle has to be run; and that it was.
+  [[nodiscard]] bool is_bound() const noexcept { return current().is_bound && index_ == 0; }
+  void pass() noexcept { ++index_; }
+  /// The point that was given last.
+  [[nodiscard]] const PlannedPoint& point() const noexcept { return current().at(static_cast<std::ptrdiff_t>(index_)); }
+  [[nodiscard]] std::size_t index() const noexcept { return index_; }
   [[nodiscard]] const Section& current() const noexcept { return slots_[slot_]; }
   [[nodiscard]] bool at_rest() const noexcept { return index_ == current().whole_count; }
   /// Whether the last step ran the first point of a stop that was not asked for: no section came in time.
   [[nodiscard]] bool was_late() const noexcept { return was_late_; }
+  /// Whether it stopped because the next section leads out of the travel.
+  [[nodiscard]] bool was_refused() const noexcept { return was_refused_; }
   /// Whether another section is wanted for the next step.
   [[nodiscard]] bool wants_more() const noexcept { return index_ >= current().count; }
 
@@ -93,12 +106,12 @@ class Sections {
   std::vector<Section> slots_;
   std::array<std::uint8_t, 32> slot_of_{};  // of the numbers that are not dropped yet
   std::uint8_t free_ = 0;
-  std::atomic<std::uint32_t> published_{0};  // the next number
-  std::atomic<std::uint64_t> reader_{0};
+  alignas(cache_line) std::atomic<std::uint32_t> published_{0};  // the next number
+  alignas(cache_line) std::atomic<std::uint64_t> reader_{0};
 
   std::uint32_t current_ = 0, next_ = 0;
   std::size_t slot_ = 0, index_ = 0;
-  bool was_late_ = false;
+  bool was_late_ = false, was_refused_ = false;
 };
 
 }  // namespace shapegcode

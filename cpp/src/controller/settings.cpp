@@ -5,7 +5,7 @@
 
 #include "base/checks.hpp"
 #include "base/refuse.hpp"
-#include "motion/speed_limits.hpp"
+#include "limits/speed_limits.hpp"
 
 namespace shapegcode {
 namespace {
@@ -24,8 +24,21 @@ bool changes(const SetPointFilters& filters) noexcept { return filters.change().
 
 double own_share(const SetPointFilters& filters) noexcept { return changes(filters) ? 1.0 - change_share : 1.0; }
 
+struct AxisSettings {
+  double max_feed, max_acceleration, max_jerk;
+};
+AxisSettings axis_settings(const ControllerSettings& settings, std::size_t i) noexcept {
+  if (i >= axis_count) {
+    const FollowingLimits& axis = settings.following[i - axis_count];
+    return {axis.max_feed, axis.max_acceleration, axis.max_jerk};
+  }
+  const auto axis = static_cast<Eigen::Index>(i);
+  return {settings.limits.max_feed_mm_per_s[axis], settings.limits.max_acceleration_mm_per_s2[axis],
+          settings.limits.max_jerk_mm_per_s3[axis]};
+}
+
 // Highest speed of an axis while the followed one moves at `speed`.
-double feed_beside_changes(const FollowingLimits& axis, double speed, const ChangeCost& cost) noexcept {
+double feed_beside_changes(const AxisSettings& axis, double speed, const ChangeCost& cost) noexcept {
   return change_share * std::min(axis.max_acceleration / (speed * cost.acceleration_per_mm),
                                  0.5 * axis.max_jerk / (speed * cost.jerk_per_mm_s));
 }
@@ -50,6 +63,47 @@ double changing_speed(const ControllerSettings& settings, const SetPointFilters&
   }
   for (const FollowingLimits& axis : settings.following) look_at(axis.max_acceleration, axis.max_jerk);
   return speed;
+}
+
+// What there may be for each axis.
+void check_axes(const ControllerSettings& settings) {
+  const std::size_t n = axis_count + settings.following.size();
+  const auto is_for_each = [n](std::size_t count, const char* name) {
+    if (count != 0 && count != n) detail::refuse("{} of {} axes, the control has {}", name, count, n);
+  };
+  is_for_each(settings.travel.size(), "travel");
+  is_for_each(settings.offset.size(), "offset");
+  is_for_each(settings.emergency_acceleration.size(), "emergency acceleration");
+  for (std::size_t i = 0; i < settings.travel.size(); ++i) {
+    const AxisTravel& travel = settings.travel[i];
+    if (!(travel.low <= travel.high)) detail::refuse("axis {}: travel from {} to {}", i, travel.low, travel.high);
+  }
+  for (std::size_t i = 0; i < settings.emergency_acceleration.size(); ++i) {
+    const double most = settings.emergency_acceleration[i];
+    const double planned = axis_settings(settings, i).max_acceleration;
+    if (!(most >= planned)) {
+      detail::refuse("axis {}: emergency acceleration {}, must be at least that of the axis, {}", i, most, planned);
+    }
+  }
+  for (std::size_t i = 0; i < settings.offset.size(); ++i) {
+    const OffsetLimits& offset = settings.offset[i];
+    const AxisSettings axis = axis_settings(settings, i);
+    const auto takes_part = [i](double part, double of, const char* name) {
+      if (!(part >= 0.0 && std::isfinite(part) && (part == 0.0 || part < of))) {
+        detail::refuse("axis {}: {} of the offset is {}, must be 0 ... {} of the axis", i, name, part, of);
+      }
+    };
+    takes_part(offset.max_feed, axis.max_feed, "feed");
+    takes_part(offset.max_acceleration, axis.max_acceleration, "acceleration");
+    takes_part(offset.max_jerk, axis.max_jerk, "jerk");
+    const bool moves = offset.max_feed > 0.0;
+    if (moves != (offset.max_acceleration > 0.0) || moves != (offset.max_jerk > 0.0)) {
+      detail::refuse("axis {}: an offset wants feed, acceleration and jerk above 0, or none of them", i);
+    }
+    if (!std::isfinite(offset.backlash) || (offset.backlash != 0.0 && !moves)) {
+      detail::refuse("axis {}: a backlash of {} wants limits of the offset", i, offset.backlash);
+    }
+  }
 }
 
 }  // namespace
@@ -79,10 +133,14 @@ void check_settings(const ControllerSettings& settings) {
     require(axis.tolerance >= 0.0, "tolerance of a following axis", axis.tolerance, "", ">= 0");
     jerk_has_acceleration(axis.max_jerk, axis.max_acceleration, axis_count + i);
   }
+  check_axes(settings);
+  require_above_zero(settings.spindle_bandwidth_hz, "spindle bandwidth", "Hz");
   require(settings.lead_periods >= 0 && settings.lead_periods <= max_lead, "lead",
           static_cast<double>(settings.lead_periods), "periods", "0 ... 10000");
   require(settings.window >= min_window && settings.window <= max_segments, "window",
           static_cast<double>(settings.window), "segments", "8 ... 16777216");
+  require(settings.retrace_periods <= max_segments, "retrace", static_cast<double>(settings.retrace_periods), "periods",
+          "0 ... 16777216");
   require(settings.queue <= max_segments, "queue", static_cast<double>(settings.queue), "segments", "0 ... 16777216");
 }
 
@@ -94,22 +152,21 @@ AxisLimits axis_limits_of(const ControllerSettings& settings, const SetPointFilt
   AxisLimits limits;
   limits.axes = axis_count + settings.following.size();
   for (std::size_t i = 0; i < limits.axes; ++i) {
-    if (i < axis_count) {
-      const auto axis = static_cast<Eigen::Index>(i);
-      limits.speed[i] = std::min(settings.limits.max_feed_mm_per_s[axis] / filters.gain(), speed);
-      limits.acceleration[i] = settings.limits.max_acceleration_mm_per_s2[axis];
-      limits.jerk[i] = settings.limits.max_jerk_mm_per_s3[axis];
-    } else {
-      const FollowingLimits& axis = settings.following[i - axis_count];
-      limits.speed[i] = axis.max_feed / filters.gain();
-      if (changes(filters)) {
-        limits.speed[i] = std::min(limits.speed[i], feed_beside_changes(axis, speed, filters.change()));
-      }
-      limits.acceleration[i] = axis.max_acceleration;
-      limits.jerk[i] = axis.max_jerk;
+    AxisSettings axis = axis_settings(settings, i);
+    axis.max_acceleration = std::min(axis.max_acceleration, no_acceleration);
+    if (i < settings.offset.size()) {
+      axis.max_feed -= settings.offset[i].max_feed;
+      axis.max_acceleration -= settings.offset[i].max_acceleration;
+      axis.max_jerk -= settings.offset[i].max_jerk;
     }
-    limits.acceleration[i] = std::min(limits.acceleration[i], no_acceleration) * share;
-    limits.jerk[i] *= share;
+    limits.speed[i] = axis.max_feed / filters.gain();
+    if (i < axis_count) {
+      limits.speed[i] = std::min(limits.speed[i], speed);
+    } else if (changes(filters)) {
+      limits.speed[i] = std::min(limits.speed[i], feed_beside_changes(axis, speed, filters.change()));
+    }
+    limits.acceleration[i] = axis.max_acceleration * share;
+    limits.jerk[i] = axis.max_jerk * share;
   }
   return limits;
 }
@@ -121,6 +178,9 @@ PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPoi
     require(settings.contour_tolerance_mm > 0.0, "contour tolerance with smoothing or shaper",
             settings.contour_tolerance_mm, "mm", "> 0");
   }
+  if (changes(filters) && !settings.offset.empty()) {
+    detail::refuse("an offset of {} axes beside a shaper that follows an axis", settings.offset.size());
+  }
   PlanningRules rules;
   rules.period_s = settings.period_s;
   rules.limits = axis_limits_of(settings, filters);
@@ -131,6 +191,12 @@ PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPoi
   rules.lead_periods = settings.plans_in_step ? 0 : settings.lead_periods;
   rules.settling_periods = filters.duration_samples();
   return rules;
+}
+
+AxisValues emergency_of(const ControllerSettings& settings, double gain) noexcept {
+  AxisValues most{};
+  std::ranges::transform(settings.emergency_acceleration, most.begin(), [gain](double value) { return value / gain; });
+  return most;
 }
 
 double path_tolerance_of(const ControllerSettings& settings, const SetPointFilters& filters) {

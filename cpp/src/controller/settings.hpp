@@ -15,6 +15,8 @@ void check_settings(const ControllerSettings& settings);
 
 /// Limits of the motion along the path, so that what leaves the filters keeps those of the settings.
 [[nodiscard]] PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPointFilters& filters);
+/// Of each axis, before the filters; without settings 0.
+[[nodiscard]] AxisValues emergency_of(const ControllerSettings& settings, double gain) noexcept;
 /// What rounding may take of the contour tolerance: half of it where filters behind take the other half, mm.
 [[nodiscard]] double path_tolerance_of(const ControllerSettings& settings, const SetPointFilters& filters);
 /// Where a contour correction leaves only what filters cut off corners: of that the time, by which it grows with the

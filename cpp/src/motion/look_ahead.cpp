@@ -9,7 +9,7 @@
 #include "motion/phase_maker.hpp"
 #include "motion/pieces.hpp"
 #include "motion/planned_motion.hpp"
-#include "motion/speed_limits.hpp"
+#include "limits/speed_limits.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {

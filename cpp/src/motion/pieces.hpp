@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "motion/speed_limits.hpp"
+#include "limits/speed_limits.hpp"
 #include "shapegcode/motion.hpp"
 
 namespace shapegcode {

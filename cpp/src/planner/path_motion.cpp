@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/LU>
-
 namespace shapegcode {
 namespace {
 
@@ -268,27 +266,13 @@ bool PathMotion::land(double travel, double excess) noexcept {
   const double most_jerk = excess * (1.0 + landing_rounding) * plan_->highest_jerk(here, path);
   const double steepest =
       excess * (1.0 + rounding) * std::max(plan_->steepest(here, path), std::abs(state_.acceleration));
-  const double a = state_.acceleration;
-  const double v = state_.speed;
   // No shorter than with a jerk that is constant.
-  const double shortest_s = 0.5 * std::max(std::abs(a) / most_jerk, std::cbrt(6.0 * travel / most_jerk));
+  const double shortest_s =
+      0.5 * std::max(std::abs(state_.acceleration) / most_jerk, std::cbrt(6.0 * travel / most_jerk));
   int periods = std::max(3, static_cast<int>(std::min(shortest_s / period_s_, longest_landing)));
   for (int n = 0; n < landings; ++n, periods += 1 + periods / (n < landings / 3 ? 32 : 8)) {
-    Landing found;
-    found.periods = {periods / 3, periods - 2 * (periods / 3), periods / 3};
-    const double whole = periods * period_s_;
-    // What a jerk of 1 in each part makes of acceleration, speed and distance at the end.
-    Eigen::Matrix3d effect;
-    double after = whole;
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      const double t = found.periods[static_cast<std::size_t>(i)] * period_s_;
-      after -= t;
-      effect(0, i) = t;
-      effect(1, i) = t * (0.5 * t + after);
-      effect(2, i) = t * (t * t / 6.0 + after * 0.5 * (t + after));
-    }
-    const Vector3 jerk = effect.inverse() * Vector3(-a, -v - a * whole, travel - whole * (v + 0.5 * a * whole));
-    std::copy_n(jerk.data(), 3, found.jerk.begin());
+    const Landing found =
+        landing_after(travel, state_, {periods / 3, periods - 2 * (periods / 3), periods / 3}, period_s_);
     if (!holds(found, most_jerk, steepest, excess)) continue;
     landing_ = found;
     return true;
@@ -324,10 +308,7 @@ bool PathMotion::land_anywhere() noexcept {
 }
 
 void PathMotion::fly_on() noexcept {
-  std::size_t part = 0;
-  while (landing_.periods[part] == 0) ++part;
-  move(landing_.jerk[part], period_s_);
-  --landing_.periods[part];
+  move(landing_.next(), period_s_);
   if (!landing_.runs()) come_to_rest();
 }
 

@@ -1,10 +1,10 @@
 // The motion along the planned path: one state a period, always such that a stop is certain.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 
+#include "planner/landing.hpp"
 #include "planner/path_plan.hpp"
 
 namespace shapegcode {
@@ -47,12 +47,6 @@ class PathMotion {
   void rates(AxisValues& velocity, AxisValues& acceleration) const noexcept;
 
  private:
-  // Three constant jerks, each for whole periods, that end at rest.
-  struct Landing {
-    std::array<double, 3> jerk{};
-    std::array<int, 3> periods{};
-    [[nodiscard]] bool runs() const noexcept { return periods[0] + periods[1] + periods[2] > 0; }
-  };
   struct Jerks {
     double low, high;
   };

@@ -40,8 +40,8 @@ void PathPlan::resize(std::size_t capacity) {
   courses_.resize(capacity);
 }
 
-void PathPlan::make(const PathStart& start, const AlongPath& state, std::uint64_t end, double ratio) {
-  path_.start(start, end, ratio);
+void PathPlan::make(const PathStart& start, const AlongPath& state, std::uint64_t end, const FeedRatios& ratios) {
+  path_.start(start, end, ratios);
   begin_ = {state.speed * state.speed, state.acceleration};
   make_stations();
   for (std::size_t k = 0; k < count_; ++k) courses_[k] = Course{};

@@ -23,7 +23,7 @@ class PathPlan {
 
   /// Plans from a position on, where the motion is in a state, to the end of what is known, or as far as the stations
   /// reach.
-  void make(const PathStart& start, const AlongPath& state, std::uint64_t end, double ratio);
+  void make(const PathStart& start, const AlongPath& state, std::uint64_t end, const FeedRatios& ratios);
 
   /// Whether it ends before the end of what is known.
   [[nodiscard]] bool is_cut() const noexcept { return is_cut_; }

@@ -70,10 +70,10 @@ RoundedPath::RoundedPath(SegmentRing& ring, const AxisLimits& limits, double per
   stopping_length_ = std::min(longest_stopping_mm, jerk * time_s * time_s * time_s / 6.0);
 }
 
-void RoundedPath::start(const PathStart& start, std::uint64_t end, double ratio) noexcept {
+void RoundedPath::start(const PathStart& start, std::uint64_t end, const FeedRatios& ratios) noexcept {
   start_ = start;
   end_ = end;
-  ratio_ = ratio;
+  ratios_ = ratios;
   segment_ = start.segment;
   PlannedSegment& at = (*ring_)[start.segment];
   if (starts_anew(start.segment)) at.distance = 0.0;
@@ -232,7 +232,7 @@ bool RoundedPath::ends_in_stop(std::uint64_t segment) const noexcept {
 }
 
 double RoundedPath::feed_of(const PlannedSegment& entry) const noexcept {
-  return std::min(entry.programmed * entry.feed_share * ratio_, entry.max_speed);
+  return std::min(entry.programmed * entry.feed_share * ratios_.of(entry), entry.max_speed);
 }
 
 // How far it is to the next stop, as far as that matters.

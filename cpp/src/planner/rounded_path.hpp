@@ -24,8 +24,8 @@ class RoundedPath {
   RoundedPath(SegmentRing& ring, const AxisLimits& limits, double period_s);
 
   /// Chooses the half-widths of what is not fixed yet, from a position on: so many mm behind the start of a segment.
-  /// `first`: the segment with which the path begins; segments before `end` are known. Feeds are run at this ratio.
-  void start(const PathStart& start, std::uint64_t end, double ratio) noexcept;
+  /// `first`: the segment with which the path begins; segments before `end` are known. Feeds are run at these ratios.
+  void start(const PathStart& start, std::uint64_t end, const FeedRatios& ratios) noexcept;
   /// The next interval; false at the end.
   [[nodiscard]] bool next(Station& station) noexcept;
 
@@ -62,7 +62,7 @@ class RoundedPath {
   double period_s_;
   double least_acceleration_, highest_acceleration_;
   double stopping_length_;
-  double ratio_ = 1.0;
+  FeedRatios ratios_;
   PathStart start_;
   double start_x_ = 0.0;
   std::uint64_t end_ = 0;

@@ -1,12 +1,14 @@
 // Segments as the planner has them: what each of them and its junction with the one before allow.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>
 
+#include "shapegcode/limits.hpp"
 #include "shapegcode/path.hpp"
 
 namespace shapegcode {
@@ -23,7 +25,8 @@ struct PlannedSegment {
   AxisValues start{}, end{};  ///< position of such an axis at both ends
 
   // Of the segment; without the override.
-  double programmed = 0.0;             ///< feed, mm/s
+  FeedRate rate_of = FeedRate::per_time;
+  double programmed = 0.0;             ///< feed, mm/s or mm per revolution
   double max_speed = no_limit;         ///< whatever the override
   double max_acceleration = no_limit;  ///< along the path, beside the limits of the axes
   double max_jerk = no_limit;
@@ -48,6 +51,30 @@ struct PlannedSegment {
   bool is_fixed = false;        ///< the motion has been planned into the rounding
   std::uint64_t saw_until = 0;  ///< segments before this one were considered when the rounding was chosen
 };
+
+/// What the programmed feeds are multiplied with.
+struct FeedRatios {
+  double feed = 1.0, rapid = 1.0, revolutions_per_s = 1.0;
+
+  [[nodiscard]] double of(FeedRate rate) const noexcept {
+    switch (rate) {
+      case FeedRate::per_time:
+        return feed;
+      case FeedRate::rapid:
+        return rapid;
+      case FeedRate::per_revolution:
+        return feed * revolutions_per_s;
+      case FeedRate::synchronous:
+        break;
+    }
+    return 1.0;
+  }
+  [[nodiscard]] double of(const PlannedSegment& segment) const noexcept { return of(segment.rate_of); }
+  friend bool operator==(const FeedRatios&, const FeedRatios&) = default;
+};
+[[nodiscard]] inline FeedRatios larger(const FeedRatios& a, const FeedRatios& b) noexcept {
+  return {std::max(a.feed, b.feed), std::max(a.rapid, b.rapid), std::max(a.revolutions_per_s, b.revolutions_per_s)};
+}
 
 /// A ring of segments: segment `index`, counted from the first one ever, is entry `index & mask`.
 class SegmentRing {

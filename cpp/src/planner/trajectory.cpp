@@ -64,7 +64,7 @@ struct Run {
 
 Run run(SegmentRing& segments, std::size_t count, const AxisLimits& limits, double period_s) {
   PathPlan plan(segments, limits, period_s, 0);
-  plan.make({}, {}, count, 1.0);
+  plan.make({}, {}, count, {});
   PathMotion motion(plan, period_s);
   Run run{{segments[0].segment.start_mm}, {0}, count};
   Vector3 seen = run.points.back();

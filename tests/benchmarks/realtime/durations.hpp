@@ -17,6 +17,7 @@ class Durations {
     if (count_ < values_.size())
       values_[count_++] = static_cast<std::uint32_t>(ns < 0 ? 0 : ns < longest ? ns : longest);
   }
+  void clear() noexcept { count_ = 0; }
   /// Ends the collection: what follows may be called from then on.
   void sort();
 

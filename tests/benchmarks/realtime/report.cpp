@@ -30,10 +30,10 @@ std::string quoted(const std::string& text) {
 }
 
 const std::string header =
-    format("  %-34s %11s %9s %9s %9s %11s\n", "us", "number", "median", "99 %", "99.99 %", "worst");
+    format("  %-42s %11s %9s %9s %9s %11s\n", "us", "number", "median", "99 %", "99.99 %", "worst");
 
 std::string row(const std::string& name, const Durations& durations) {
-  return format("  %-34s %11zu %9.3f %9.3f %9.3f %11.3f\n", name.c_str(), durations.count(), 1e-3 * durations.at(0.5),
+  return format("  %-42s %11zu %9.3f %9.3f %9.3f %11.3f\n", name.c_str(), durations.count(), 1e-3 * durations.at(0.5),
                 1e-3 * durations.at(0.99), 1e-3 * durations.at(0.9999), 1e-3 * durations.worst());
 }
 
@@ -147,6 +147,20 @@ void Report::periodic(const Periodic& found, double minutes) {
                       format(", \"missed\": %zu, \"missed_alone\": %zu, \"minutes\": %g, \"others_cores\": %.3f, "
                              "\"stolen_cores\": %.3f}",
                              found.missed, found.missed_alone, minutes, found.others_cores, found.stolen_cores));
+  std::fflush(stdout);
+}
+
+void Report::other_calls(const OtherCalls& found) {
+  std::printf("\nevery other call, and step() in whatever else it does; one thread, %s\n", found.thread.c_str());
+  std::string text = header;
+  std::string json;
+  for (const NamedDurations& named : found.rows) {
+    text += row(named.name, named.durations);
+    json += (json.empty() ? "{" : ", ") + quoted(named.name) + ": " + json_of(named.durations);
+  }
+  std::fputs(text.c_str(), stdout);
+  calls("all of them", found.calls);
+  add("other_calls", json + "}");
   std::fflush(stdout);
 }
 

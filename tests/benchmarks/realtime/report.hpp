@@ -16,6 +16,7 @@ class Report {
   /// Table of push() of the windows so far.
   void pushes();
   void repeated(const Repeated& found);
+  void other_calls(const OtherCalls& found);
   void periodic(const Periodic& found, double minutes);
   void simulated(const Simulated& found);
 

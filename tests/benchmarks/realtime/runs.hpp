@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "durations.hpp"
 #include "interposer.hpp"
@@ -28,11 +29,23 @@ struct FreeRun {
   /// interrupted it then interrupts a step as often.
   std::size_t interruptions = 0;
   Durations push;  ///< segments that were taken
-  std::array<std::size_t, 6> activities{};
+  std::array<std::size_t, 7> activities{};
   interposer::Calls stepping, pushing;
   std::uint64_t segments = 0, starvations = 0;
 };
 [[nodiscard]] FreeRun free_running(std::size_t steps, std::size_t window);
+
+/// Every call that is none of these, one after another in one thread, while another form of motion is run.
+struct NamedDurations {
+  std::string name;
+  Durations durations;
+};
+struct OtherCalls {
+  std::string thread;
+  std::vector<NamedDurations> rows;
+  interposer::Calls calls;
+};
+[[nodiscard]] OtherCalls other_calls(int rounds);
 
 /// The same steps several times, fed between them by the same thread: the least time of each is the code's own.
 struct Repeated {

@@ -1,7 +1,7 @@
 // What a segment allows: its acceleration, and how long jerk has to be spread.
 #pragma once
 
-#include "shapegcode/motion.hpp"
+#include "shapegcode/limits.hpp"
 #include "shapegcode/path.hpp"
 
 namespace shapegcode {

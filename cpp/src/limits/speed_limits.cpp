@@ -1,4 +1,4 @@
-#include "motion/speed_limits.hpp"
+#include "limits/speed_limits.hpp"
 
 #include <algorithm>
 #include <cmath>
