@@ -384,12 +384,13 @@ class MotionController::Implementation {
     } else if (!is_beside_) {
       retrace_.note(point);
     }
-    const bool waits = mode == Jog::Mode::returns ? jog_.is_beside() : !jog_.at_rest();
-    retrace_.step(waits ? Jog::Mode::closed : mode);
+    const bool retraces = !retrace_.at_rest();
+    const bool jogs = mode == Jog::Mode::returns ? jog_.is_beside() : !jog_.at_rest();
+    retrace_.step(jogs ? Jog::Mode::closed : mode);
     AxisValues base = point.position;
     AxisValues unused{};
     retrace_.add_to(base, unused, unused);
-    jog_.step(mode == Jog::Mode::open && !retrace_.at_rest() ? Jog::Mode::closed : mode, base);
+    jog_.step(retraces || !retrace_.at_rest() ? Jog::Mode::closed : mode, base);
   }
   [[nodiscard]] bool rests_beside() const noexcept { return jog_.at_rest() && retrace_.at_rest(); }
   void stop_beside() noexcept {

@@ -208,6 +208,19 @@ std::optional<PathPoint> OnlinePlanner::next_start(std::uint64_t pushed) noexcep
   return from;
 }
 
+// Behind the last one.
+void OnlinePlanner::join(Section& section) const noexcept {
+  section.is_bound = false;
+  section.after = last_number_;
+  section.start = start_;
+  section.first_period = last_->first_period + start_;
+  for (std::size_t i = 0; i < section.before.size(); ++i) {
+    // What was bound to the spindle has come to rest there long ago.
+    const std::size_t back = last_->is_bound && start_ > 0 ? 0 : i;
+    section.before[i] = last_->at(static_cast<std::ptrdiff_t>(start_) - static_cast<std::ptrdiff_t>(back));
+  }
+}
+
 bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const FeedRatios& asked) {
   const std::optional<PathPoint> start = next_start(pushed);
   if (!start) return false;
@@ -227,15 +240,7 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
   const FeedRatios planned_ratios = is_faster ? larger(ratios, ratios_) : ratios;
   bool makes_plan = !has_motion_ || planned_ratios != ratios_ || wants_plan(from, pushed);
   pushed_before_ = pushed;
-  section.is_bound = false;
-  section.after = last_number_;
-  section.start = start_;
-  section.first_period = last_->first_period + start_;
-  for (std::size_t i = 0; i < section.before.size(); ++i) {
-    // What was bound to the spindle has come to rest there long ago.
-    const std::size_t back = last_->is_bound && start_ > 0 ? 0 : i;
-    section.before[i] = last_->at(static_cast<std::ptrdiff_t>(start_) - static_cast<std::ptrdiff_t>(back));
-  }
+  join(section);
   if (rests && begins_bound(from)) {
     bind_to_spindle(section, from, pushed);
     return true;
