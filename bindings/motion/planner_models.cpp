@@ -1,0 +1,51 @@
+#include "shapegcode/planner_models.hpp"
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+
+#include "register.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+
+void register_planner_models(py::module_& module) {
+  py::enum_<ControllerKind>(module, "ControllerKind", "Whose rules plan a program.")
+      .value("fanuc", ControllerKind::fanuc)
+      .value("linuxcnc", ControllerKind::linuxcnc)
+      .value("klipper", ControllerKind::klipper)
+      .value("grbl", ControllerKind::grbl);
+
+  py::class_<PlannerRules>(module, "PlannerRules", "Settings of the open planners.")
+      .def(py::init<>())
+      .def_readwrite("kind", &PlannerRules::kind, "Whose rules.")
+      .def_readwrite("arc_resolution_mm", &PlannerRules::arc_resolution_mm, "klipper: length of the chords of an arc.")
+      .def_readwrite("square_corner_velocity_mm_per_s", &PlannerRules::square_corner_velocity_mm_per_s,
+                     "klipper: speed at a corner of 90 degrees.")
+      .def_readwrite("minimum_cruise_ratio", &PlannerRules::minimum_cruise_ratio,
+                     "klipper: max_accel_to_decel is max_accel times what it leaves of 1.")
+      .def_readwrite("arc_tolerance_mm", &PlannerRules::arc_tolerance_mm, "grbl: chords of an arc lie within it ($12).")
+      .def_readwrite("junction_deviation_mm", &PlannerRules::junction_deviation_mm,
+                     "grbl: a corner is passed as an arc that cuts it by so much ($11).")
+      .def_readwrite("look_ahead_blocks", &PlannerRules::look_ahead_blocks, "grbl: blocks of its planner's buffer.");
+
+  module.def(
+      "controlled_motion",
+      [](const std::shared_ptr<Path>& path, const MotionLimits& limits, const PlannerRules& rules) {
+        ControlledMotion motion;
+        {
+          const py::gil_scoped_release release;
+          motion = controlled_motion(path, limits, rules);
+        }
+        // Python knows no constant objects; neither class lets anything be changed.
+        return py::make_tuple(std::const_pointer_cast<Path>(motion.path),
+                              std::const_pointer_cast<SpeedProfile>(motion.profile));
+      },
+      py::arg("path").none(false), py::arg("limits"), py::arg("rules"),
+      "The path that a control follows, and its speed along it from rest to rest: (Path, SpeedProfile). Raises "
+      "ArgumentError on a segment without feed, or a setting that the planner does not take.");
+}
+
+}  // namespace shapegcode::bindings

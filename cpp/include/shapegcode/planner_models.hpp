@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "shapegcode/motion.hpp"
+#include "shapegcode/path.hpp"
+
+namespace shapegcode {
+
+/// Whose rules plan a program.
+enum class ControllerKind : std::uint8_t {
+  fanuc,     ///< `plan_speed` under MotionLimits, or block by block
+  linuxcnc,  ///< trapezoids in whole servo periods, blend arcs, kink rule (2.9)
+  klipper,   ///< trapezoids, square corner velocity, minimum cruise ratio
+  grbl,      ///< trapezoids, junction deviation, a buffer of a few blocks
+};
+
+/// Settings of the open planners, by the names of their own configuration. Feed, override and acceleration of the axes
+/// are those of MotionLimits; jerk and the rules of a FANUC control do not act.
+struct PlannerRules {
+  ControllerKind kind = ControllerKind::fanuc;
+  double arc_resolution_mm = 1.0;                ///< klipper: length of the chords of an arc ([gcode_arcs] resolution)
+  double square_corner_velocity_mm_per_s = 5.0;  ///< klipper: speed at a corner of 90 degrees
+  double minimum_cruise_ratio = 0.5;             ///< klipper: max_accel_to_decel is max_accel times what it leaves of 1
+  double arc_tolerance_mm = 0.002;               ///< grbl: chords of an arc lie within it ($12)
+  double junction_deviation_mm = 0.01;           ///< grbl: a corner is passed as an arc that cuts it by so much ($11)
+  /// grbl: blocks of its planner's buffer. It can stop at the end of the last of them at any time.
+  std::size_t look_ahead_blocks = 15;
+};
+
+/// Throws Error(argument) on a setting that the planner does not take; the message names it and its range.
+void check(const PlannerRules& rules);
+
+/// A path as a control executes it, and how fast.
+struct ControlledMotion {
+  std::shared_ptr<const Path> path;  ///< its own where the control leaves the geometry as it is
+  std::shared_ptr<const SpeedProfile> profile;
+};
+
+/// The path that a control follows: arcs as chords (grbl, klipper); that of a FANUC control is the given one itself.
+[[nodiscard]] std::shared_ptr<const Path> executed_path(const std::shared_ptr<const Path>& path,
+                                                        const PlannerRules& rules);
+
+/// A path planned by the rules of a control from rest to rest, with all of its blocks in time (but for the blocks that
+/// its buffer holds). Written from the published rules:
+/// grbl: Jeon's junction deviation, "Improving Grbl: Cornering Algorithm" (2011), and the project's wiki.
+/// klipper: docs/Kinematics.md and docs/Config_Reference.md of the project.
+/// Throws Error(argument) on a segment without feed, or a setting or limit that is not positive and finite.
+[[nodiscard]] ControlledMotion controlled_motion(const std::shared_ptr<const Path>& path, const MotionLimits& limits,
+                                                 const PlannerRules& rules);
+
+}  // namespace shapegcode
