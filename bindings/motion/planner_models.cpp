@@ -29,6 +29,14 @@ void register_planner_models(py::module_& module) {
       .def_readwrite("arc_tolerance_mm", &PlannerRules::arc_tolerance_mm, "grbl: chords of an arc lie within it ($12).")
       .def_readwrite("junction_deviation_mm", &PlannerRules::junction_deviation_mm,
                      "grbl: a corner is passed as an arc that cuts it by so much ($11).")
+      .def_readwrite("period_s", &PlannerRules::period_s, "linuxcnc: of the servo thread, in which it plans.")
+      .def_readwrite("blend_tolerance_mm", &PlannerRules::blend_tolerance_mm, "linuxcnc: G64 P; 0: not limited.")
+      .def_readwrite("ramp_frequency_hz", &PlannerRules::ramp_frequency_hz, "linuxcnc: shorter segments are ramps.")
+      .def_readwrite("kink_ratio", &PlannerRules::kink_ratio, "linuxcnc: share of the acceleration for a kink.")
+      .def_readwrite("max_feed_override", &PlannerRules::max_feed_override, "linuxcnc: it plans for that.")
+      .def_readwrite("rapid_follows", &PlannerRules::rapid_follows,
+                     "linuxcnc: else the last segment has half of the acceleration.")
+      .def_readwrite("optimization_depth", &PlannerRules::optimization_depth, "linuxcnc: segments that it looks ahead.")
       .def_readwrite("look_ahead_blocks", &PlannerRules::look_ahead_blocks, "grbl: blocks of its planner's buffer.");
 
   module.def(

@@ -1014,6 +1014,14 @@ class PlannerRules:
     def arc_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def blend_tolerance_mm(self) -> float:
+        """
+        linuxcnc: G64 P; 0: not limited.
+        """
+    @blend_tolerance_mm.setter
+    def blend_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def junction_deviation_mm(self) -> float:
         """
         grbl: a corner is passed as an arc that cuts it by so much ($11).
@@ -1030,6 +1038,14 @@ class PlannerRules:
     def kind(self, arg0: ControllerKind) -> None:
         ...
     @property
+    def kink_ratio(self) -> float:
+        """
+        linuxcnc: share of the acceleration for a kink.
+        """
+    @kink_ratio.setter
+    def kink_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def look_ahead_blocks(self) -> int:
         """
         grbl: blocks of its planner's buffer.
@@ -1038,12 +1054,52 @@ class PlannerRules:
     def look_ahead_blocks(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
+    def max_feed_override(self) -> float:
+        """
+        linuxcnc: it plans for that.
+        """
+    @max_feed_override.setter
+    def max_feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def minimum_cruise_ratio(self) -> float:
         """
         klipper: max_accel_to_decel is max_accel times what it leaves of 1.
         """
     @minimum_cruise_ratio.setter
     def minimum_cruise_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def optimization_depth(self) -> int:
+        """
+        linuxcnc: segments that it looks ahead.
+        """
+    @optimization_depth.setter
+    def optimization_depth(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def period_s(self) -> float:
+        """
+        linuxcnc: of the servo thread, in which it plans.
+        """
+    @period_s.setter
+    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def ramp_frequency_hz(self) -> float:
+        """
+        linuxcnc: shorter segments are ramps.
+        """
+    @ramp_frequency_hz.setter
+    def ramp_frequency_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rapid_follows(self) -> bool:
+        """
+        linuxcnc: else the last segment has half of the acceleration.
+        """
+    @rapid_follows.setter
+    def rapid_follows(self, arg0: bool) -> None:
         ...
     @property
     def square_corner_velocity_mm_per_s(self) -> float:

@@ -1,4 +1,4 @@
-"""Motion of a path by planners that are not the package's own: Klipper's host, and grbl's rules in plain Python.
+"""Motion of a path by planners that are not the package's own: Klipper's host, recordings of LinuxCNC, grbl's rules.
 
 A path is its segments as the core gives them: geometry and feed alone are used.
 """
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dialect_readers import in_klipper
+from dialect_readers import ReadMove, in_klipper, read_linuxcnc
 from shapegcode import _core
 
 Vector = NDArray[np.float64]
@@ -102,3 +102,40 @@ class Grbl:
         for k in reversed(known):
             speed = min(math.sqrt(speed**2 + 2.0 * most[k] * lengths[k]), junctions[k], feeds[k], feeds[k - 1])
         return min(speed, math.sqrt(entry**2 + 2.0 * most[i] * lengths[i]), feeds[i])
+
+
+def path_of_text(text: str, folder: Path) -> _core.Path:
+    """The last cut of a program in LinuxCNC's words, read by its own interpreter."""
+    cut: list[ReadMove] = []
+    for move in reversed(read_linuxcnc(text, folder)):
+        if not move.rapid and not move.dwell_s:
+            cut.append(move)
+        elif cut:
+            break
+    return _core.Path([_segment(move) for move in reversed(cut)])
+
+
+def _segment(move: ReadMove) -> _core.Segment:
+    feed = move.feed_mm_per_min / 60.0
+    if move.centre is None:
+        return _core.Segment.line(move.start, move.end, feed)
+    angles = [math.atan2(*(point - move.centre)[[1, 0]]) for point in (move.start, move.end)]
+    sweep = (angles[1] - angles[0]) * move.turn % math.tau * move.turn
+    return _core.Segment.arc(move.start, move.end, move.centre, sweep, feed)
+
+
+def smoothed(points: Vector) -> Vector:
+    """Set-points behind the cubic between the samples of a joint: a sixth, four sixths, a sixth."""
+    held = np.vstack([np.repeat(points[:1], 2, axis=0), points, np.repeat(points[-1:], 2, axis=0)])
+    return (held[:-2] + 4.0 * held[1:-1] + held[2:]) / 6.0
+
+
+def distance_in_time(one: Vector, other: Vector, most_shift: int = 6) -> float:
+    """Largest distance of set-points at the same time, mm, where one begins by so many periods earlier or later."""
+    found = []
+    for shift in range(-most_shift, most_shift + 1):
+        a, b = one[max(0, shift) :], other[max(0, -shift) :]
+        count = max(len(a), len(b))
+        a, b = (np.vstack([each, np.repeat(each[-1:], count - len(each), axis=0)]) for each in (a, b))
+        found.append(float(np.linalg.norm(a - b, axis=1).max()))
+    return min(found)

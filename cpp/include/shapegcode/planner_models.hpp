@@ -26,6 +26,14 @@ struct PlannerRules {
   double minimum_cruise_ratio = 0.5;             ///< klipper: max_accel_to_decel is max_accel times what it leaves of 1
   double arc_tolerance_mm = 0.002;               ///< grbl: chords of an arc lie within it ($12)
   double junction_deviation_mm = 0.01;           ///< grbl: a corner is passed as an arc that cuts it by so much ($11)
+  double period_s = 0.001;           ///< linuxcnc: of the servo thread, in which it plans ([EMCMOT] SERVO_PERIOD)
+  double blend_tolerance_mm = 0.0;   ///< linuxcnc: G64 P; 0: as far as half of a segment lets it
+  double ramp_frequency_hz = 100.0;  ///< linuxcnc: shorter segments are ramps ([TRAJ] ARC_BLEND_RAMP_FREQ)
+  double kink_ratio = 0.1;           ///< linuxcnc: share of the acceleration for a kink (ARC_BLEND_KINK_RATIO)
+  double max_feed_override = 1.0;    ///< linuxcnc: [DISPLAY] MAX_FEED_OVERRIDE; it plans for that
+  /// linuxcnc: a rapid follows the path; else (a dwell, an M function) its last segment has half of the acceleration
+  bool rapid_follows = true;
+  std::size_t optimization_depth = 50;  ///< linuxcnc: segments that it looks ahead (ARC_BLEND_OPTIMIZATION_DEPTH)
   /// grbl: blocks of its planner's buffer. It can stop at the end of the last of them at any time.
   std::size_t look_ahead_blocks = 15;
 };
@@ -35,18 +43,16 @@ void check(const PlannerRules& rules);
 
 /// A path as a control executes it, and how fast.
 struct ControlledMotion {
-  std::shared_ptr<const Path> path;  ///< its own where the control leaves the geometry as it is
+  /// Arcs as chords (grbl, klipper), corners as blends (linuxcnc); the given one where the control leaves it as it is.
+  std::shared_ptr<const Path> path;
   std::shared_ptr<const SpeedProfile> profile;
 };
-
-/// The path that a control follows: arcs as chords (grbl, klipper); that of a FANUC control is the given one itself.
-[[nodiscard]] std::shared_ptr<const Path> executed_path(const std::shared_ptr<const Path>& path,
-                                                        const PlannerRules& rules);
 
 /// A path planned by the rules of a control from rest to rest, with all of its blocks in time (but for the blocks that
 /// its buffer holds). Written from the published rules:
 /// grbl: Jeon's junction deviation, "Improving Grbl: Cornering Algorithm" (2011), and the project's wiki.
 /// klipper: docs/Kinematics.md and docs/Config_Reference.md of the project.
+/// linuxcnc: the trajectory planner of 2.9 (blend arcs by Ellenberg, 2014) as its manual and comments state it.
 /// Throws Error(argument) on a segment without feed, or a setting or limit that is not positive and finite.
 [[nodiscard]] ControlledMotion controlled_motion(const std::shared_ptr<const Path>& path, const MotionLimits& limits,
                                                  const PlannerRules& rules);

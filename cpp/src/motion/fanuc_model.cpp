@@ -87,6 +87,10 @@ void check(const FanucModel& model) {
 
 std::vector<Fir> acceleration_filters(const FanucModel& model) {
   std::vector<Fir> filters;
+  if (model.planner.kind == ControllerKind::linuxcnc) {
+    // Joints are interpolated by cubics that pass near the set-points of the planner, not through them.
+    filters.push_back(Fir({0, 1, 2}, {1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0}));
+  }
   if (model.planner.kind != ControllerKind::fanuc) return filters;
   if (model.motion == MotionKind::look_ahead) {
     add_average(filters, model.look_ahead_filter_time_constant_s, model.period_s);

@@ -197,6 +197,22 @@ std::vector<Piece> klipper_pieces(const Path& path, const MotionLimits& limits, 
   return pieces;
 }
 
+// Arcs as chords; the path itself where it has none.
+std::shared_ptr<const Path> chorded_path(const std::shared_ptr<const Path>& path, const PlannerRules& rules) {
+  bool has_arcs = false;
+  for (std::size_t i = 0; i < path->size() && !has_arcs; ++i) has_arcs = path->is_arc(i);
+  if (!has_arcs) return path;
+  PathBuilder builder;
+  for (const Segment& segment : path->segments()) {
+    if (segment.kind == SegmentKind::arc) {
+      add_chords(segment, chord_count(segment, rules), builder);
+    } else {
+      builder.add(segment);
+    }
+  }
+  return std::make_shared<const Path>(builder.path());
+}
+
 }  // namespace
 
 namespace detail {
@@ -251,24 +267,15 @@ void check(const PlannerRules& rules) {
   require(rules.minimum_cruise_ratio >= 0.0 && rules.minimum_cruise_ratio < 1.0, "minimum cruise ratio",
           rules.minimum_cruise_ratio, "", "0 to below 1");
   require_within(rules.junction_deviation_mm, 1e-6, 10.0, "junction deviation", "mm");
+  require_within(rules.period_s, 1e-5, 0.1, "servo period", "s");
+  require_within(rules.blend_tolerance_mm, 0.0, 100.0, "blend tolerance", "mm");
+  require_within(rules.ramp_frequency_hz, 1e-3, 1e6, "ramp frequency", "Hz");
+  require_within(rules.kink_ratio, 1e-3, 1.0, "kink ratio", "");
+  require_within(rules.max_feed_override, 0.01, 100.0, "largest feed override", "");
+  require(rules.optimization_depth >= 2 && rules.optimization_depth <= 4096, "optimization depth",
+          static_cast<double>(rules.optimization_depth), "", "2 to 4096");
   require(rules.look_ahead_blocks >= 2 && rules.look_ahead_blocks <= 4096, "blocks of the planner's buffer",
           static_cast<double>(rules.look_ahead_blocks), "", "2 to 4096");
-}
-
-std::shared_ptr<const Path> executed_path(const std::shared_ptr<const Path>& path, const PlannerRules& rules) {
-  if (rules.kind != ControllerKind::klipper && rules.kind != ControllerKind::grbl) return path;
-  bool has_arcs = false;
-  for (std::size_t i = 0; i < path->size() && !has_arcs; ++i) has_arcs = path->is_arc(i);
-  if (!has_arcs) return path;
-  PathBuilder builder;
-  for (const Segment& segment : path->segments()) {
-    if (segment.kind == SegmentKind::arc) {
-      add_chords(segment, chord_count(segment, rules), builder);
-    } else {
-      builder.add(segment);
-    }
-  }
-  return std::make_shared<const Path>(builder.path());
 }
 
 ControlledMotion controlled_motion(const std::shared_ptr<const Path>& path, const MotionLimits& limits,
@@ -280,7 +287,10 @@ ControlledMotion controlled_motion(const std::shared_ptr<const Path>& path, cons
   check_limits(limits, {});
   for (int i = 0; i < axis_count; ++i)
     require_above_zero(limits.max_acceleration_mm_per_s2[i], "acceleration", "mm/s2");
-  ControlledMotion motion{executed_path(path, rules), nullptr};
+  if (rules.kind == ControllerKind::linuxcnc && path->length_mm() > 0.0) {
+    return detail::linuxcnc_motion(*path, limits, rules);
+  }
+  ControlledMotion motion{chorded_path(path, rules), nullptr};
   const double length_mm = motion.path->length_mm();
   std::vector<Piece> pieces;
   if (length_mm > 0.0) {

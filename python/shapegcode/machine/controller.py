@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, Strict, model_validator
 
 from shapegcode.io.data_file import toml_tables
-from shapegcode.machine.planners import ControllerKind, GrblPlanner, KlipperPlanner
+from shapegcode.machine.planners import ControllerKind, GrblPlanner, KlipperPlanner, LinuxcncPlanner
 from shapegcode.settings.keys import (
     AxisRatios,
     AxisTimes,
@@ -33,6 +33,9 @@ class Controller(TomlTable):
         "of that control, from the limits of the axes and the table of its name; shaped programs too, since it cannot "
         "be switched off. motion, law, corner_rule and their keys are then those by which the shaped motion is planned",
         default="fanuc",
+    )
+    linuxcnc: LinuxcncPlanner | None = key(
+        'settings of kind = "linuxcnc"; left out: the control\'s own defaults', default=None
     )
     klipper: KlipperPlanner | None = key(
         'settings of kind = "klipper"; left out: the control\'s own defaults', default=None

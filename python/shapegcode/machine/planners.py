@@ -6,11 +6,45 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict
 
-from shapegcode.settings.keys import NonNegative, Positive, TomlTable, key
+from shapegcode.settings.keys import Bool, NonNegative, Positive, TomlTable, key
 
 ControllerKind = Literal["fanuc", "linuxcnc", "klipper", "grbl"]
 PLANNER_NAMES = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "klipper": "Klipper", "grbl": "GRBL"}
 """Kinds of controls for people."""
+
+
+class LinuxcncPlanner(TomlTable):
+    """What the INI file and the program say of the motion; its period is interpolation_period_s."""
+
+    blend_tolerance_mm: Annotated[NonNegative, Field(le=100)] = key(
+        "G64 P of the program (shaped ones have P0.001): how far a blend may leave a corner, and the lines of one feed "
+        "that become one; 0: G64 without P",
+        default=0.001,
+        assumed=True,
+    )
+    ramp_frequency_hz: Annotated[Positive, Field(ge=0.001, le=1e6)] = key(
+        "[TRAJ] ARC_BLEND_RAMP_FREQ: in a segment that takes less than its inverse the speed is a linear ramp",
+        default=100.0,
+        assumed=True,
+    )
+    kink_ratio: Annotated[Positive, Field(ge=0.001, le=1)] = key(
+        "[TRAJ] ARC_BLEND_KINK_RATIO: share of the acceleration that the change of direction between two segments may "
+        "take, within one period; above it slows. It acts up to 0.7071",
+        default=0.1,
+        assumed=True,
+    )
+    max_feed_override: Annotated[Positive, Field(ge=0.01, le=100)] = key(
+        "[DISPLAY] MAX_FEED_OVERRIDE: corners are planned for it", unit="1", default=1.0, assumed=True
+    )
+    optimization_depth: Annotated[int, Strict(), Field(ge=2, le=4096)] = key(
+        "[TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH: segments that it looks ahead", unit="segments", default=50, assumed=True
+    )
+    rapid_follows: Bool = key(
+        "a rapid follows each cut; false: a dwell, an M function or the end of the program does, and the last move "
+        "brakes with half of the acceleration",
+        default=True,
+        assumed=True,
+    )
 
 
 class KlipperPlanner(TomlTable):

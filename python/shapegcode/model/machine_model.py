@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.machine.planners import GrblPlanner, KlipperPlanner
+from shapegcode.machine.planners import GrblPlanner, KlipperPlanner, LinuxcncPlanner
 from shapegcode.model.modes import (
     NO_OFFSET,
     Offset,
@@ -83,7 +83,11 @@ def planner_rules(machine: Machine) -> _core.PlannerRules:
     """The planner of a control that is none of FANUC's."""
     controller, rules = machine.controller, _core.PlannerRules()
     rules.kind = getattr(_core.ControllerKind, controller.kind)
-    settings = {"klipper": controller.klipper or KlipperPlanner(), "grbl": controller.grbl or GrblPlanner()}
+    rules.period_s = controller.interpolation_period_s
+    settings = {
+        "linuxcnc": controller.linuxcnc or LinuxcncPlanner(), "klipper": controller.klipper or KlipperPlanner(),
+        "grbl": controller.grbl or GrblPlanner(),
+    }  # fmt: skip
     if table := settings.get(controller.kind):
         for name, value in table:
             setattr(rules, name, value)
