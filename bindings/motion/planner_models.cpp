@@ -39,6 +39,23 @@ void register_planner_models(py::module_& module) {
       .def_readwrite("optimization_depth", &PlannerRules::optimization_depth, "linuxcnc: segments that it looks ahead.")
       .def_readwrite("look_ahead_blocks", &PlannerRules::look_ahead_blocks, "grbl: blocks of its planner's buffer.");
 
+  py::class_<LinuxcncSlowing>(module, "LinuxcncSlowing", "What LinuxCNC's rules for short segments do to a path.")
+      .def_readonly("segments", &LinuxcncSlowing::segments, "How many there are.")
+      .def_readonly("kinks", &LinuxcncSlowing::kinks, "Junctions above the kink ratio.")
+      .def_readonly("largest_ratio", &LinuxcncSlowing::largest_ratio, "Of the acceleration, that a junction asks for.")
+      .def_readonly("speed_mm_per_s", &LinuxcncSlowing::speed_mm_per_s, "There.")
+      .def_readonly("angle_rad", &LinuxcncSlowing::angle_rad, "There.")
+      .def_readonly("line", &LinuxcncSlowing::line, "There.")
+      .def_readonly("ramps", &LinuxcncSlowing::ramps, "Segments whose speed is a ramp.");
+  module.def(
+      "linuxcnc_slowing",
+      [](const std::shared_ptr<Path>& path, const MotionLimits& limits, const PlannerRules& rules, double corner_rad) {
+        const py::gil_scoped_release release;
+        return linuxcnc_slowing(*path, limits, rules, corner_rad);
+      },
+      py::arg("path").none(false), py::arg("limits"), py::arg("rules"), py::arg("corner_rad"),
+      "What LinuxCNC's two rules for short segments do to a path at its feeds; larger turns are corners.");
+
   module.def(
       "controlled_motion",
       [](const std::shared_ptr<Path>& path, const MotionLimits& limits, const PlannerRules& rules) {

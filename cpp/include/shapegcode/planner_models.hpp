@@ -57,4 +57,19 @@ struct ControlledMotion {
 [[nodiscard]] ControlledMotion controlled_motion(const std::shared_ptr<const Path>& path, const MotionLimits& limits,
                                                  const PlannerRules& rules);
 
+/// What LinuxCNC's two rules for short segments do to a path at its feeds.
+struct LinuxcncSlowing {
+  std::size_t segments = 0;
+  std::size_t kinks = 0;        ///< junctions that ask for more of the acceleration than the kink ratio
+  double largest_ratio = 0.0;   ///< that any junction of at most `corner_rad` asks for
+  double speed_mm_per_s = 0.0;  ///< there
+  double angle_rad = 0.0;
+  std::uint32_t line = 0;
+  std::size_t ramps = 0;  ///< segments whose speed is a ramp, as they are shorter than the ramp frequency's inverse
+};
+
+/// Turns of more than `corner_rad` are corners of the path and do not count.
+[[nodiscard]] LinuxcncSlowing linuxcnc_slowing(const Path& path, const MotionLimits& limits, const PlannerRules& rules,
+                                               double corner_rad);
+
 }  // namespace shapegcode

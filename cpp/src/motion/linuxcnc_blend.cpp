@@ -378,6 +378,19 @@ double overlap_speed(const QueuedSegment& before, const QueuedSegment& behind, c
   return speed;
 }
 
+double kink_speed_of(const QueuedSegment& before, const QueuedSegment& behind, const PlannerRules& rules) {
+  return std::min(target_speed(before, rules.max_feed_override), target_speed(behind, rules.max_feed_override));
+}
+
+// Share of the acceleration that the change of direction takes within a period, beside that of the axes.
+double kink_share(const QueuedSegment& before, const QueuedSegment& behind, const Corner& corner,
+                  const MotionLimits& limits, const PlannerRules& rules) {
+  const double at_once = kink_speed_of(before, behind, rules) / rules.period_s + behind.max_acceleration_mm_per_s2;
+  const Vector3 change = (corner.behind - corner.before).cwiseAbs() * at_once;
+  const double share = (change.array() / limits.max_acceleration_mm_per_s2.array()).maxCoeff();
+  return before.is_arc || behind.is_arc ? share / tangential_share : share;
+}
+
 void join(std::vector<QueuedSegment>& queue, QueuedSegment& behind, const MotionLimits& limits,
           const PlannerRules& rules) {
   QueuedSegment& before = queue.back();
@@ -387,13 +400,8 @@ void join(std::vector<QueuedSegment>& queue, QueuedSegment& behind, const Motion
     finish_limits(before, rules.period_s);
     return;
   }
-  // The change of direction within a period, beside the acceleration of the axes.
-  const double speed =
-      std::min(target_speed(before, rules.max_feed_override), target_speed(behind, rules.max_feed_override));
-  const double at_once = speed / rules.period_s + behind.max_acceleration_mm_per_s2;
-  const Vector3 change = (corner.behind - corner.before).cwiseAbs() * at_once;
-  double scale = (change.array() / limits.max_acceleration_mm_per_s2.array()).maxCoeff();
-  if (before.is_arc || behind.is_arc) scale /= tangential_share;
+  const double speed = kink_speed_of(before, behind, rules);
+  double scale = kink_share(before, behind, corner, limits, rules);
   const double ratio = std::clamp(rules.kink_ratio, least_kink_ratio, largest_kink_ratio);
   double kink_speed = speed;
   if (scale >= ratio) {
@@ -471,3 +479,36 @@ std::vector<QueuedSegment> linuxcnc_queue(const Path& path, const MotionLimits& 
 }
 
 }  // namespace shapegcode::detail
+
+namespace shapegcode {
+
+LinuxcncSlowing linuxcnc_slowing(const Path& path, const MotionLimits& limits, const PlannerRules& rules,
+                                 double corner_rad) {
+  LinuxcncSlowing slowing;
+  std::optional<detail::QueuedSegment> before;
+  for (const Segment& segment : path.segments()) {
+    if (!(segment.length_mm > 0.0)) continue;
+    const detail::QueuedSegment now = detail::queued_of(segment, limits, rules.period_s);
+    ++slowing.segments;
+    const double speed = now.request_mm_per_s;
+    if (before) {
+      const detail::Corner corner(before->geometry.back(), segment);
+      const double share = detail::kink_share(*before, now, corner, limits, rules);
+      if (corner.turn_rad <= corner_rad) {
+        if (share >= rules.kink_ratio) ++slowing.kinks;
+        if (share > slowing.largest_ratio) {
+          slowing.largest_ratio = share;
+          slowing.speed_mm_per_s = detail::kink_speed_of(*before, now, rules);
+          slowing.angle_rad = corner.turn_rad;
+          slowing.line = segment.line;
+        }
+      }
+      const bool is_short = segment.length_mm < speed / rules.ramp_frequency_hz;
+      if (is_short && std::abs(speed - before->request_mm_per_s) > 1e-3 * speed) ++slowing.ramps;
+    }
+    before = now;
+  }
+  return slowing;
+}
+
+}  // namespace shapegcode
