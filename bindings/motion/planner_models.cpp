@@ -31,6 +31,8 @@ void register_planner_models(py::module_& module) {
                      "grbl: a corner is passed as an arc that cuts it by so much ($11).")
       .def_readwrite("period_s", &PlannerRules::period_s, "linuxcnc: of the servo thread, in which it plans.")
       .def_readwrite("blend_tolerance_mm", &PlannerRules::blend_tolerance_mm, "linuxcnc: G64 P; 0: not limited.")
+      .def_readwrite("naive_cam_tolerance_mm", &PlannerRules::naive_cam_tolerance_mm,
+                     "linuxcnc: G64 Q: lines of one feed within it are one, an arc in XY within it is two lines.")
       .def_readwrite("ramp_frequency_hz", &PlannerRules::ramp_frequency_hz, "linuxcnc: shorter segments are ramps.")
       .def_readwrite("kink_ratio", &PlannerRules::kink_ratio, "linuxcnc: share of the acceleration for a kink.")
       .def_readwrite("max_feed_override", &PlannerRules::max_feed_override, "linuxcnc: it plans for that.")

@@ -26,8 +26,10 @@ struct PlannerRules {
   double minimum_cruise_ratio = 0.5;             ///< klipper: max_accel_to_decel is max_accel times what it leaves of 1
   double arc_tolerance_mm = 0.002;               ///< grbl: chords of an arc lie within it ($12)
   double junction_deviation_mm = 0.01;           ///< grbl: a corner is passed as an arc that cuts it by so much ($11)
-  double period_s = 0.001;           ///< linuxcnc: of the servo thread, in which it plans ([EMCMOT] SERVO_PERIOD)
-  double blend_tolerance_mm = 0.0;   ///< linuxcnc: G64 P; 0: as far as half of a segment lets it
+  double period_s = 0.001;          ///< linuxcnc: of the servo thread, in which it plans ([EMCMOT] SERVO_PERIOD)
+  double blend_tolerance_mm = 0.0;  ///< linuxcnc: G64 P; 0: as far as half of a segment lets it
+  /// linuxcnc: G64 Q, without it that of P: lines of one feed within it are one, an arc in XY within it is two lines
+  double naive_cam_tolerance_mm = 0.0;
   double ramp_frequency_hz = 100.0;  ///< linuxcnc: shorter segments are ramps ([TRAJ] ARC_BLEND_RAMP_FREQ)
   double kink_ratio = 0.1;           ///< linuxcnc: share of the acceleration for a kink (ARC_BLEND_KINK_RATIO)
   double max_feed_override = 1.0;    ///< linuxcnc: [DISPLAY] MAX_FEED_OVERRIDE; it plans for that

@@ -430,35 +430,60 @@ void join(std::vector<QueuedSegment>& queue, QueuedSegment& behind, const Motion
   finish_limits(before, rules.period_s);
 }
 
-// Lines of one feed whose ends lie within the tolerance of one line are one.
-std::vector<Segment> merged_lines(const Path& path, double tolerance_mm) {
-  std::vector<Segment> merged;
-  std::vector<Vector3> passed;  // ends of the lines that the last one stands for
-  for (const Segment& segment : path.segments()) {
-    if (!(segment.length_mm > 0.0)) continue;
-    bool links = tolerance_mm > 0.0 && !passed.empty() && segment.kind == SegmentKind::line &&
-                 segment.feed_mm_per_s == merged.back().feed_mm_per_s && passed.size() <= most_merged;
-    if (links) {
-      const Segment whole = make_line(merged.back().start_mm, segment.end_mm, segment.feed_mm_per_s, segment.line);
-      links = std::all_of(passed.begin(), passed.end(), [&](const Vector3& point) {
-        return whole.length_mm > 0.0 && nearest_on(whole, point).distance_mm <= tolerance_mm;
-      });
-      if (links) {
-        merged.back() = whole;
-        merged.back().stop_at_end = segment.stop_at_end;
-      }
-    }
-    if (!links) {
-      merged.push_back(segment);
-      passed.clear();
+// Lines of one feed whose ends lie within a tolerance of one line, put together.
+class LineMerger {
+ public:
+  explicit LineMerger(double tolerance_mm) : tolerance_mm_(tolerance_mm) {}
+
+  void add(const Segment& segment) {
+    if (segment.length_mm > 0.0 && !link(segment)) {
+      merged_.push_back(segment);
+      passed_.clear();
     }
     if (segment.kind == SegmentKind::line && !segment.stop_at_end) {
-      passed.push_back(segment.end_mm);
+      passed_.push_back(segment.end_mm);
     } else {
-      passed.clear();
+      passed_.clear();
     }
   }
-  return merged;
+  [[nodiscard]] std::vector<Segment>& segments() noexcept { return merged_; }
+
+ private:
+  bool link(const Segment& segment) {
+    if (!(tolerance_mm_ > 0.0) || passed_.empty() || passed_.size() > most_merged) return false;
+    Segment& last = merged_.back();
+    if (segment.kind != SegmentKind::line || segment.feed_mm_per_s != last.feed_mm_per_s) return false;
+    Segment whole = make_line(last.start_mm, segment.end_mm, segment.feed_mm_per_s, segment.line);
+    whole.stop_at_end = segment.stop_at_end;
+    const bool links = whole.length_mm > 0.0 && std::all_of(passed_.begin(), passed_.end(), [&](const Vector3& point) {
+                         return nearest_on(whole, point).distance_mm <= tolerance_mm_;
+                       });
+    if (links) last = whole;
+    return links;
+  }
+
+  double tolerance_mm_;
+  std::vector<Segment> merged_;
+  std::vector<Vector3> passed_;  // ends of the lines that the last one stands for
+};
+
+// What LinuxCNC's detector of naive CAM output leaves of a path: lines within its tolerance are one, and an arc in XY
+// that is no further from its chord is two lines.
+std::vector<Segment> merged_lines(const Path& path, double tolerance_mm) {
+  LineMerger merger(tolerance_mm);
+  for (const Segment& segment : path.segments()) {
+    const double sagitta = segment.start_radius_mm * (1.0 - std::cos(0.5 * segment.sweep_rad));
+    if (segment.kind == SegmentKind::arc && segment.normal == 2 && sagitta < tolerance_mm) {
+      const Vector3 middle = point_at(segment, 0.5 * segment.length_mm);
+      merger.add(make_line(segment.start_mm, middle, segment.feed_mm_per_s, segment.line));
+      Segment rest = make_line(middle, segment.end_mm, segment.feed_mm_per_s, segment.line);
+      rest.stop_at_end = segment.stop_at_end;
+      merger.add(rest);
+    } else {
+      merger.add(segment);
+    }
+  }
+  return std::move(merger.segments());
 }
 
 }  // namespace
@@ -466,7 +491,7 @@ std::vector<Segment> merged_lines(const Path& path, double tolerance_mm) {
 std::vector<QueuedSegment> linuxcnc_queue(const Path& path, const MotionLimits& limits, const PlannerRules& rules) {
   std::vector<QueuedSegment> queue;
   queue.reserve(path.size());
-  for (const Segment& segment : merged_lines(path, rules.blend_tolerance_mm)) {
+  for (const Segment& segment : merged_lines(path, rules.naive_cam_tolerance_mm)) {
     QueuedSegment next = queued_of(segment, limits, rules.period_s);
     if (!queue.empty()) join(queue, next, limits, rules);
     queue.push_back(std::move(next));

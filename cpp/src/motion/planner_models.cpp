@@ -269,6 +269,7 @@ void check(const PlannerRules& rules) {
   require_within(rules.junction_deviation_mm, 1e-6, 10.0, "junction deviation", "mm");
   require_within(rules.period_s, 1e-5, 0.1, "servo period", "s");
   require_within(rules.blend_tolerance_mm, 0.0, 100.0, "blend tolerance", "mm");
+  require_within(rules.naive_cam_tolerance_mm, 0.0, 100.0, "tolerance of naive CAM output", "mm");
   require_within(rules.ramp_frequency_hz, 1e-3, 1e6, "ramp frequency", "Hz");
   require_within(rules.kink_ratio, 1e-3, 1.0, "kink ratio", "");
   require_within(rules.max_feed_override, 0.01, 100.0, "largest feed override", "");

@@ -17,9 +17,14 @@ class LinuxcncPlanner(TomlTable):
     """What the INI file and the program say of the motion; its period is interpolation_period_s."""
 
     blend_tolerance_mm: Annotated[NonNegative, Field(le=100)] = key(
-        "G64 P of the program (shaped ones have P0.001): how far a blend may leave a corner, and the lines of one feed "
-        "that become one; 0: G64 without P",
+        "G64 P of the program (those written here have P0.001): how far a blend may leave a corner; 0: G64 without P",
         default=0.001,
+        assumed=True,
+    )
+    naive_cam_tolerance_mm: Annotated[NonNegative, Field(le=100)] = key(
+        "G64 Q of the program (those written here have Q0), without it as P: lines of one feed within it become one, "
+        "and an arc in XY within it two lines; 0: not",
+        default=0.0,
         assumed=True,
     )
     ramp_frequency_hz: Annotated[Positive, Field(ge=0.001, le=1e6)] = key(
