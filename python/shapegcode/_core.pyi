@@ -1070,6 +1070,14 @@ class PlannerRules:
     def minimum_cruise_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def naive_cam_tolerance_mm(self) -> float:
+        """
+        linuxcnc: G64 Q: lines of one feed within it are one, an arc in XY within it is two lines.
+        """
+    @naive_cam_tolerance_mm.setter
+    def naive_cam_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def optimization_depth(self) -> int:
         """
         linuxcnc: segments that it looks ahead.
