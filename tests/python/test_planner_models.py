@@ -140,15 +140,15 @@ LINUXCNC = Path(__file__).parents[1] / "golden" / "linuxcnc"
 #: after the other.
 RUNS = {
     "paper-original-5000-delivered": (0.01, 0.0),
-    "paper-shaped-5000-two-lines": (1.0, 0.0),
-    "paper-shaped-10000-delivered": (1.0, 0.0),
-    "paper-shaped-10000-two-lines": (1.0, 0.0),
+    "paper-shaped-5000-two-lines": (0.01, 0.0),
+    "paper-shaped-10000-delivered": (0.01, 0.0),
+    "paper-shaped-10000-two-lines": (0.01, 0.0),
     "corners-original-5000-delivered": (0.2, 0.0),
     "corners-original-10000-delivered": (80.0, 1.0),
     "short-original-5000-delivered": (2.0, 0.0),
     "short-original-10000-delivered": (15.0, 0.0),
     "short-original-10000-two-lines": (15.0, 0.0),
-    "short-shaped-10000-two-lines": (1.0, 0.0),
+    "short-shaped-10000-two-lines": (0.01, 0.0),
     "arcs-original-10000-delivered": (150.0, 2.0),
     "arcs-original-5000-two-lines": (150.0, 2.0),
 }
