@@ -13,6 +13,7 @@ PYBIND11_MODULE(_core, module) {
   register_filter(module);
   register_path(module);
   register_motion(module);
+  register_planner_models(module);
   register_controller(module);
   register_gcode(module);
   register_plant(module);

@@ -15,6 +15,7 @@ void register_filter(pybind11::module_& module);
 void register_path(pybind11::module_& module);
 void register_gcode(pybind11::module_& module);
 void register_motion(pybind11::module_& module);
+void register_planner_models(pybind11::module_& module);
 void register_controller(pybind11::module_& module);
 void register_shaped_command(pybind11::module_& module);
 void register_emission(pybind11::module_& module);

@@ -95,6 +95,8 @@ void define_model(py::module_& module) {
   py::class_<FanucModel>(module, "FanucModel",
                          "What decides how long a program takes, and what acceleration does to the path.")
       .def(py::init<>())
+      .def_readwrite("planner", &FanucModel::planner,
+                     "Another kind than fanuc: look-ahead by its rules, shaped blocks too.")
       .def_readwrite("period_s", &FanucModel::period_s, "Interpolation period, s.")
       .def_readwrite("block_end", &FanucModel::block_end, "When a block's successor starts.")
       .def_readwrite("motion", &FanucModel::motion, "Where a cutting move is accelerated.")

@@ -55,6 +55,9 @@ void register_emission(py::module_& module) {
           },
           py::arg("clockwise"), py::arg("normal"), py::arg("radius_mm"),
           "The last block must be an arc, so that the modal motion code behind it is G02 or G03.")
+      .def_readwrite(
+          "smooth_arcs_mm", &FitOptions::smooth_arcs_mm,
+          "How far the middle of an arc may be moved so that it meets its neighbours at a smaller angle, mm.")
       .def_readwrite("arc_min_chord_mm", &FitOptions::arc_min_chord_mm, "Shorter pieces are lines, mm.");
 
   py::class_<FittedBlocks, std::shared_ptr<FittedBlocks>>(module, "FittedBlocks", "Blocks ready to be written.")

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedOf', 'FeedRate', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'JogResult', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OffsetLimits', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'SegmentRules', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerKind', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedOf', 'FeedRate', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'JogResult', 'LimitedFeed', 'LinearPlant', 'LinuxcncSlowing', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OffsetLimits', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlannerRules', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'SegmentRules', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'controlled_motion', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'linuxcnc_slowing', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -937,6 +937,224 @@ class Interpolator:
     def sample_count(self) -> int:
         """
         Set-points from start to end.
+        """
+class ControllerKind:
+    """
+    Whose rules plan a program.
+    
+    Members:
+    
+      fanuc
+    
+      linuxcnc
+    
+      klipper
+    
+      grbl
+    """
+    __members__: typing.ClassVar[dict[str, ControllerKind]]
+    fanuc: typing.ClassVar[ControllerKind]
+    grbl: typing.ClassVar[ControllerKind]
+    klipper: typing.ClassVar[ControllerKind]
+    linuxcnc: typing.ClassVar[ControllerKind]
+    @typing.overload
+    def __eq__(self, other: ControllerKind) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: ControllerKind) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class PlannerRules:
+    """
+    Settings of the open planners.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def arc_resolution_mm(self) -> float:
+        """
+        klipper: length of the chords of an arc.
+        """
+    @arc_resolution_mm.setter
+    def arc_resolution_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def arc_tolerance_mm(self) -> float:
+        """
+        grbl: chords of an arc lie within it ($12).
+        """
+    @arc_tolerance_mm.setter
+    def arc_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def blend_tolerance_mm(self) -> float:
+        """
+        linuxcnc: G64 P; 0: not limited.
+        """
+    @blend_tolerance_mm.setter
+    def blend_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def junction_deviation_mm(self) -> float:
+        """
+        grbl: a corner is passed as an arc that cuts it by so much ($11).
+        """
+    @junction_deviation_mm.setter
+    def junction_deviation_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def kind(self) -> ControllerKind:
+        """
+        Whose rules.
+        """
+    @kind.setter
+    def kind(self, arg0: ControllerKind) -> None:
+        ...
+    @property
+    def kink_ratio(self) -> float:
+        """
+        linuxcnc: share of the acceleration for a kink.
+        """
+    @kink_ratio.setter
+    def kink_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def look_ahead_blocks(self) -> int:
+        """
+        grbl: blocks of its planner's buffer.
+        """
+    @look_ahead_blocks.setter
+    def look_ahead_blocks(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_feed_override(self) -> float:
+        """
+        linuxcnc: it plans for that.
+        """
+    @max_feed_override.setter
+    def max_feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def minimum_cruise_ratio(self) -> float:
+        """
+        klipper: max_accel_to_decel is max_accel times what it leaves of 1.
+        """
+    @minimum_cruise_ratio.setter
+    def minimum_cruise_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def naive_cam_tolerance_mm(self) -> float:
+        """
+        linuxcnc: G64 Q: lines of one feed within it are one, an arc in XY within it is two lines.
+        """
+    @naive_cam_tolerance_mm.setter
+    def naive_cam_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def optimization_depth(self) -> int:
+        """
+        linuxcnc: segments that it looks ahead.
+        """
+    @optimization_depth.setter
+    def optimization_depth(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def period_s(self) -> float:
+        """
+        linuxcnc: of the servo thread, in which it plans.
+        """
+    @period_s.setter
+    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def ramp_frequency_hz(self) -> float:
+        """
+        linuxcnc: shorter segments are ramps.
+        """
+    @ramp_frequency_hz.setter
+    def ramp_frequency_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rapid_follows(self) -> bool:
+        """
+        linuxcnc: else the last segment has half of the acceleration.
+        """
+    @rapid_follows.setter
+    def rapid_follows(self, arg0: bool) -> None:
+        ...
+    @property
+    def square_corner_velocity_mm_per_s(self) -> float:
+        """
+        klipper: speed at a corner of 90 degrees.
+        """
+    @square_corner_velocity_mm_per_s.setter
+    def square_corner_velocity_mm_per_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class LinuxcncSlowing:
+    """
+    What LinuxCNC's rules for short segments do to a path.
+    """
+    @property
+    def angle_rad(self) -> float:
+        """
+        There.
+        """
+    @property
+    def kinks(self) -> int:
+        """
+        Junctions above the kink ratio.
+        """
+    @property
+    def largest_ratio(self) -> float:
+        """
+        Of the acceleration, that a junction asks for.
+        """
+    @property
+    def line(self) -> int:
+        """
+        There.
+        """
+    @property
+    def ramps(self) -> int:
+        """
+        Segments whose speed is a ramp.
+        """
+    @property
+    def segments(self) -> int:
+        """
+        How many there are.
+        """
+    @property
+    def speed_mm_per_s(self) -> float:
+        """
+        There.
         """
 class PushResult:
     """
@@ -3875,6 +4093,14 @@ class FitOptions:
     @most_periods.setter
     def most_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+    @property
+    def smooth_arcs_mm(self) -> float:
+        """
+        How far the middle of an arc may be moved so that it meets its neighbours at a smaller angle, mm.
+        """
+    @smooth_arcs_mm.setter
+    def smooth_arcs_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class FittedBlocks:
     """
     Blocks ready to be written.
@@ -5244,6 +5470,14 @@ class FanucModel:
         """
     @period_s.setter
     def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def planner(self) -> PlannerRules:
+        """
+        Another kind than fanuc: look-ahead by its rules, shaped blocks too.
+        """
+    @planner.setter
+    def planner(self, arg0: PlannerRules) -> None:
         ...
     @property
     def position_gain_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -6813,6 +7047,10 @@ def contour_kernel(shaper: Fir, modes: collections.abc.Sequence[Mode], period_s:
     """
     Kernel from a command before shaping to what shall follow the path; `shaper`: taps in samples of `period_s`.
     """
+def controlled_motion(path: Path, limits: MotionLimits, rules: PlannerRules) -> tuple[Path, SpeedProfile]:
+    """
+    The path that a control follows, and its speed along it from rest to rest: (Path, SpeedProfile). Raises ArgumentError on a segment without feed, or a setting that the planner does not take.
+    """
 def convolve(first: Shaper, second: Shaper) -> Shaper:
     """
     The two shapers in series: cancels what either cancels, lasts as long as both together.
@@ -7100,6 +7338,10 @@ def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[nump
     
     Raises:
         ArgumentError: The drive is not linear.
+    """
+def linuxcnc_slowing(path: Path, limits: MotionLimits, rules: PlannerRules, corner_rad: typing.SupportsFloat | typing.SupportsIndex) -> LinuxcncSlowing:
+    """
+    What LinuxCNC's two rules for short segments do to a path at its feeds; larger turns are corners.
     """
 def list_programs(text: bytes) -> list[ProgramEntry]:
     """

@@ -25,7 +25,7 @@ class Planner:
     def __init__(self, limits: dict[str, float]) -> None:
         self.max_velocity = limits["velocity"]
         self.max_accel = limits["acceleration"]
-        self.max_accel_to_decel = 0.5 * self.max_accel
+        self.max_accel_to_decel = (1.0 - limits.get("minimum_cruise_ratio", 0.5)) * self.max_accel
         corner = limits["square_corner_velocity"]
         self.junction_deviation = corner**2 * (math.sqrt(2.0) - 1.0) / self.max_accel
         self.extruder = SimpleNamespace(calc_junction=lambda _before, move: move.max_cruise_v2)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <set>
 #include <vector>
@@ -438,4 +439,48 @@ TEST_CASE("block fit: refuses sizes that do not match and positions out of range
   CHECK_THROWS_AS((void)fit(command), Error);
   command.grid(3, 1) = -99999.9;
   CHECK_NOTHROW((void)fit(command));
+}
+
+TEST_CASE("block fit: arcs meet at smaller angles where that is asked for") {
+  // A path whose direction swings by 0.1 rad over 7 mm: arcs through ends and middles of blocks of 1 mm are off its
+  // tangents, now more and now less.
+  const Command command = sampled(60, [&](double k) {
+    Vector3 at = Vector3::Zero();
+    const int steps = 400;
+    for (int i = 0; i < steps; ++i) {
+      const double s = k * (i + 0.5) / steps;
+      const double direction = 0.1 * std::sin(0.9 * s);
+      at += Vector3(std::cos(direction), std::sin(direction), 0.0) * k / steps;
+    }
+    return at;
+  });
+  const std::vector<std::int8_t> normals(60, std::int8_t{2});
+  const auto largest_angle = [&](double smooth_mm) {
+    FitOptions options;
+    options.increment_mm = 1e-5;
+    options.feed_unit_mm_per_s = 1e-3 / 60.0;
+    options.smooth_arcs_mm = smooth_mm;
+    const auto blocks = shapegcode::fit_blocks(command.grid, command.middle, normals, {}, options);
+    double largest = 0.0;
+    double before = 0.0;
+    Position start{};
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      const double dx = static_cast<double>(blocks[i].end[0] - start[0]) * 1e-5;
+      const double dy = static_cast<double>(blocks[i].end[1] - start[1]) * 1e-5;
+      const bool is_arc = blocks[i].kind != FittedKind::line;
+      const double half =
+          is_arc ? std::asin(0.5 * std::hypot(dx, dy) / (static_cast<double>(blocks[i].radius) * 1e-5)) : 0.0;
+      const double side = blocks[i].kind == FittedKind::clockwise ? -1.0 : 1.0;
+      const double chord = std::atan2(dy, dx);
+      if (i > 2 && i + 1 < blocks.size()) {
+        largest = std::max(largest, std::abs(std::remainder(chord - side * half - before, 2.0 * std::numbers::pi)));
+      }
+      before = chord + side * half;
+      start = blocks[i].end;
+    }
+    return largest;
+  };
+  CHECK(largest_angle(0.0) > 5e-4);
+  CHECK(largest_angle(1e-3) < 0.5 * largest_angle(0.0));
+  CHECK(largest_angle(2e-4) < 0.8 * largest_angle(0.0));
 }

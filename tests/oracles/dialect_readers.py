@@ -125,7 +125,7 @@ def read_siemens(text: str, _folder: Path) -> list[ReadMove]:
     return found
 
 
-def _in_klipper(script: str, asked: str) -> str:
+def in_klipper(script: str, asked: str) -> str:
     """What a script answers in Klipper's environment."""
     fetch = [ROOT / "tests" / "tools" / "fetch_peers.sh"]
     python = subprocess.run(fetch, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()[-1]
@@ -141,12 +141,12 @@ def plan_klipper(moves: list[ReadMove], acceleration: float, folder: Path) -> tu
         "path": {"start": list(moves[0].start), "pieces": pieces}, "limits": limits, "period_s": 0.001,
         "file": str(folder / "points.npy"),
     }  # fmt: skip
-    time_s = float(_in_klipper("klipper_plan.py", json.dumps(asked)))
+    time_s = float(in_klipper("klipper_plan.py", json.dumps(asked)))
     return np.load(folder / "points.npy"), time_s
 
 
 def read_klipper(text: str, _folder: Path) -> list[ReadMove]:
-    answer = json.loads(_in_klipper("klipper_moves.py", text))
+    answer = json.loads(in_klipper("klipper_moves.py", text))
     assert answer["unknown"] == []
     at, found = np.zeros(3), []
     for move in answer["moves"]:

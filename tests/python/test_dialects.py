@@ -326,7 +326,7 @@ GOLDEN = {
     "siemens": "G710 G90/G0 X1.Y-0.5Z5./G4 F0.6/G4 F1.5/G1 X2. F500./G9 X3./G2 X5.Y-2.5CR=2./G64/"
     "G3 X3.Y-0.5I-2.J0.F50./M30",
     # G4 P in seconds, G61.1 for stops: linuxcnc.org/docs, gcode/g-code.html
-    "linuxcnc": "G21G90/G00X1.Y-.5Z5./G04P0.6/G04P1.5/G01X2.F500./G61.1/X3./G64P0.001/G02X5.Y-2.5R2./G64P0.001/"
+    "linuxcnc": "G21G90/G00X1.Y-.5Z5./G04P0.6/G04P1.5/G01X2.F500./G61.1/X3./G64P0.001Q0/G02X5.Y-2.5R2./G64P0.001Q0/"
     "G03X3.Y-.5I-2.J0.F50./M30",
     # G04 X in seconds, alone: 206132747; G60: 206301707; G71, no G64: 5251491951026763659 of TF5200's manual
     "isg": "G71G90/G00X1.Y-.5Z5./G04 X0.6/G04 X1.5/G01X2.F500./G60X3./G02X5.Y-2.5R2./G359/G03X3.Y-.5I-2.J0.F50./M30",
@@ -369,7 +369,7 @@ def test_numbers_without_a_point(dialect: str) -> None:
 @pytest.mark.parametrize("dialect", WITH_INCHES)
 def test_inch(dialect: str, tmp_path: Path) -> None:
     conversion = converted(dialect, TEXT.replace("G21", "G20").replace("F6000.", "F200.").replace("F3000.", "F120."))
-    assert {"siemens": b"G700", "linuxcnc": b"G64P0.00004"}.get(dialect, b"G20") in conversion.text
+    assert {"siemens": b"G700", "linuxcnc": b"G64P0.00004Q0"}.get(dialect, b"G20") in conversion.text
     compare(dialect, conversion, READERS[dialect](conversion.text.decode(), tmp_path))
 
 
@@ -528,7 +528,7 @@ def test_what_stands_behind_the_end_is_left_out() -> None:
 def test_exact_stop_in_exact_stop_mode() -> None:
     text = "G21G90\nG00X0.\nG61\nG01X5.F500.\nG09X6.\nG64\nX7.\nM30\n"
     assert translated("linuxcnc", text)[2:] == [
-        "G61.1", "G01X5.F500.", "G61.1", "X6.", "G61.1", "G64P0.001", "X7.", "M30",
+        "G61.1", "G01X5.F500.", "G61.1", "X6.", "G61.1", "G64P0.001Q0", "X7.", "M30",
     ]  # fmt: skip
 
 

@@ -53,6 +53,7 @@ HEADER_FOLDERS = {
     "columns.hpp": "path",
     "error.hpp": "base",
     "fanuc_model.hpp": "motion",
+    "planner_models.hpp": "motion",
     "minimal_shapers.hpp": "shaper",
     "mode.hpp": "base",
     "samples.hpp": "base",

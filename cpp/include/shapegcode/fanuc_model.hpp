@@ -13,6 +13,7 @@
 #include "shapegcode/filter.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/path.hpp"
+#include "shapegcode/planner_models.hpp"
 #include "shapegcode/samples.hpp"
 
 namespace shapegcode {
@@ -145,9 +146,10 @@ struct SpindleTime {
   double seconds = 0.0;
 };
 
-/// Everything that decides how long a program takes on a FANUC control, and what its acceleration does to the path.
-/// Plain values; the numbers in the comments are FANUC parameters.
+/// Everything that decides how long a program takes on a control, and what its acceleration does to the path: FANUC's,
+/// or another one whose planner is modelled. Plain values; the numbers in the comments are FANUC parameters.
 struct FanucModel {
+  PlannerRules planner;     ///< another kind than `fanuc`: look-ahead by its rules, shaped blocks too
   double period_s = 0.001;  ///< interpolation period T_I
   BlockEnd block_end = BlockEnd::ceil;
 
@@ -190,8 +192,14 @@ struct FanucModel {
   Vector3 unknown_move_s = Vector3::Zero();  ///< of a rapid whose start or end the program does not give
 };
 
-/// The same controller while shaped blocks run: block by block at their feed, without look-ahead.
+/// The same controller while shaped blocks run: block by block at their feed, without look-ahead; itself where that
+/// cannot be switched off (another planner than FANUC's).
 [[nodiscard]] FanucModel for_shaped_blocks(const FanucModel& model);
+
+/// Whether cutting moves are planned along the path before they are interpolated.
+[[nodiscard]] inline bool is_planned(const FanucModel& model) noexcept {
+  return model.motion == MotionKind::look_ahead || model.planner.kind != ControllerKind::fanuc;
+}
 
 /// Throws Error(argument) on a value that no controller can have; the message names it.
 void check(const FanucModel& model);

@@ -33,6 +33,7 @@
 #include "shapegcode/motion.hpp"
 #include "shapegcode/path.hpp"
 #include "shapegcode/planner.hpp"
+#include "shapegcode/planner_models.hpp"
 #include "shapegcode/plant/feed_drive.hpp"
 #include "shapegcode/plant/linear_plant.hpp"
 #include "shapegcode/plant/modal.hpp"

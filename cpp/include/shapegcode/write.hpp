@@ -46,6 +46,9 @@ struct FitOptions {
   /// Likewise blocks so far from both ends of a steady section: what they excite dies away before it. 0: none.
   std::uint32_t equal_periods = 0;
   double arc_min_chord_mm = 0.02;  ///< shorter pieces are lines
+  /// How far the middle of an arc may be moved so that it meets its neighbours at a smaller angle, for a control that
+  /// slows where the direction jumps; 0: not at all.
+  double smooth_arcs_mm = 0.0;
   /// What the last block must be, so that the modal motion code behind it is the original's: a control refuses G02 or
   /// G03 alone. An arc that takes the place of a line there has `last_radius_mm` in the plane across `last_normal`.
   FittedKind last_kind = FittedKind::line;

@@ -41,6 +41,7 @@ void require_ascending(const char* name, const std::vector<SpindleTime>& table) 
 
 FanucModel for_shaped_blocks(const FanucModel& model) {
   FanucModel shaped = model;
+  if (model.planner.kind != ControllerKind::fanuc) return shaped;
   shaped.motion = MotionKind::after_interpolation;
   shaped.filter_shape = model.shaped_filter_shape;
   shaped.time_constant_s = model.shaped_time_constant_s;
@@ -50,6 +51,7 @@ FanucModel for_shaped_blocks(const FanucModel& model) {
 }
 
 void check(const FanucModel& model) {
+  check(model.planner);
   require(model.period_s >= 1e-5 && model.period_s <= 1.0, "interpolation period", model.period_s, "s", "1e-5 to 1 s");
   require_ramp("acceleration time constant", model.time_constant_s);
   require_ramp("bell time", model.bell_time_s);
@@ -85,6 +87,11 @@ void check(const FanucModel& model) {
 
 std::vector<Fir> acceleration_filters(const FanucModel& model) {
   std::vector<Fir> filters;
+  if (model.planner.kind == ControllerKind::linuxcnc) {
+    // Joints are interpolated by cubics that pass near the set-points of the planner, not through them.
+    filters.push_back(Fir({0, 1, 2}, {1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0}));
+  }
+  if (model.planner.kind != ControllerKind::fanuc) return filters;
   if (model.motion == MotionKind::look_ahead) {
     add_average(filters, model.look_ahead_filter_time_constant_s, model.period_s);
   } else if (model.filter_shape == FilterShape::linear) {

@@ -137,8 +137,8 @@ class Clock {
   TimeParts cutting_run(const Path& path, bool exact_stop, bool shaped) {
     time_.cutting_length_mm += path.length_mm();
     const RunModel& run_model = shaped ? shaped_ : ordinary_;
-    return run_model.model.motion == MotionKind::look_ahead ? planned_run(path, exact_stop, run_model)
-                                                            : overlapped_run(path, exact_stop, run_model);
+    return is_planned(run_model.model) ? planned_run(path, exact_stop, run_model)
+                                       : overlapped_run(path, exact_stop, run_model);
   }
 
   // Paper 004: a block's successor starts ceil(l / (F T_I)) T_I behind it, and the filters end the run.
@@ -182,15 +182,16 @@ class Clock {
         parts.cutting_s += segment.length_mm / detail::checked_feed(segment, run_model.model);
       }
     }
-    const SpeedProfile profile = plan_speed(path, limits_);
+    const ControlledMotion motion = controlled_motion(std::make_shared<const Path>(path), limits_, model_.planner);
+    const SpeedProfile& profile = *motion.profile;
     const detail::PlannedEnd end = detail::planned_end(profile, run_model.filters, run_model.model);
     parts.cutting_s = std::min(parts.cutting_s, end.duration_s);  // rounding only
     parts.acceleration_s = end.duration_s - parts.cutting_s;
     if (exact_stop) {
-      parts.in_position_s = detail::wait_behind_profile(path, profile, end, run_model.model);
+      parts.in_position_s = detail::wait_behind_profile(*motion.path, profile, end, run_model.model);
     }
     if (per_block_) {
-      detail::append_rows(path, profile, now_s(), time_.blocks);
+      detail::append_rows(*motion.path, profile, now_s(), time_.blocks);
       BlockTime& last = time_.blocks.back();
       last.duration_s = now_s() + parts.total_s() - last.start_s;
     }

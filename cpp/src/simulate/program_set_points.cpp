@@ -211,10 +211,11 @@ void ProgramSetPoints::open_cut(const std::shared_ptr<const Path>& programmed, b
   cut.exact_stop = exact_stop;
   cut.is_region = is_region;
   cut.filters = shaped ? &shaped_filters_ : &filters_;
-  if (model.motion == MotionKind::look_ahead) {
-    auto profile = std::make_shared<const SpeedProfile>(plan_speed(*programmed, overridden_limits(model)));
-    cut.smoothed = profile->jerk_time_s() > 1.5 * model.period_s || !cut.filters->empty();
-    cut.motion.emplace<Interpolator>(programmed, std::move(profile), model.period_s);
+  if (is_planned(model)) {
+    ControlledMotion planned = controlled_motion(programmed, overridden_limits(model), model.planner);
+    cut.path = planned.path;
+    cut.smoothed = planned.profile->jerk_time_s() > 1.5 * model.period_s || !cut.filters->empty();
+    cut.motion.emplace<Interpolator>(planned.path, std::move(planned.profile), model.period_s);
   } else {
     const Segments segments = programmed->segments();
     cut.blocks.assign(segments.begin(), segments.end());

@@ -11,6 +11,7 @@
 #include "write/block_rounding.hpp"
 #include "write/block_shape.hpp"
 #include "write/feed_words.hpp"
+#include "write/smooth_arcs.hpp"
 
 namespace shapegcode {
 namespace {
@@ -84,6 +85,9 @@ class Fitter {
       round_for_vibration(blocks, grid_, shape_, k, rests, options_);
     }
     end_with_arc(blocks);
+    if (options_.smooth_arcs_mm > 0.0) {
+      smooth_arcs(blocks, shape_.rounded(0), shape_, options_.smooth_arcs_mm, options_.increment_mm);
+    }
     shorten_feeds(blocks, shape_.rounded(0), shape_);
     return blocks;
   }

@@ -15,6 +15,7 @@ from shapegcode._core import ProgramError
 from shapegcode.checking.result import Check, Finding, FindingCounts, SerialLine, ShortBlocks, ShortRun, StarvedRun
 from shapegcode.checking.runs import BlockTable, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
+from shapegcode.model.linuxcnc_lines import ini_lines
 from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program
 from shapegcode.program.computer import require_memory_for_lines
@@ -123,6 +124,7 @@ def check_text(
             found.append(_at(program, severity, "look_ahead_breaker", stop.line, stop.message))
         found += _feed_findings(program, table)
         found += _low_feed_findings(program, machine)
+        found += _planner_findings(program, machine)
         if not program.core.alarms:
             simulated = SimulatedPrograms(program, machine, labels=("program", ""))
         short = _short_blocks(program, machine, table)
@@ -236,6 +238,12 @@ def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:
             f"{clamped.least_mm_per_min:.0f} mm/min"
         )
         yield _at(program, "warning", "axis_feed", clamped.first_line, message)
+
+
+def _planner_findings(program: Program, machine: Machine) -> Iterator[Finding]:
+    shaped = [region for region in program.regions if region.shaped]
+    for code, line, message in ini_lines([region.path for region in shaped], machine):
+        yield _at(program, "warning", code, line or shaped[0].first_line, message)
 
 
 def _low_feed_findings(program: Program, machine: Machine) -> Iterator[Finding]:

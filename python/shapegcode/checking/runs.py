@@ -199,6 +199,7 @@ def _clamped_feeds(
 def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDArray[Any]:
     """One row per move in slow motion, without any acceleration: length over feed."""
     model = fanuc_model(machine, feed_override=_SLOW_MOTION, shaped=False)
+    model.planner = _core.PlannerRules()
     model.motion = _core.MotionKind.after_interpolation
     model.filter_shape = _core.FilterShape.linear
     model.block_end = _core.BlockEnd.carry

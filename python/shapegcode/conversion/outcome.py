@@ -25,6 +25,7 @@ from shapegcode.conversion.result import ChangeProof, Conversion
 from shapegcode.conversion.sensitivity import Sensitivity, parameter_sensitivity
 from shapegcode.conversion.tables import CutOutcome, outcome_of, tools_of_cuts
 from shapegcode.machine import Machine
+from shapegcode.model.linuxcnc_lines import ini_lines
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
@@ -247,6 +248,7 @@ def _warnings(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> 
         warnings += open_axes(program, machine)
     warnings += simulation_warnings(program, figures, machine, is_priced=bool(plan.aims.priced))
     warnings += text_warnings(program, written.placed, figures, machine, written.size, written.blocks)
+    warnings += [why for _, _, why in ini_lines([place.blocks(shaped.emitted) for place in written.placed], machine)]
     return warnings + (shaped.rapids.warnings if shaped.rapids is not None else [])
 
 

@@ -120,7 +120,7 @@ class _Region:
 
     def before(self, figures: RegionFigures) -> dict[str, LimitCheck]:
         """Its judged figures as it is meant to run, under the controller's own rule of block timing."""
-        own = figures.emitted[0 if self.judge.own_rule == _core.BlockEnd.ceil else 1]
+        own = figures.emitted[self.judge.rules.index(self.judge.own_rule)]
         return {each.figure: each for each in judge_region(case_figures(own), self.limits(figures))}
 
 

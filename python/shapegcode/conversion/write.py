@@ -364,6 +364,8 @@ class RegionWriter:
         fit.minimum_feed = max(1, math.ceil(controller.minimum_feed_mm_per_min / unit * 10**feed_decimals - 1e-9))
         fit.merge_tolerance_increments = emission.merge_tolerance_increments
         fit.arc_min_chord_mm = emission.arc_min_chord_mm
+        if (own := dialect_of(emission.dialect)) is not None:
+            fit.smooth_arcs_mm = own.smooth_arcs_um * 1e-3
         if self._machine.bears_override:
             fit.most_periods = 1
             fit.equal_above_increments = self._machine.tolerance.residual_floor_increments

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, Strict, model_validator
 
 from shapegcode.io.data_file import toml_tables
+from shapegcode.machine.planners import ControllerKind, GrblPlanner, KlipperPlanner, LinuxcncPlanner
 from shapegcode.settings.keys import (
     AxisRatios,
     AxisTimes,
@@ -27,6 +28,19 @@ from shapegcode.settings.keys import (
 class Controller(TomlTable):
     """How the controller turns blocks into set-points, and what it accepts."""
 
+    kind: ControllerKind = key(
+        'whose planner executes programs. "fanuc": as the keys below say. "linuxcnc", "klipper", "grbl": by the rules '
+        "of that control, from the limits of the axes and the table of its name; shaped programs too, since it cannot "
+        "be switched off. motion, law, corner_rule and their keys are then those by which the shaped motion is planned",
+        default="fanuc",
+    )
+    linuxcnc: LinuxcncPlanner | None = key(
+        'settings of kind = "linuxcnc"; left out: the control\'s own defaults', default=None
+    )
+    klipper: KlipperPlanner | None = key(
+        'settings of kind = "klipper"; left out: the control\'s own defaults', default=None
+    )
+    grbl: GrblPlanner | None = key('settings of kind = "grbl"; left out: the control\'s own defaults', default=None)
     interpolation_period_s: Annotated[Positive, Field(le=0.1)] = key(
         "time between two set-points", default=0.001, assumed=True
     )

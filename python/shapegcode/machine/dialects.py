@@ -45,6 +45,7 @@ class Dialect:
         short_codes: codes have no leading zeros.
         decimals: digits of positions in mm in shaped blocks; None: as many as `controller.least_increment_mm` has.
         feed_decimals: likewise of F; None: `controller.feed_decimals_mm`.
+        smooth_arcs_um: how far the middle of an arc may be moved so that blocks meet at smaller angles; 0: not at all.
         least_block_s: shortest block that the control runs; None: not known.
         lock: lines that switch the feed override off, and on again; empty: none are known.
         lock_word: word of every shaped block that does it instead.
@@ -68,6 +69,7 @@ class Dialect:
     short_codes: bool = False
     decimals: int | None = None
     feed_decimals: int | None = None
+    smooth_arcs_um: float = 0.0
     least_block_s: float | None = None
     lock: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
     lock_word: str = ""

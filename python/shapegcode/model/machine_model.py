@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.machine.planners import GrblPlanner, KlipperPlanner, LinuxcncPlanner
 from shapegcode.model.modes import (
     NO_OFFSET,
     Offset,
@@ -33,6 +34,7 @@ def fanuc_model(
     """The controller of a machine as the core times and simulates it."""
     controller = machine.controller
     model = _core.FanucModel()
+    model.planner = planner_rules(machine)
     model.period_s = controller.interpolation_period_s
     model.block_end = getattr(_core.BlockEnd, controller.block_end)
     model.motion = getattr(_core.MotionKind, controller.motion)
@@ -66,7 +68,30 @@ def fanuc_model(
     model.spindle_start_s = times.spindle_start.rows if times.spindle_start else []
     model.spindle_stop_s = times.spindle_stop.rows if times.spindle_stop else []
     model.unknown_move_s = times.unknown_move_s.as_tuple()
+    if controller.kind != "fanuc":
+        # Straight rapids by the acceleration of the axes, and no wait behind them.
+        pairs = [(axis.rapid_mm_per_min / 60.0, axis.max_acceleration_mm_s2) for axis in machine.axes.as_tuple()]
+        model.rapid_time_constant_s = [rate / acceleration for rate, acceleration in pairs]
+        model.rapid_bell_time_s = 0.0
+        model.rapid_path = _core.RapidPath.linear
+        model.in_position = _core.InPosition.measured
+        model.in_position_s = [0.0, 0.0, 0.0]
     return model
+
+
+def planner_rules(machine: Machine) -> _core.PlannerRules:
+    """The planner of a control that is none of FANUC's."""
+    controller, rules = machine.controller, _core.PlannerRules()
+    rules.kind = getattr(_core.ControllerKind, controller.kind)
+    rules.period_s = controller.interpolation_period_s
+    settings = {
+        "linuxcnc": controller.linuxcnc or LinuxcncPlanner(), "klipper": controller.klipper or KlipperPlanner(),
+        "grbl": controller.grbl or GrblPlanner(),
+    }  # fmt: skip
+    if table := settings.get(controller.kind):
+        for name, value in table:
+            setattr(rules, name, value)
+    return rules
 
 
 def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
@@ -103,6 +128,9 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
 def _limit(value: float | None) -> float:
     return math.inf if value is None else value
 
+
+BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
+"""Both rules of block timing."""
 
 PLANTS = ("modal", "feed-drive")
 """The plants that there are: modes behind an ideal servo, or motor, ball screw and table with their servo loops."""
@@ -147,10 +175,11 @@ class SimulatedController:
         self.filters = _core.acceleration_filters(model)
         """Acceleration filters behind the interpolation."""
 
-    def _planned(self, path: _core.Path) -> _core.SpeedProfile | None:
-        """The look-ahead's speed along a path; None where the controller executes block by block."""
-        look_ahead = self.model.motion == _core.MotionKind.look_ahead
-        return _core.plan_speed(path, self.model.limits) if look_ahead else None
+    def _planned(self, path: _core.Path) -> tuple[_core.Path, _core.SpeedProfile] | None:
+        """What the planner makes of a path, and its speed along it; None where the control executes block by block."""
+        model = self.model
+        look_ahead = model.motion == _core.MotionKind.look_ahead or model.planner.kind != _core.ControllerKind.fanuc
+        return _core.controlled_motion(path, model.limits, model.planner) if look_ahead else None
 
     def simulate(
         self,
@@ -162,25 +191,25 @@ class SimulatedController:
     ) -> _core.SimulationFigures:
         """A path simulated from rest to rest and measured against itself or another one."""
         options.axis_filters = self.filters
-        profile = self._planned(path)
-        if profile is not None:
-            given = () if against is None else (against,)
-            return _core.simulate_path(path, profile, options, *given)
+        planned = self._planned(path)
+        if planned is not None:
+            is_own = against is None and planned[0].moves_as(path)
+            return _core.simulate_path(*planned, options, *(() if is_own else (against or path,)))
         return _core.simulate_blocks(path, against or path, block_end or self.model.block_end, self._override, options)
 
     def stream(self, path: _core.Path, options: _core.SimulationOptions, rest_s: float) -> _core.SimulationStream:
         """The same motion piece by piece, and what the plant does for a while behind its end."""
         options.axis_filters = self.filters
-        profile = self._planned(path)
-        if profile is not None:
-            return _core.SimulationStream.of_path(path, profile, options, rest_s)
+        planned = self._planned(path)
+        if planned is not None:
+            return _core.SimulationStream.of_path(*planned, options, rest_s)
         return _core.SimulationStream.of_blocks(path, self.model.block_end, 1.0, options, rest_s)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: FloatArray, window_s: float) -> _core.Travel:
         """How fast a path is travelled."""
-        period_s, profile = self.model.period_s, self._planned(path)
-        if profile is not None:
-            return _core.travel_path(path, profile, along, stations_mm, period_s, self.filters, window_s)
+        period_s, planned = self.model.period_s, self._planned(path)
+        if planned is not None:
+            return _core.travel_path(*planned, along, stations_mm, period_s, self.filters, window_s)
         return _core.travel_blocks(path, along, self.model.block_end, stations_mm, period_s, self.filters, window_s)
 
 
@@ -196,6 +225,10 @@ class MachineModel:
         """Interpolation period."""
         self.own_rule: _core.BlockEnd = getattr(_core.BlockEnd, machine.controller.block_end)
         """The controller's own rule of block timing."""
+        self.always_plans = machine.controller.kind != "fanuc"
+        """Whether the control plans shaped blocks too: its planner cannot be switched off."""
+        self.block_rules = (self.own_rule,) if self.always_plans else BLOCK_ENDS
+        """Rules of block timing under which emitted blocks are simulated; a planner has one of its own."""
         rates = [
             damping * 2.0 * math.pi * frequency
             for axis in machine.axes.as_tuple()
@@ -224,7 +257,7 @@ class MachineModel:
 
     @cached_property
     def shaped(self) -> SimulatedController:
-        """The controller as it simulates shaped blocks: one by one, without look-ahead."""
+        """The controller as it simulates shaped blocks: one by one, without look-ahead, if that can be switched off."""
         model = _core.for_shaped_blocks(fanuc_model(self.machine))
         model.block_end = self.own_rule
         return SimulatedController(model)
@@ -258,7 +291,7 @@ class MachineModel:
         """
         machine = self.machine
         plain = machine.verdict.plant == "modal" and not self.shaped.filters and moving_axis(machine) is None
-        return plain and machine.input.material_side is None
+        return plain and not self.always_plans and machine.input.material_side is None
 
     def limits(self, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
         """Look-ahead limits, a copy of one's own."""
@@ -325,10 +358,10 @@ class MachineModel:
         """A cut as the controller executes an ordinary program."""
         options = self.verdict_options(shift=shift, only=only, offset=offset)
         options.record_samples = record_samples
-        controller = self.ordinary
-        if override != 1.0:
-            controller = SimulatedController(fanuc_model(self.machine), override)
-        return controller.simulate(path, options, against=against)
+        return self._at_override(override).simulate(path, options, against=against)
+
+    def _at_override(self, override: float) -> SimulatedController:
+        return self.ordinary if override == 1.0 else SimulatedController(fanuc_model(self.machine), override)
 
     def simulate_rapid(
         self, start_mm: FloatArray, end_mm: FloatArray, options: _core.SimulationOptions
@@ -370,9 +403,11 @@ class MachineModel:
         if increment_mm is not None:
             options.feed_window_s = max(self.machine.controller.block_time_s, self.period_s)
             options.feed_slack_mm = 2.0 * increment_mm
+        options.record_samples = record_samples
+        if self.always_plans:
+            return self._at_override(override).simulate(blocks, options, against=path)
         options.last_seconds = last_seconds
         options.other_overrides = list(other_overrides)
-        options.record_samples = record_samples
         if starved_blocks:
             options.starved_blocks = list(starved_blocks)
             options.starved_s = self.machine.verdict.starved_s

@@ -40,8 +40,13 @@ class SimulatedPrograms:
         """Published methods of the controller and the plant that simulate them; see `Result.methods`."""
         control, drives = self.machine.controller, [axis.drive for axis in self.machine.axes.as_tuple()]
         used = {
-            "block overlap": control.motion == "after_interpolation",
-            "junction deviation": control.motion == "look_ahead" and control.corner_rule == "junction_deviation",
+            "block overlap": control.kind == "fanuc" and control.motion == "after_interpolation",
+            "junction deviation": control.kind == "grbl"
+            or (
+                control.kind == "fanuc"
+                and control.motion == "look_ahead"
+                and control.corner_rule == "junction_deviation"
+            ),
             "LuGre friction": self.plant != "modal"
             and any(drive is not None and drive.friction_model == "lugre" for drive in drives),
         }

@@ -69,7 +69,7 @@ class Answers(TomlTable):
     """What a shop says of its machine."""
 
     name: Text = key("What do you call the machine?", default="unnamed")
-    control: Literal["fanuc", "other"] | None = key("Which control does it have?", default=None)
+    control: Literal["fanuc", "linuxcnc", "other"] | None = key("Which control does it have?", default=None)
     dump: Text | None = key("Is there a parameter file of the control?", default=None)
     rapid_mm_per_min: PositiveAxisValues | None = key("How fast are the rapids (G00)?", default=None)
     max_feed_mm_per_min: PositiveAxisValues | None = key("What is the largest cutting feed?", default=None)
@@ -101,6 +101,8 @@ class Answers(TomlTable):
 
     @model_validator(mode="after")
     def _baud_of_a_line(self) -> Answers:
+        if self.control == "linuxcnc" and self.look_ahead not in (None, "none"):
+            raise KeyProblem("look_ahead", self.look_ahead, 'is a code of FANUC controls, and control is "linuxcnc"')
         if self.dnc_baud is not None and self.delivery != "dnc":
             raise ValueError('dnc_baud is given, and delivery is not "dnc": take one of both out')
         return self
@@ -192,13 +194,12 @@ def _of_modes(modes: ModesAnswer) -> str:
 
 EXPLAINED: Mapping[str, Callable[[Any], str]] = {
     "name": lambda _: "It stands in the header of every program that is written.",
-    "control": lambda answer: (
-        "A parameter file of it can be read; look-ahead is switched by G05.1 or G08."
-        if answer == "fanuc"
-        else "Programs are written as FANUC controls read them: try one above the part first."
-    ),
+    "control": lambda answer: {
+        "fanuc": "A parameter file of it can be read; look-ahead is switched by G05.1 or G08.",
+        "linuxcnc": "Its INI file can be read; programs are written in its words, and judged by its own planner.",
+    }.get(answer, "Programs are written as FANUC controls read them: try one above the part first."),
     "dump": lambda answer: (
-        "Limits, time constants and increments come from it; it holds no vibration."
+        "Limits and what else it says of the motion come from it; it holds no vibration."
         if answer
         else "Limits and time constants are then what you say, or assumed and marked so."
     ),

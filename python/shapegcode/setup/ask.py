@@ -19,6 +19,7 @@ _TITLES = {
     _UNKNOWN: "not known yet",
     _BACK: "(back to the question before)",
     "fanuc": "FANUC (0i, 16i, 18i, 21i, 30i, 31i, 32i)",
+    "linuxcnc": "LinuxCNC",
     "other": "another one that reads programs as FANUC does",
     "memory": "it is loaded into the memory",
     "dnc": "a line feeds it while it runs (DNC)",
@@ -30,7 +31,10 @@ _TITLES = {
 _UNITS = {"m/min": ("mm/min", 1000.0), "m/s²": ("mm/s²", 1000.0), "MB": ("kB", 1024.0), "mm": ("µm", 1000.0)}
 """What people say for a unit, and how much of it that is."""
 _OF_AXES = ("rapid_mm_per_min", "max_feed_mm_per_min", "max_acceleration_mm_s2")
-_FILES = {"dump": "parameter file, such as CNC-PARA.TXT", "file": "record of a tap test: CSV, UFF or WAV"}
+_FILES = {
+    "dump": "parameter file, such as CNC-PARA.TXT, or LinuxCNC's INI file",
+    "file": "record of a tap test: CSV, UFF or WAV",
+}
 _TYPED_MODES = {
     "file": ("Which file?", _FILES["file"]),
     "known": ("Which frequency and damping ratio?", "Hz and ratio, such as 46:0.02"),
@@ -82,9 +86,11 @@ def _left_out(given: Mapping[str, Any]) -> Iterator[str]:
     """Questions that the answers so far make needless."""
     if given.get("control") == "other":
         yield "dump"
+    if given.get("control") == "linuxcnc":
+        yield from ("look_ahead", "least_increment_mm", "delivery")
     if given.get("dump"):
         yield from ("max_feed_mm_per_min", "max_acceleration_mm_s2", "least_increment_mm")
-        if not dump_lacks_rapids(given["dump"]):
+        if given.get("control") == "linuxcnc" or not dump_lacks_rapids(given["dump"]):
             yield "rapid_mm_per_min"
     if given.get("delivery") != "dnc":
         yield "dnc_baud"
@@ -166,7 +172,7 @@ def _problem(name: str, typed: str, given: Mapping[str, Any]) -> bool | str:
         of_axes = ", or three with commas between (X, Y, Z)" if name in _OF_AXES else ""
         return f"{typed}: must be a number in {_unit(name)}{of_axes}"
     if name == "dump":
-        return _of_file(str(value), dump_problem)
+        return _of_file(str(value), lambda file: dump_problem(file, given.get("control")))
     try:
         read_answers(_alone(name, {**given, name: value}))
     except FileError as error:

@@ -12,6 +12,7 @@ from shapegcode.identification.identify import identify
 from shapegcode.identification.update import update_modes
 from shapegcode.machine import Machine
 from shapegcode.machine.fanuc_import import import_parameters
+from shapegcode.machine.linuxcnc_ini import read_ini
 from shapegcode.machine.result import ParameterImport
 from shapegcode.setup.answers import EXPLAINED, Answers, is_mode, mode_of
 from shapegcode.setup.result import MachineSetup, OpenQuestion
@@ -74,6 +75,9 @@ def set_up(answers: Answers) -> MachineSetup:
 def _started(answers: Answers) -> tuple[Machine, list[str]]:
     """The machine of the dump, or one that has what every machine file must have."""
     rigid = "".join(axis for axis, answer in answers.modes.model_dump().items() if answer == "rigid")
+    if answers.dump is not None and answers.control == "linuxcnc":
+        ini = read_ini(answers.dump, name=answers.name)
+        return ini.machine, [f"{ini.count} values read from {answers.dump}", *ini.notes]
     if answers.dump is not None:
         found = _imported(answers, rigid)
         if not found.ok:
@@ -105,10 +109,10 @@ def _read_keys(found: ParameterImport) -> set[str]:
     return {each.key for each in found.read}
 
 
-def dump_problem(file: str) -> str:
+def dump_problem(file: str, control: str | None = None) -> str:
     """What is wrong with a parameter file, before the other questions are asked."""
     try:
-        _started(Answers.model_validate({"dump": file}))
+        _started(Answers.model_validate({"dump": file, "control": control}))
     except (FileError, ArgumentError, OSError) as error:
         return str(error)
     return ""
@@ -153,8 +157,13 @@ def _plain(answers: Answers) -> Machine:
         }
         for name, (answer, _, why) in limits.items():
             remarks[f"axes.{axis}.{name}"] = f"assumed: {why}" if answer is None else _ANSWERED
-    control = {"fanuc": "FANUC control", "other": "control that reads FANUC's G-code", None: "control not known yet"}
+    control = {
+        "fanuc": "FANUC control", "linuxcnc": "LinuxCNC", "other": "control that reads FANUC's G-code",
+        None: "control not known yet",
+    }  # fmt: skip
     data = {"name": answers.name, "description": f"{control[answers.control]}; set up by answers", "axes": axes}
+    if answers.control == "linuxcnc":
+        data |= {"controller": {"kind": "linuxcnc", "block_end": "carry"}, "emission": {"dialect": "linuxcnc"}}
     return Machine.from_data(data, answers.name).with_remarks(remarks)
 
 

@@ -24,7 +24,6 @@ from shapegcode.results.result import Xyz
 from shapegcode.simulation.files import csv_file, npz_file
 from shapegcode.simulation.motion import MotionRecorder
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
-from shapegcode.verdict.cases import BLOCK_ENDS
 from shapegcode.verdict.judge import judge_program
 
 # How long behind a stop its settling time is looked for. A drive is integrated all that time.
@@ -89,7 +88,7 @@ def simulate(
         replay = partial(_play, region.path, path, model, plant, as_shaped, model.offset(region), band_um, limit_s)
         figures = [replay(record_samples)]
         if as_shaped:
-            figures += [replay(0, block_end=rule) for rule in BLOCK_ENDS if rule != model.own_rule]
+            figures += [replay(0, block_end=rule) for rule in model.block_rules if rule != model.own_rule]
         runs.append(
             RegionRun(
                 lines=(region.first_line, region.last_line),

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.machine.planners import PLANNER_NAMES
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset
 from shapegcode.results.figures import Deviation
@@ -124,17 +125,20 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
 
 
 def stated_cases(machine: Machine) -> list[Case]:
-    """The conditions in which a program of this machine is simulated; the two nominal ones come first (ceil, carry).
+    """The conditions in which a program of this machine is simulated; the nominal ones come first (ceil, carry).
 
     Overrides from 50 to 120 % and at the ends of the band (none where the override is locked); each mode, and all of
     them, up and down by their stated uncertainty with as little damping as they state; both together at the corners of
-    the band; the look-ahead mode left on (for a controller that has one); and a block buffer that runs empty once.
+    the band; the look-ahead mode left on (for a controller that has one); and a block buffer that runs empty once. A
+    control whose planner cannot be switched off runs all of them by it, and stops in time where its buffer runs empty.
     """
-    band, own = machine.verdict, machine.controller.block_end
+    band, kind = machine.verdict, machine.controller.kind
     low, high = band.override_percent
-    cases = [
-        Case(f"nominal, {rule}", rule, counts=band.block_end == "both" or rule == own) for rule in ("ceil", "carry")
-    ]
+    own = machine.controller.block_end if kind == "fanuc" else None
+    cases = [Case(f"nominal, planner of {PLANNER_NAMES[kind]}", None, counts=True)]
+    if own is not None:
+        counting = ("ceil", "carry") if band.block_end == "both" else (own,)
+        cases = [Case(f"nominal, {rule}", rule, counts=rule in counting) for rule in ("ceil", "carry")]
 
     def at_override(percent: float) -> Case:
         return Case(f"override {percent:g} %", own, low <= percent <= high, override=percent / 100.0)
@@ -155,6 +159,8 @@ def stated_cases(machine: Machine) -> list[Case]:
             for corner in map(at_override, ends)
             for shift, words in together
         ]
+    if own is None:
+        return cases
     if machine.controller.motion == "look_ahead" or band.look_ahead:
         cases.append(Case("look-ahead on", None, band.look_ahead, look_ahead=True))
     cases.append(Case(f"underrun {band.starved_s * 1e3:g} ms", own, band.starved_block, starved_s=band.starved_s))
@@ -245,10 +251,6 @@ def _style(case: CaseVerdict, worst: bool) -> str:
     return f"bold {colour}".strip() if worst else colour
 
 
-BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
-"""Both rules of block timing."""
-
-
 @dataclass(frozen=True)
 class SimulatedCase:
     """An operating condition that was simulated."""
@@ -294,6 +296,8 @@ class CaseSimulation:
 
     def _whole(self, case: Case) -> bool:
         """Whether a case needs a simulation of the whole region for itself."""
+        if self.model.always_plans and case.override != 1.0:
+            return True
         # Behind feed drives each would take a quarter of a conversion: what is only shown makes do with the residual.
         spared = case.override != 1.0 and not case.counts and self.model.machine.verdict.plant != "modal"
         return case.needs_contour(self.target) and not spared and not self._beside(case)
@@ -337,7 +341,7 @@ class CaseSimulation:
         others: Mapping[str, SimulatedCase],
     ) -> tuple[CaseFigures, ...]:
         """One entry per case, of what the tasks gave."""
-        by_rule = {rule.name: run for rule, run in zip(BLOCK_ENDS, nominal, strict=True)}
+        by_rule = {rule.name: run for rule, run in zip(self.model.block_rules, nominal, strict=True)}
         own = by_rule[self.model.own_rule.name]
         figures = []
         for case in self.cases:
@@ -346,7 +350,7 @@ class CaseSimulation:
             elif case.starved_s > 0.0:
                 figures.append(_starved(own, case.starved_s if own.starved else 0.0))
             else:
-                run = planned if case.look_ahead and planned is not None else by_rule[case.block_end or ""]
+                run = planned if case.look_ahead and planned is not None else by_rule.get(case.block_end or "", own)
                 figures.append(case_figures(run))
         return tuple(figures)
 

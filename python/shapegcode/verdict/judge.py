@@ -23,7 +23,6 @@ from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_
 from shapegcode.results.result import Pair, Xyz
 from shapegcode.verdict.cases import (
     ALL_MODES,
-    BLOCK_ENDS,
     Case,
     CaseFigures,
     CaseSimulation,
@@ -101,6 +100,8 @@ class Judge:
         """In the order of `RegionFigures.cases`."""
         self.own_rule = model.own_rule
         """The controller's own rule of block timing."""
+        self.rules = model.block_rules
+        """The rules of block timing of `RegionFigures.emitted`."""
         self.target: Target = "response" if model.machine.shaping.contour == "response" else "command"
         """What the contour tolerance is about."""
 
@@ -121,6 +122,8 @@ class Judge:
     ) -> list[PendingSimulations]:
         """Start the simulation of every emitted region."""
         limits = self._model.limits()
+        if self._model.always_plans:  # what its planner slows is part of every simulation
+            limits.corner_speed_difference_mm_per_s = limits.max_feed_mm_per_s = [math.inf] * 3
         running = []
         for place, tracker in zip(placed, trackers, strict=True):
             simulation = CaseSimulation(
@@ -129,7 +132,7 @@ class Judge:
                 written_increment_mm(self._machine, place.region.exit.units),
             )  # fmt: skip
             planned = pool.submit(simulation.planned)  # takes longest
-            runs = [pool.submit(simulation.nominal, rule) for rule in BLOCK_ENDS]
+            runs = [pool.submit(simulation.nominal, rule) for rule in self.rules]
             rest = [pool.submit(simulation.others, group) for group in simulation.groups()]
             slowed = pool.submit(
                 _core.count_slowed_blocks, simulation.blocks, limits.corner_speed_difference_mm_per_s,
@@ -451,7 +454,7 @@ def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
         model.simulate_emitted(region.path, region.path, rule, contour=False, offset=model.offset(region)).residual_mm
         for region in program.regions
         if region.was_rapid
-        for rule in BLOCK_ENDS
+        for rule in model.block_rules
     ]
     return largest_xyz_um([*found.values(), *shaped])
 

@@ -16,7 +16,6 @@ from shapegcode.conversion.rapids.candidates import Gap, Rapid
 from shapegcode.conversion.write import EmittedRegion
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import NO_OFFSET
-from shapegcode.verdict.cases import BLOCK_ENDS
 from shapegcode.verdict.figures import RegionVerdict
 
 NO_GAIN = "no time gained"
@@ -199,7 +198,7 @@ class RapidPlant:
         period = self.model.period_s
         offset = self._machine_model.offset(region)
         runs = []
-        for rule in BLOCK_ENDS:
+        for rule in self._machine_model.block_rules:
             least = 2 + math.ceil(2.0 * blocks.programmed_time_s / period) + self._filter_periods()
             figures = self._machine_model.simulate_emitted(
                 blocks, region.path, rule, contour=False, record_samples=least, offset=offset

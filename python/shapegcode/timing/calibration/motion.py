@@ -136,6 +136,7 @@ class MotionFit:
         limits.corner_stop_angle_rad = values.get("stop_angle", _OFF)
         limits.block_time_s = values.get("block_time", 0.0)
         model.limits = limits
+        model.planner = _core.PlannerRules()
         model.motion = getattr(_core.MotionKind, family.motion)
         model.filter_shape = _core.FilterShape.linear
         model.time_constant_s = values.get("time_constant", 0.0)

@@ -1,0 +1,173 @@
+"""A LinuxCNC INI file as a machine: limits of the axes, period, what its planner is set to.
+
+    [AXIS_X] MAX_VELOCITY                             axes.x.max_feed_mm_per_min and rapid_mm_per_min
+    [AXIS_X] MAX_ACCELERATION                         axes.x.max_acceleration_mm_s2
+    [TRAJ] MAX_LINEAR_VELOCITY, ..._ACCELERATION      the same, where they are smaller
+    [EMCMOT] SERVO_PERIOD                             controller.interpolation_period_s
+    [TRAJ] ARC_BLEND_..., [DISPLAY] MAX_FEED_OVERRIDE controller.linuxcnc
+
+What it leaves out has LinuxCNC's own default.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shapegcode.errors import MachineError, Problem
+from shapegcode.io.data_file import read_file
+from shapegcode.machine.machine import Machine
+from shapegcode.settings.keys import toml
+
+_MAX_BYTES = 1 << 20
+_SECTION = re.compile(r"\[\s*([^\]]+?)\s*\]")
+_ENTRY = re.compile(r"([A-Za-z0-9_]+)\s*=\s*(.*?)\s*(?:[;#].*)?")
+_UNITS_MM = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
+_PLANNER = {
+    "ARC_BLEND_RAMP_FREQ": ("ramp_frequency_hz", float), "ARC_BLEND_KINK_RATIO": ("kink_ratio", float),
+    "ARC_BLEND_OPTIMIZATION_DEPTH": ("optimization_depth", int),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class IniMachine:
+    """A machine that an INI file describes.
+
+    Attributes:
+        machine: with where each value comes from.
+        count: values that were read.
+        notes: what is set there and not part of the model.
+    """
+
+    machine: Machine
+    count: int
+    notes: tuple[str, ...]
+
+
+class _Ini:
+    """Entries of an INI file with their lines; the first of a name counts, as in LinuxCNC."""
+
+    def __init__(self, file: str, text: str) -> None:
+        self.file = file
+        self.entries: dict[tuple[str, str], tuple[str, int]] = {}
+        self.problems: list[Problem] = []
+        section = ""
+        for number, raw in enumerate(text.splitlines(), start=1):
+            line = raw.strip()
+            if found := _SECTION.match(line):
+                section = found[1].upper()
+            elif line and line[0] not in "#;" and (entry := _ENTRY.fullmatch(line)):
+                self.entries.setdefault((section, entry[1].upper()), (entry[2], number))
+
+    def number(self, section: str, name: str, *, least: float = 0.0) -> float | None:
+        """A number above a limit; None where there is none, and where it is none, which is then a problem."""
+        text, line = self.entries.get((section, name), ("", 0))
+        if not line:
+            return None
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not least < value < math.inf:
+            self.problems.append(
+                Problem(f"[{section}] {name}", toml(text), f"must be a number greater than {least:g}", line)
+            )
+            return None
+        return value
+
+    def origin(self, section: str, name: str) -> str:
+        """Where a value comes from, for the machine file."""
+        return f"parameters: {Path(self.file).name} line {self.entries[section, name][1]}: [{section}] {name}"
+
+
+def read_ini(file: str | Path, *, name: str | None = None) -> IniMachine:
+    """The machine that a LinuxCNC INI file describes; its modes are not known.
+
+    Args:
+        file: the INI file.
+        name: of the machine; None: [EMC] MACHINE.
+
+    Returns:
+        The machine, how many values were read, and notes.
+
+    Raises:
+        MachineError: no INI file of LinuxCNC, or a value that is none; every problem with its line.
+        OSError: the file cannot be read.
+    """
+    ini = _Ini(str(file), read_file(file, _MAX_BYTES).decode("utf-8", "replace"))
+    if not any(section == "TRAJ" for section, _ in ini.entries):
+        raise MachineError(str(file), (Problem("", "", "no INI file of LinuxCNC: it has no section [TRAJ]"),))
+    unit_text, line = ini.entries.get(("TRAJ", "LINEAR_UNITS"), ("mm", 0))
+    unit_mm = _UNITS_MM.get(unit_text.lower())
+    if unit_mm is None:
+        ini.problems.append(Problem("[TRAJ] LINEAR_UNITS", toml(unit_text), "must be mm or inch", line))
+    axes, remarks = _axes(ini, unit_mm or 1.0)
+    controller = dict(_controller(ini, remarks))
+    if ini.problems:
+        raise MachineError(str(file), tuple(ini.problems))
+    own = name or ini.entries.get(("EMC", "MACHINE"), (Path(file).stem, 0))[0]
+    data: Mapping[str, Any] = {
+        "name": "".join(c for c in own if " " <= c <= "~")[:60] or "machine",
+        "description": f"read from {Path(file).name}",
+        "axes": axes, "controller": controller, "emission": {"dialect": "linuxcnc"},
+    }  # fmt: skip
+    machine = Machine.from_data(dict(data), str(file)).with_remarks(remarks)
+    return IniMachine(machine, len(remarks), tuple(_notes(ini)))
+
+
+def _axes(ini: _Ini, unit_mm: float) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
+    """Limits of the axes: the smallest of axis, joint and path."""
+    axes: dict[str, dict[str, float]] = {}
+    remarks: dict[str, str] = {}
+    for number, axis in enumerate("xyz"):
+        limits: dict[str, float] = {}
+        for word, keys, factor in (
+            ("VELOCITY", ("max_feed_mm_per_min", "rapid_mm_per_min"), 60.0),
+            ("ACCELERATION", ("max_acceleration_mm_s2",), 1.0),
+        ):
+            places = [
+                (f"AXIS_{axis.upper()}", f"MAX_{word}"), (f"JOINT_{number}", f"MAX_{word}"),
+                ("TRAJ", f"MAX_LINEAR_{word}"),
+            ]  # fmt: skip
+            found = [(value, place) for place in places if (value := ini.number(*place)) is not None]
+            if not found:
+                needed = f"[AXIS_{axis.upper()}] MAX_{word}"
+                ini.problems.append(Problem(needed, "", "is missing, and so is that of the joint and of [TRAJ]"))
+                continue
+            value, place = min(found)
+            for key in keys:
+                limits[key] = round(value * unit_mm * factor, 9)
+                remarks[f"axes.{axis}.{key}"] = ini.origin(*place)
+        axes[axis] = limits
+    return axes, remarks
+
+
+def _controller(ini: _Ini, remarks: dict[str, str]) -> Iterator[tuple[str, Any]]:
+    """What the file says of servo period and planner."""
+    yield "kind", "linuxcnc"
+    # Blocks are not rounded to periods: what is left of one goes to the next block.
+    yield "block_end", "carry"
+    if (period_ns := ini.number("EMCMOT", "SERVO_PERIOD")) is not None:
+        yield "interpolation_period_s", round(period_ns * 1e-9, 12)
+        remarks["controller.interpolation_period_s"] = ini.origin("EMCMOT", "SERVO_PERIOD")
+    planner: dict[str, float] = {}
+    for name, (key, kind) in _PLANNER.items():
+        if (value := ini.number("TRAJ", name)) is not None:
+            planner[key] = min(kind(value), 1) if key == "kink_ratio" else kind(value)
+            remarks[f"controller.linuxcnc.{key}"] = ini.origin("TRAJ", name)
+    if (override := ini.number("DISPLAY", "MAX_FEED_OVERRIDE")) is not None:
+        planner["max_feed_override"] = override
+        remarks["controller.linuxcnc.max_feed_override"] = ini.origin("DISPLAY", "MAX_FEED_OVERRIDE")
+    yield "linuxcnc", planner
+
+
+def _notes(ini: _Ini) -> Iterator[str]:
+    if ini.entries.get(("TRAJ", "ARC_BLEND_ENABLE"), ("1", 0))[0] == "0":
+        yield "[TRAJ] ARC_BLEND_ENABLE = 0: LinuxCNC looks one segment ahead then; the model looks further"
+    for entry in ("PLANNER_TYPE", "MAX_LINEAR_JERK"):
+        if ("TRAJ", entry) in ini.entries:
+            yield f"[TRAJ] {entry}: the S-curve planner of LinuxCNC 2.10 is not modelled; that of 2.9 is"
