@@ -134,7 +134,7 @@ class MotionController::Implementation {
   // Behind the segment that was pushed last.
   PushResult push_event(const ControllerEvent& event) noexcept {
     if (const PushResult closed = closed_to_pushes(); closed != PushResult::accepted) return closed;
-    const bool has_room = events_.push(head_.load(std::memory_order_relaxed), event);
+    const bool has_room = events_.push(head_.load(std::memory_order_relaxed), {event, stops_.pushed()});
     return has_room ? PushResult::accepted : PushResult::queue_full;
   }
   PushResult push_stop() noexcept {
@@ -154,8 +154,8 @@ class MotionController::Implementation {
   }
   bool next_event(ControllerEvent& event) noexcept {
     const auto* const next = events_.first();
-    if (next == nullptr || !has_reached(next->segment)) return false;
-    event = next->what;
+    if (next == nullptr || stops_.taken() < next->what.stops_before || !has_reached(next->segment)) return false;
+    event = next->what.event;
     events_.drop();
     return true;
   }
@@ -592,8 +592,12 @@ class MotionController::Implementation {
   bool is_braked_ = false, is_bound_ = false, is_beside_ = false;
   std::vector<double> values_;  // as the filters have them
   double period_s_;
+  struct Event {
+    ControllerEvent event;
+    std::uint64_t stops_before = 0;  // that were pushed
+  };
   struct Nothing {};
-  PlaceQueue<ControllerEvent> events_;
+  PlaceQueue<Event> events_;
   PlaceQueue<Nothing> stops_;                   // that were pushed
   std::atomic<std::uint64_t> rests_at_{0};      // a dwell or stop is behind the segment before this one
   std::atomic<std::uint64_t> released_{0};      // segments before this one do not wait

@@ -40,6 +40,7 @@ class PlaceQueue {
     return &entries_[taken & (entries_.size() - 1)];
   }
   void drop() noexcept { taken_.store(taken_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
+  [[nodiscard]] std::uint64_t taken() const noexcept { return taken_.load(std::memory_order_relaxed); }
   /// All before what was pushed as that number.
   void drop_before(std::uint64_t pushed) noexcept { taken_.store(pushed, std::memory_order_release); }
 
