@@ -320,3 +320,52 @@ def test_what_a_retrace_answers() -> None:
     rows.append(made.run())
     np.testing.assert_array_equal(rows[-1][-1], [50.0, 10.0, 0.0])
     assert largest_share(np.concatenate(rows)) <= 1.001
+
+
+def test_an_emergency_stop_a_jog_and_flushed_go_on_where_the_axes_are() -> None:
+    made = control(emergency_acceleration=[6000.0] * 3)
+    made.push_line([100, 0, 0], 100.0)
+    made.step(300)
+    made.flush()
+    made.emergency_stop()
+    made.step(300)
+    assert made.jog_by(1, 5.0, 50.0) == ACCEPTED
+    rows = [made.step(500)]
+    position = made.flushed()
+    assert position is not None
+    np.testing.assert_allclose(position, rows[-1][-1], atol=1e-9)
+    rows.append(made.step(5))
+    np.testing.assert_allclose(rows[-1], np.tile(position, (5, 1)), atol=1e-9)
+
+
+@pytest.mark.parametrize("stop", ["hold", "flush", "abort", "emergency_stop"])
+def test_a_stop_in_the_same_period_is_stronger_than_what_was_asked_for(stop: str) -> None:
+    made, rows = held_on_a_path(retrace_periods=2000, emergency_acceleration=[6000.0] * 3)
+    assert made.retrace(20.0) == made.jog_by(1, 3.0, 40.0) == ACCEPTED
+    getattr(made, stop)()
+    np.testing.assert_allclose(made.step(800), np.tile(rows[-1][-1], (800, 1)), atol=1e-9)
+    made, rows = held_on_a_path()
+    assert made.jog_by(0, 5.0, 50.0) == made.jog(0, 0.0) == ACCEPTED
+    np.testing.assert_allclose(made.step(300), np.tile(rows[-1][-1], (300, 1)), atol=1e-9)
+
+
+def test_an_emergency_stop_is_not_retraced() -> None:
+    made = control(emergency_acceleration=[6000.0] * 3, retrace_periods=2000)
+    made.push_line([100, 0, 0], 120.0)
+    made.step(400)
+    made.emergency_stop()
+    rest = made.run()[-1]
+    made.step(5)
+    assert made.retrace(20.0) == ACCEPTED  # of nothing
+    np.testing.assert_allclose(made.step(400), np.tile(rest, (400, 1)), atol=1e-9)
+
+
+def test_the_way_back_is_as_fast_as_the_way_there() -> None:
+    made, _ = held_on_a_path()
+    made.jog(0, 50.0)
+    made.step(300)
+    made.jog(0, 1e-3)
+    made.step(300)
+    made.resume()
+    assert len(made.run(20_000)) < 3000
+    assert made.state.activity == sg.Activity.idle

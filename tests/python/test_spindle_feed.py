@@ -208,3 +208,52 @@ def test_a_synchronous_segment_waits_and_is_lost() -> None:
     assert whole[-1, 2] > -40.0
     assert np.abs(np.diff(whole, n=2, axis=0)).max() / PERIOD_S**2 <= 1.001 * ACCELERATION
     assert np.abs(np.diff(whole, n=3, axis=0)).max() / PERIOD_S**3 <= 1.001 * JERK
+
+
+def test_a_thread_is_not_cut_again_after_a_restart() -> None:
+    made = control()
+    angle = np.arange(1, 20_001) * 0.01
+    made.push_line([0, 0, -15], 1.0, rules=SYNCHRONOUS)
+    made.push_line([0, 0, -30], 1.0, rules=SYNCHRONOUS, stop_at_end=True)
+    made.step(8000, angle[:8000])
+    made.restart([50.0, 0.0, 0.0])
+    rows = made.step(1000, angle[8000:9000])
+    np.testing.assert_array_equal(rows, np.tile([50.0, 0.0, 0.0], (1000, 1)))
+    assert (made.state.segments_waiting, made.state.activity) == (0, sg.Activity.idle)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_threads_that_end_while_they_catch_up_keep_the_limits(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    for _ in range(20):
+        length, pitch = float(np.exp(random.uniform(np.log(0.04), np.log(12.0)))), float(random.uniform(0.25, 3.0))
+        made = control(**FILTERS[seed % len(FILTERS)])
+        made.push_line([0, 0, -length], pitch, rules=SYNCHRONOUS, stop_at_end=True)
+        count = int(2000 + 1000.0 * length / (pitch * 10.0))
+        rows = made.step(count, np.arange(1, count + 1) * 0.01 * float(random.uniform(0.5, 2.0)))
+        assert made.state.activity == sg.Activity.idle
+        assert rows[-1, 2] == -length
+        assert largest_share(rows) <= 1.001, (length, pitch)
+
+
+def test_an_angle_that_is_missing_changes_nothing() -> None:
+    made = control()
+    made.push_line([0, 0, -40], 2.0, rules=SYNCHRONOUS, stop_at_end=True)
+    angle = np.arange(1, 3001) * 0.01
+    angle[800] = math.nan
+    angle[900] = 1e308
+    rows = [made.step(1500, angle[:1500]), made.step(1), made.step(1499, angle[1501:])]
+    assert made.state.activity == sg.Activity.idle
+    np.testing.assert_array_equal(rows[-1][-1], [0.0, 0.0, -40.0])
+    assert largest_share(np.concatenate(rows)) <= 1.001
+
+
+@pytest.mark.parametrize("feed_of", [sg.FeedOf.all_axes, sg.FeedOf.dominant, sg.FeedOf.path, sg.FeedOf.time])
+def test_a_rotary_axis_that_moves_much_further_comes_to_its_end(feed_of: sg.FeedOf) -> None:
+    axis = sg.FollowingLimits(max_feed=180.0, max_acceleration=2000.0, max_jerk=1e5, tolerance=0.05)
+    made = control(following=[axis])
+    rules = sg.SegmentRules(feed_of=feed_of)
+    made.push_line([3, 0, 0], 50.0, [-3.0], rules=rules)
+    made.push_line([3.02, 0.02, 0], 50.0, [-20.0], rules=rules, stop_at_end=True)
+    rows = made.run(3000)
+    np.testing.assert_array_equal(rows[-1], [3.02, 0.02, 0.0, -20.0])

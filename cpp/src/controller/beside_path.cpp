@@ -100,6 +100,7 @@ JogResult Jog::jog(std::size_t axis, double speed) noexcept {
   const AxisTravel travel = travel_->of(axis);
   const double here = commands_[axis].from.load(std::memory_order_relaxed);
   if ((speed > 0.0 && here >= travel.high) || (speed < 0.0 && here <= travel.low)) return JogResult::beyond_travel;
+  commands_[axis].distance.store(0.0, std::memory_order_relaxed);
   commands_[axis].velocity.store(speed, std::memory_order_relaxed);
   return JogResult::accepted;
 }
@@ -151,7 +152,10 @@ void Jog::step(Mode mode, const AxisValues& base) noexcept {
     take(axis, commands_[i], base[i] + tracker.position());
     if (mode != Mode::open) axis.goes = false;
     if (mode == Mode::returns) {
-      tracker.step(0.0, axis.limits);
+      // As fast as it was away from the path at the most: what was asked for last may be a creep.
+      TrackerLimits limits = axis.limits;
+      limits.speed = axis.fastest;
+      tracker.step(0.0, limits);
     } else if (axis.goes) {
       const double here = base[i] + tracker.position();
       const AxisTravel travel = travel_->of(i);
@@ -163,8 +167,10 @@ void Jog::step(Mode mode, const AxisValues& base) noexcept {
     }
     const double from = axis.goes && std::isfinite(axis.goal) ? axis.goal : base[i] + tracker.position();
     commands_[i].from.store(from, std::memory_order_relaxed);
+    const bool is_away = !tracker.at_rest() || tracker.position() != 0.0;
+    axis.fastest = is_away || axis.goes ? std::max(axis.fastest, axis.limits.speed) : 0.0;
     moves_ = moves_ || axis.goes || !tracker.at_rest();
-    is_beside_ = is_beside_ || !tracker.at_rest() || tracker.position() != 0.0;
+    is_beside_ = is_beside_ || is_away;
   }
 }
 

@@ -65,6 +65,7 @@ class Jog {
     AxisTracker tracker;
     TrackerLimits limits;  // their speed: of the last command
     double highest_speed = 0.0;
+    double fastest = 0.0;  // since it left the path
     double goal = 0.0;
     bool goes = false;
   };

@@ -12,7 +12,7 @@ namespace {
 constexpr double crawl_mm_per_s = 1e-2;
 // What is no travel of X, Y and Z, and a share of what another axis travels that hardly is one.
 constexpr double no_travel_mm = 1e-9;
-constexpr double hardly_moves = 1e-3;
+constexpr double hardly_moves = 0.1;
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "controller/beside_path.hpp"
@@ -174,6 +175,7 @@ class MotionController::Implementation {
   }
 
   Activity step() noexcept {
+    if (!std::exchange(is_measured_, false)) spindle_.miss();
     const Flush flush = flush_.load(std::memory_order_acquire);
     if (flush == Flush::over || flush == Flush::asked_again) go_on();
     const bool stays = flush == Flush::at_rest || flush == Flush::taken;
@@ -212,7 +214,10 @@ class MotionController::Implementation {
 
   void feed_override(double ratio) noexcept { set_override(override_, ratio); }
   void rapid_override(double ratio) noexcept { set_override(rapid_override_, ratio); }
-  void spindle(double revolutions) noexcept { spindle_.measure(revolutions); }
+  void spindle(double revolutions) noexcept {
+    spindle_.measure(revolutions);
+    is_measured_ = true;
+  }
   void hold() noexcept {
     hold_.store(true, std::memory_order_relaxed);
     stops_jog_.store(true, std::memory_order_relaxed);
@@ -379,8 +384,8 @@ class MotionController::Implementation {
 
   // One of them at a time: back from a jog first, then forward along the path.
   void step_beside(Jog::Mode mode, const PlannedPoint& point) noexcept {
-    if (is_bound_) {
-      retrace_.restart();  // a thread is not run backwards
+    if (is_bound_ || is_braked_) {
+      retrace_.restart();  // neither a thread nor an emergency stop is run backwards
     } else if (!is_beside_) {
       retrace_.note(point);
     }
@@ -424,7 +429,8 @@ class MotionController::Implementation {
   void go_on() noexcept {
     retrace_.restart();
     jog_.restart();
-    is_bound_ = is_beside_ = false;
+    emergency_.store(false, std::memory_order_relaxed);
+    is_braked_ = is_bound_ = is_beside_ = false;
     first_ = new_head_ - done_;
     step_from(new_head_, rest_.line);
     Flush over = Flush::over;
@@ -589,6 +595,7 @@ class MotionController::Implementation {
   alignas(cache_line) std::uint64_t first_ = 0;
   bool runs_out_ = false;
   int rest_periods_ = 0, still_periods_ = 0;
+  bool is_measured_ = false;  // the spindle, for this period
   bool is_braked_ = false, is_bound_ = false, is_beside_ = false;
   std::vector<double> values_;  // as the filters have them
   double period_s_;

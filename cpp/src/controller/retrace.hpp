@@ -30,7 +30,10 @@ class Retrace {
   /// One period on.
   void step(Jog::Mode mode) noexcept;
   /// To rest, wherever that is.
-  void stop() noexcept { stops_ = true; }
+  void stop() noexcept {
+    stops_ = true;
+    asked_.store(std::numeric_limits<double>::quiet_NaN(), std::memory_order_relaxed);
+  }
   [[nodiscard]] bool is_asked() const noexcept { return !std::isnan(asked_.load(std::memory_order_relaxed)); }
   void restart() noexcept;
   void add_to(AxisValues& position, AxisValues& velocity, AxisValues& acceleration) const noexcept;

@@ -10,7 +10,7 @@ void Sections::restart(const PlannedPoint& point) noexcept {
   rest.start = rest.count = rest.whole_count = 0;
   rest.first_period = 0;
   rest.done = point.point.segment;
-  rest.runs_out = false;
+  rest.runs_out = rest.is_bound = false;
   rest.before.fill(point);
   slot_of_.fill(0);
   current_ = 0;

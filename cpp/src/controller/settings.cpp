@@ -195,7 +195,10 @@ PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPoi
 
 AxisValues emergency_of(const ControllerSettings& settings, double gain) noexcept {
   AxisValues most{};
-  std::ranges::transform(settings.emergency_acceleration, most.begin(), [gain](double value) { return value / gain; });
+  for (std::size_t i = 0; i < settings.emergency_acceleration.size(); ++i) {
+    const double offset = i < settings.offset.size() ? settings.offset[i].max_acceleration : 0.0;
+    most[i] = (settings.emergency_acceleration[i] - offset) / gain;
+  }
   return most;
 }
 

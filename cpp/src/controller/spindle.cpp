@@ -14,6 +14,8 @@ constexpr double catching_share = 0.8;
 constexpr double followed_within = 0.005;
 // Of the speed of the spindle, by which it may rise.
 constexpr double speed_room = 1.15;
+// No count is beyond that.
+constexpr double most_revolutions = 1e9;
 // Slower than that it stands, revolutions per s.
 constexpr double stands = 0.01;
 
@@ -36,13 +38,21 @@ Spindle::Spindle(double bandwidth_hz, double period_s, double ahead_s) noexcept
 SpindleState Spindle::foreseen() const noexcept { return after(observed_, ahead_s_); }
 
 void Spindle::measure(double revolutions) noexcept {
-  if (!std::isfinite(revolutions)) return;
+  if (!(std::abs(revolutions) < most_revolutions)) return miss();
   if (!is_measured_) {
     is_measured_ = true;
     observed_ = smooth_ = {revolutions, 0.0, 0.0};
   }
+  correct(revolutions - after(observed_, period_s_).angle);
+}
+
+void Spindle::miss() noexcept {
+  if (is_measured_) correct(0.0);
+}
+
+// One period on, with what was missing from what was expected.
+void Spindle::correct(double missing) noexcept {
   observed_ = after(observed_, period_s_);
-  const double missing = revolutions - observed_.angle;
   observed_.angle += angle_gain_ * missing;
   observed_.speed += speed_gain_ * missing;
   observed_.acceleration += acceleration_gain_ * missing;
@@ -121,7 +131,10 @@ void SpindleFeed::step(const Spindle& spindle, bool may_begin, bool brakes) noex
     along_.restart(std::max(along_.position(), pitch_mm_ * (now.angle - first_angle_) + beside_.position()),
                    pitch_mm_ * now.speed + beside_.velocity(), pitch_mm_ * now.acceleration + beside_.acceleration());
     error_mm_ = along_.position() - pitch_mm_ * (spindle.foreseen().angle - first_angle_);
-    if (!along_.leaves_room(length, 1.0, along_limits_)) {
+    // However fast the next period may be.
+    AxisTracker on = along_;
+    on.step_to_speed(along_limits_.speed, along_limits_);
+    if (!on.leaves_room(length, 1.0, along_limits_)) {
       phase_ = Phase::ends;
       along_limits_.speed = along_.velocity();
     }
@@ -135,9 +148,10 @@ void SpindleFeed::step(const Spindle& spindle, bool may_begin, bool brakes) noex
 
 void SpindleFeed::write() noexcept {
   const Segment& segment = segment_->segment;
-  const double s = std::clamp(along_.position(), 0.0, segment.length_mm);
-  const Vector3 position = point_at(segment, s);
-  const Vector3 tangent = tangent_at(segment, s);
+  // A little past its end as well, where it cannot be met at once.
+  const double s = along_.position();
+  const Vector3 tangent = tangent_at(segment, 0.0);
+  const Vector3 position = s == segment.length_mm ? segment.end_mm : Vector3(segment.start_mm + s * tangent);
   point_.point = {start_.point.segment, s, {along_.velocity(), along_.acceleration()}};
   point_.distance = s;
   point_.line = segment.line;

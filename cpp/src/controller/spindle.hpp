@@ -24,6 +24,8 @@ class Spindle {
 
   /// Once in every period; from the thread that steps.
   void measure(double revolutions) noexcept;
+  /// Or nothing was measured: it goes on as it did.
+  void miss() noexcept;
   /// What the motion follows.
   [[nodiscard]] const SpindleState& smooth() const noexcept { return smooth_; }
   /// What it should be.
@@ -32,6 +34,8 @@ class Spindle {
   [[nodiscard]] double speed() const noexcept { return speed_.load(std::memory_order_relaxed); }
 
  private:
+  void correct(double missing) noexcept;
+
   double pole_, period_s_, ahead_s_;
   double angle_gain_, speed_gain_, acceleration_gain_;
   SpindleState observed_, smooth_;
