@@ -5,11 +5,11 @@
 #include <utility>
 
 #include "base/refuse.hpp"
+#include "limits/speed_limits.hpp"
 #include "motion/feed_sections.hpp"
 #include "motion/phase_maker.hpp"
 #include "motion/pieces.hpp"
 #include "motion/planned_motion.hpp"
-#include "limits/speed_limits.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
