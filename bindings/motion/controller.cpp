@@ -527,7 +527,7 @@ fast as it was jogged last; flushed() and restart() begin at the new place.
 
 Args:
     axis: Its index, from 0.
-    speed: With its sign, unit per s; given anew it counts from the next period; 0: to rest.
+    speed: With its sign, unit per s; given again it counts from the next period; 0: to rest.
 
 Returns:
     JogResult; unless it is `accepted` nothing has happened. It comes to rest at the end of the travel.)")

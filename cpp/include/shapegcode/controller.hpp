@@ -262,7 +262,7 @@ class MotionController {
 
   /// Moves an axis by hand while the path rests: after hold(), at a stop that was pushed, after flush() until
   /// flushed(), after abort(). Any thread, but one for each axis. The limits hold; it comes to rest at the end of the
-  /// travel. A speed that is given anew counts from the next period; 0: to rest. resume() leads back onto the path,
+  /// travel. A speed that is given again counts from the next period; 0: to rest. resume() leads back onto the path,
   /// each axis as fast as it was jogged last, then the path goes on; flushed() and restart() begin at the new place.
   JogResult jog(int axis, double speed) noexcept;
   /// Likewise by a distance; those that are given before it ends add up.

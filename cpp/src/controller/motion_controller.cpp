@@ -198,9 +198,9 @@ class MotionController::Implementation {
     if (is_still() && flush_.load(std::memory_order_relaxed) == Flush::asked) {
       rest_ = point;
       rest_at_ = point.position;
-      AxisValues unused{};
-      retrace_.add_to(rest_at_, unused, unused);
-      jog_.add_to(rest_at_, unused, unused);
+      AxisValues velocity{};
+      AxisValues acceleration{};
+      add_beside(rest_at_, velocity, acceleration);
       done_ = now.running - first_;
       flush_.store(Flush::at_rest, std::memory_order_release);
     }
@@ -220,7 +220,7 @@ class MotionController::Implementation {
   }
   void hold() noexcept {
     hold_.store(true, std::memory_order_relaxed);
-    stops_jog_.store(true, std::memory_order_relaxed);
+    stops_beside_.store(true, std::memory_order_relaxed);
   }
   void resume() noexcept {
     hold_.store(false, std::memory_order_relaxed);
@@ -229,7 +229,7 @@ class MotionController::Implementation {
   }
   void abort() noexcept {
     abort_.store(true, std::memory_order_relaxed);
-    stops_jog_.store(true, std::memory_order_relaxed);
+    stops_beside_.store(true, std::memory_order_relaxed);
   }
   void emergency_stop() noexcept {
     emergency_.store(brakes_, std::memory_order_relaxed);
@@ -245,7 +245,7 @@ class MotionController::Implementation {
     return travel_.set(static_cast<std::size_t>(axis), travel);
   }
   void flush() noexcept {
-    stops_jog_.store(true, std::memory_order_relaxed);
+    stops_beside_.store(true, std::memory_order_relaxed);
     Flush now = flush_.load(std::memory_order_relaxed);
     while (now == Flush::none || now == Flush::over) {
       const Flush next = now == Flush::none ? Flush::asked : Flush::asked_again;
@@ -265,8 +265,6 @@ class MotionController::Implementation {
       return false;
     }
     new_head_ = push_from(rest_at_);
-    events_from_ = events_.pushed();
-    stops_from_ = stops_.pushed();
     std::copy_n(rest_at_.begin(), std::min(position.size(), axes()), position.begin());
     flush_.store(Flush::over, std::memory_order_seq_cst);
     return true;
@@ -277,10 +275,6 @@ class MotionController::Implementation {
     hold_.store(false, std::memory_order_relaxed);
     abort_.store(false, std::memory_order_relaxed);
     flush_.store(Flush::none, std::memory_order_relaxed);
-    emergency_.store(false, std::memory_order_relaxed);
-    is_braked_ = is_bound_ = is_beside_ = false;
-    retrace_.restart();
-    jog_.restart();
     offset_.restart();
     AxisValues rest{};
     std::copy_n(position.begin(), std::min(position.size(), axes()), rest.begin());
@@ -288,8 +282,6 @@ class MotionController::Implementation {
     std::copy_n(rest.begin(), axes(), values_.begin());
     const std::uint64_t head = push_from(rest);
     filters_.reset(values(0));
-    events_from_ = events_.pushed();
-    stops_from_ = stops_.pushed();
     step_from(head, 0);
     rest_periods_ = still_periods_ = settled_periods();
     settled_.store(true, std::memory_order_relaxed);
@@ -366,7 +358,10 @@ class MotionController::Implementation {
 
   // Whether axes may be jogged, or have to go back to the path.
   Jog::Mode jog_mode(bool rests, Flush flush) noexcept {
-    if (stops_jog_.exchange(false, std::memory_order_relaxed)) stop_beside();
+    if (stops_beside_.exchange(false, std::memory_order_relaxed)) {
+      jog_.stop();
+      retrace_.stop();
+    }
     if (!rests || flush == Flush::taken) return Jog::Mode::closed;
     if (flush == Flush::at_rest) {
       // What is jogged rests elsewhere.
@@ -397,11 +392,11 @@ class MotionController::Implementation {
     retrace_.add_to(base, unused, unused);
     jog_.step(retraces || !retrace_.at_rest() ? Jog::Mode::closed : mode, base);
   }
-  [[nodiscard]] bool rests_beside() const noexcept { return jog_.at_rest() && retrace_.at_rest(); }
-  void stop_beside() noexcept {
-    jog_.stop();
-    retrace_.stop();
+  void add_beside(AxisValues& position, AxisValues& velocity, AxisValues& acceleration) const noexcept {
+    retrace_.add_to(position, velocity, acceleration);
+    jog_.add_to(position, velocity, acceleration);
   }
+  [[nodiscard]] bool rests_beside() const noexcept { return jog_.at_rest() && retrace_.at_rest(); }
 
   void set_values(const AxisValues& position, const AxisValues& velocity, const AxisValues& acceleration) noexcept {
     std::size_t order = 0;
@@ -414,8 +409,7 @@ class MotionController::Implementation {
     AxisValues position = point.position;
     AxisValues velocity = point.velocity;
     AxisValues acceleration = point.acceleration;
-    retrace_.add_to(position, velocity, acceleration);
-    jog_.add_to(position, velocity, acceleration);
+    add_beside(position, velocity, acceleration);
     offset_.step(position);
     offset_.add_to(position, velocity, acceleration);
     set_values(position, velocity, acceleration);
@@ -427,10 +421,6 @@ class MotionController::Implementation {
     return rest_of(abort_.load(std::memory_order_relaxed), hold_.load(std::memory_order_relaxed));
   }
   void go_on() noexcept {
-    retrace_.restart();
-    jog_.restart();
-    emergency_.store(false, std::memory_order_relaxed);
-    is_braked_ = is_bound_ = is_beside_ = false;
     first_ = new_head_ - done_;
     step_from(new_head_, rest_.line);
     Flush over = Flush::over;
@@ -443,11 +433,16 @@ class MotionController::Implementation {
     intake_.restart({rest.data(), axes()});
     planner_.restart(head, rest);
     rests_at_.store(head, std::memory_order_relaxed);
+    events_from_ = events_.pushed();
+    stops_from_ = stops_.pushed();
     return head;
   }
   // At rest before a segment; what belongs to places before it is dropped.
   void step_from(std::uint64_t segment, std::uint32_t line) noexcept {
-    runs_out_ = false;
+    runs_out_ = is_braked_ = is_bound_ = is_beside_ = false;
+    emergency_.store(false, std::memory_order_relaxed);
+    retrace_.restart();
+    jog_.restart();
     std::ranges::fill(passed_, Passed{0.0, segment, line, true});
     events_.drop_before(events_from_);
     stops_.drop_before(stops_from_);
@@ -581,7 +576,7 @@ class MotionController::Implementation {
   std::atomic<bool> hold_{false};
   std::atomic<bool> abort_{false};
   std::atomic<bool> emergency_{false};
-  std::atomic<bool> stops_jog_{false};
+  std::atomic<bool> stops_beside_{false};
   std::atomic<bool> settled_{true};
   std::atomic<Flush> flush_{Flush::none};
   std::atomic<bool> is_planning_{false};

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/cubic.hpp"
+
 namespace shapegcode {
 
 void PathBrake::begin(const Section& section, std::size_t index) noexcept {
@@ -56,13 +58,10 @@ void PathBrake::go_to(double distance, double speed, double deceleration) noexce
     const auto direction = [&](const PlannedPoint& point) {
       return point.point.state.speed > 0.0 ? point.velocity[i] / point.point.state.speed * length : chord;
     };
-    const double begin = direction(from);
-    const double end = direction(to);
-    const double bend = 6.0 * chord - 4.0 * begin - 2.0 * end;
-    const double turn = 6.0 * (begin + end) - 12.0 * chord;
-    point_.position[i] = from.position[i] + share * (begin + share * (0.5 * bend + share * turn / 6.0));
-    const double first = length > 0.0 ? (begin + share * (bend + 0.5 * share * turn)) / length : 0.0;
-    const double second = length > 0.0 ? (bend + share * turn) / (length * length) : 0.0;
+    const Cubic cubic(chord, direction(from), direction(to));
+    point_.position[i] = from.position[i] + cubic.value(share);
+    const double first = length > 0.0 ? cubic.first(share) / length : 0.0;
+    const double second = length > 0.0 ? cubic.second(share) / (length * length) : 0.0;
     point_.velocity[i] = first * point_.point.state.speed;
     point_.acceleration[i] = first * point_.point.state.acceleration + second * speed * speed;
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/cubic.hpp"
+
 namespace shapegcode {
 namespace {
 
@@ -97,15 +99,10 @@ void Retrace::add_to(AxisValues& position, AxisValues& velocity, AxisValues& acc
   const double pace = pace_.velocity() * period_s_;
   const double change = pace_.acceleration() * period_s_;
   for (std::size_t i = 0; i < limits_.axes; ++i) {
-    // Between two periods a cubic, by the share of the period.
-    const double chord = to.position[i] - from.position[i];
-    const double begin = from.velocity[i] * period_s_;
-    const double end = to.velocity[i] * period_s_;
-    const double bend = 6.0 * chord - 4.0 * begin - 2.0 * end;
-    const double turn = 6.0 * (begin + end) - 12.0 * chord;
-    const double first = begin + share * (bend + 0.5 * share * turn);
-    const double second = bend + share * turn;
-    position[i] += from.position[i] - back(0).position[i] + share * (begin + share * (0.5 * bend + share * turn / 6.0));
+    const Cubic cubic(to.position[i] - from.position[i], from.velocity[i] * period_s_, to.velocity[i] * period_s_);
+    const double first = cubic.first(share);
+    const double second = cubic.second(share);
+    position[i] += from.position[i] - back(0).position[i] + cubic.value(share);
     velocity[i] += first / period_s_ * pace;
     acceleration[i] += second / (period_s_ * period_s_) * pace * pace + first / period_s_ * change;
   }

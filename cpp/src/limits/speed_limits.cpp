@@ -36,16 +36,6 @@ Vector3 axis_share(const Segment& segment) noexcept {
   return share;
 }
 
-double tangential_limit(const Vector3& share, const Vector3& limit) noexcept {
-  double result = MotionLimits::none;
-  for (int i = 0; i < axis_count; ++i) {
-    if (share[i] > 0.0) {
-      result = std::min(result, limit[i] / share[i]);
-    }
-  }
-  return result;
-}
-
 // In-plane axes of an arc share their acceleration between the turn and the change of speed.
 double arc_centripetal_limit(const Segment& segment, const MotionLimits& limits) noexcept {
   double limit = limits.centripetal_acceleration_mm_per_s2;
@@ -106,6 +96,16 @@ double curvature_speed(double curvature_per_mm, double centripetal, const Filter
 }
 
 }  // namespace
+
+double tangential_limit(const Vector3& share, const Vector3& limit) noexcept {
+  double result = MotionLimits::none;
+  for (int i = 0; i < axis_count; ++i) {
+    if (share[i] > 0.0) {
+      result = std::min(result, limit[i] / share[i]);
+    }
+  }
+  return result;
+}
 
 void check_limits(const MotionLimits& limits, const FilterTolerance& filter) {
   require_limit(limits.time_constant_s, "acceleration time constant", "s");

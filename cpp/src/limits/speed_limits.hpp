@@ -9,6 +9,9 @@ namespace shapegcode {
 /// Throws Error(argument) on a limit that is not positive.
 void check_limits(const MotionLimits& limits, const FilterTolerance& filter);
 
+/// The largest along a direction of which no axis has more than its limit; `share`: of each axis in it.
+[[nodiscard]] double tangential_limit(const Vector3& share, const Vector3& limit) noexcept;
+
 /// Acceleration along a segment that is run at most at `speed_limit`.
 [[nodiscard]] double segment_acceleration(const Segment& segment, double speed_limit,
                                           const MotionLimits& limits) noexcept;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "limits/speed_limits.hpp"
 #include "motion/feed_sections.hpp"
 #include "motion/planner_rules.hpp"
 
@@ -31,14 +32,6 @@ constexpr std::size_t most_merged = 100;  // lines that its detector of naive CA
 constexpr double chord_turn_rad = 0.02;  // of the lines that stand for a blend arc here
 
 double normal_share() noexcept { return std::sqrt(1.0 - tangential_share * tangential_share); }
-
-double limit_along(const Vector3& direction, const Vector3& limit) noexcept {
-  double least = MotionLimits::none;
-  for (int i = 0; i < axis_count; ++i) {
-    if (std::abs(direction[i]) > 1e-12) least = std::min(least, limit[i] / std::abs(direction[i]));
-  }
-  return least;
-}
 
 // The largest vector in every direction of a plane that no axis' limit is below.
 double limit_in_plane(const Vector3& normal, const Vector3& limit) noexcept {
@@ -90,9 +83,9 @@ QueuedSegment queued_of(const Segment& segment, const MotionLimits& limits, doub
     const double across = normal_share() * queued.max_acceleration_mm_per_s2;
     if (bend > 0.0) queued.max_speed_mm_per_s = std::min(queued.max_speed_mm_per_s, std::sqrt(across / bend));
   } else {
-    const Vector3 along = tangent_at(segment, 0.0);
-    queued.max_speed_mm_per_s = limit_along(along, limits.max_feed_mm_per_s);
-    queued.max_acceleration_mm_per_s2 = limit_along(along, limits.max_acceleration_mm_per_s2);
+    const Vector3 along = tangent_at(segment, 0.0).cwiseAbs();
+    queued.max_speed_mm_per_s = tangential_limit(along, limits.max_feed_mm_per_s);
+    queued.max_acceleration_mm_per_s2 = tangential_limit(along, limits.max_acceleration_mm_per_s2);
   }
   queued.request_mm_per_s = planned_feed(segment, programmed, queued.max_speed_mm_per_s);
   queued.max_speed_mm_per_s = std::min(queued.max_speed_mm_per_s, queued.length_mm / period_s);
