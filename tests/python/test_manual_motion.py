@@ -369,3 +369,15 @@ def test_the_way_back_is_as_fast_as_the_way_there() -> None:
     made.resume()
     assert len(made.run(20_000)) < 3000
     assert made.state.activity == sg.Activity.idle
+
+
+@pytest.mark.parametrize("beside", ["retrace", "jog"])
+def test_an_emergency_stop_beside_the_path_stays_there(beside: str) -> None:
+    made, rows = held_on_a_path(retrace_periods=2000, emergency_acceleration=[2.0 * ACCELERATION] * 3)
+    assert (made.retrace(12.0) if beside == "retrace" else made.jog_by(1, 8.0, 60.0)) == ACCEPTED
+    rows.append(made.step(200))
+    made.emergency_stop()
+    rows.append(made.step(600))
+    assert made.state.activity == sg.Activity.aborted
+    assert np.abs(rows[-1][-1] - rows[1][-1]).max() > 1.0
+    assert largest_share(np.concatenate(rows)) <= 1.001

@@ -114,15 +114,15 @@ TESTS = {
         "python/test_motion_controller.py", "test_the_delay_is_what_the_set_points_lag", "the delay of the filters"
     ),
     "sessions": HeldBy(
-        "python/test_operator_sessions.py",
-        "test_sessions",
+        "cpp/operator_session.cpp",
+        "OperatorSession::run",
         "random sessions of an operator: limits, path, events, rest",
     ),
     "probe": HeldBy(
-        "python/test_operator_sessions.py", "test_a_probe_stops_the_motion_on_its_path", "probe, and where it rests"
+        "python/test_probe_and_flush.py", "test_a_probe_stops_the_motion_on_its_path", "probe, and where it rests"
     ),
     "flush": HeldBy(
-        "python/test_operator_sessions.py", "test_a_flush_at_rest_in_a_dwell_and_twice", "flush in every state"
+        "python/test_probe_and_flush.py", "test_a_flush_at_rest_in_a_dwell_and_twice", "flush in every state"
     ),
     "by hand": HeldBy(
         "cpp/allocation_program.cpp",

@@ -380,7 +380,8 @@ class MotionController::Implementation {
   // One of them at a time: back from a jog first, then forward along the path.
   void step_beside(Jog::Mode mode, const PlannedPoint& point) noexcept {
     if (is_bound_ || is_braked_) {
-      retrace_.restart();  // neither a thread nor an emergency stop is run backwards
+      // Neither a thread nor an emergency stop is run backwards; one in which the path rested ends beside it.
+      if (!retrace_.is_beside()) retrace_.restart();
     } else if (!is_beside_) {
       retrace_.note(point);
     }

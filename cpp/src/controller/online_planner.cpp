@@ -77,6 +77,7 @@ void OnlinePlanner::restart(std::uint64_t first, const AxisValues& position) noe
   point.position = position;
   point.point.segment = first;
   sections_.restart(point);
+  plan_.forget();
   last_ = &sections_.current();
   last_number_ = 0;
   start_ = 0;

@@ -44,17 +44,37 @@ void PathPlan::make(const PathStart& start, const AlongPath& state, std::uint64_
   path_.start(start, end, ratios);
   begin_ = {state.speed * state.speed, state.acceleration};
   make_stations();
-  for (std::size_t k = 0; k < count_; ++k) courses_[k] = Course{};
-  make_sets(Round::first);
+  make_sets(true);
   for (int round = 0; round < rounds; ++round) {
     expect();
     if (!lay_tangents()) break;
-    make_sets(Round::exact);
+    make_sets(false);
   }
-  if (!grows_) make_sets(Round::slow);
+  if (!grows_) make_slow_sets();
+}
+
+// What the plan before found for an interval holds for the same one.
+void PathPlan::keep(const Station& station, std::size_t before, std::size_t before_end) noexcept {
+  if (before < before_end) {
+    Station moved = stations_[before];
+    const double further = station.distance - moved.distance;
+    moved.distance = station.distance;
+    if (moved == station) {
+      courses_[count_] = courses_[before];
+      courses_[count_].approach_begin += further;
+      courses_[count_].is_kept = true;
+      courses_[count_].is_remade = false;
+      sets_[count_] = sets_[before];
+      if (!grows_) slow_sets_[count_] = slow_sets_[before];
+      return;
+    }
+  }
+  courses_[count_] = Course{};
 }
 
 void PathPlan::make_stations() {
+  const std::size_t before_end = count_ > 0 ? end() : 0;
+  std::size_t passed = before_end;  // of the stations before
   count_ = 0;
   Station station;
   while ((grows_ || count_ + 1 < stations_.size()) && path_.next(station)) {
@@ -73,8 +93,17 @@ void PathPlan::make_stations() {
       station.max_acceleration = steepest(station, path);
       station.max_jerk = highest_jerk(station, path);
     }
+    if (count_ == 0) {
+      passed = 0;
+      while (passed < before_end &&
+             (stations_[passed].segment != station.segment || stations_[passed].offset != station.offset)) {
+        ++passed;
+      }
+    }
+    keep(station, count_ + passed, before_end);
     stations_[count_++] = station;
   }
+  courses_[count_] = Course{};
   Station& last = stations_[count_];
   last = stations_[count_ - 1];
   last.stop = true;
@@ -101,56 +130,78 @@ bool is_same(const ControllableSet& one, const ControllableSet& other) noexcept 
 
 }  // namespace
 
-// Of an exact round, those that depend on tangents that were laid again; of the slow one, those that differ from the
-// sets that approach valleys.
-void PathPlan::make_sets(Round round) noexcept {
-  const bool is_slow = round == Round::slow;
-  std::vector<ControllableSet>& sets = is_slow ? slow_sets_ : sets_;
+Making PathPlan::making_of(std::size_t index) const noexcept {
+  const double higher = stations_[index].straight ? tangent_on_lines : tangent_on_curves;
+  return {cap_at(index), higher * courses_[index].laid, higher * courses_[index + 1].laid, -no_limit};
+}
+
+// Whether the valley that follows is being approached.
+bool PathPlan::is_approach(std::size_t index) const noexcept {
+  const Course& next = courses_[index + 1];
+  return next.approaches && stations_[index].distance > next.approach_begin;
+}
+
+// Whether what a set is made from is another than in the plan before.
+bool PathPlan::is_changed(std::size_t index) const noexcept {
+  return index == 0 || stations_[index].valley || !courses_[index - 1].is_kept || !courses_[index].is_kept ||
+         !courses_[index + 1].is_kept;
+}
+
+// Of the first round, those of intervals that are not those of the plan before; later, those that depend on tangents
+// that were laid again.
+void PathPlan::make_sets(bool is_first) noexcept {
   bool differs = false;  // the next one
   for (std::size_t k = end(); k-- > 0;) {
     const Station& here = stations_[k];
     const PlannedSegment& segment = segment_of(here);
     Course& course = courses_[k];
-    double cap = cap_at(k);
+    const Course& next = courses_[k + 1];
+    const bool is_new = is_first ? is_changed(k) : course.relaid || next.relaid;
     if (ends_in_stop(k)) {
-      if (round == Round::first) sets_[k] = rules_.before_stop(here, segment, cap);
-      if (is_slow) slow_sets_[k] = sets_[k];
+      if (is_first && is_new) sets_[k] = rules_.before_stop(here, segment, cap_at(k));
+      course.is_remade = course.is_remade || (is_first && is_new);
       course.approaches = false;
       differs = false;
       continue;
     }
-    const Course& next = courses_[k + 1];
-    const bool approaches_here = next.approaches && here.distance > next.approach_begin;
-    const bool is_new = is_slow ? here.valley || approaches_here : course.relaid || next.relaid;
-    if (round != Round::first && !is_new && !differs) {
-      if (is_slow) slow_sets_[k] = sets_[k];
-      continue;
+    if (!is_new && !differs) continue;
+    Making making = making_of(k);
+    if (here.valley) making.cap = std::min(making.cap, best_passing(k));
+    course.approaches = is_approach(k);
+    if (course.approaches) {
+      course.approach = rules_.hardest_before(here, segment, making.cap, next.approach);
+      course.approach_begin = next.approach_begin;
+      making.least_acceleration = course.approach.acceleration;
+      course.approaches = course.approach.speed_squared < making.cap;
     }
-    const double higher = here.straight ? tangent_on_lines : tangent_on_curves;
-    Making making{cap, -1.0, -1.0, -no_limit};
-    if (round != Round::first) {
-      making.b_begin = higher * course.laid;
-      making.b_end = higher * next.laid;
-    }
-    if (!is_slow) {
-      if (here.valley) making.cap = cap = std::min(cap, best_passing(k));
-      course.approaches = approaches_here;
-      if (approaches_here) {
-        course.approach = rules_.hardest_before(here, segment, cap, next.approach);
-        course.approach_begin = next.approach_begin;
-        making.least_acceleration = course.approach.acceleration;
-        course.approaches = course.approach.speed_squared < cap;
-      }
-      if (here.valley) making.least_acceleration = 0.0;
-    }
-    const ControllableSet set = rules_.before(here, segment, making, sets[k + 1]);
+    if (here.valley) making.least_acceleration = 0.0;
+    const ControllableSet set = rules_.before(here, segment, making, sets_[k + 1]);
     differs = !is_same(set, sets_[k]);
-    sets[k] = set;
-    if (here.valley && !is_slow) {
+    sets_[k] = set;
+    course.is_remade = true;
+    if (here.valley) {
       course.approaches = true;
       course.approach = {ControllableSets::steady(set), 0.0};
       course.approach_begin = here.distance - segment.half_width;
     }
+  }
+}
+
+// Those that differ from the sets that approach valleys, as far as these are not those of the plan before.
+void PathPlan::make_slow_sets() noexcept {
+  bool differs = false;     // the next one, from the other one there
+  bool is_another = false;  // than in the plan before
+  for (std::size_t k = end(); k-- > 0;) {
+    const Station& here = stations_[k];
+    if (is_another || courses_[k].is_remade || courses_[k + 1].is_remade || is_changed(k)) {
+      ControllableSet set = sets_[k];
+      if (!ends_in_stop(k) && (differs || here.valley || is_approach(k))) {
+        set = rules_.before(here, segment_of(here), making_of(k), slow_sets_[k + 1]);
+      }
+      is_another = !is_same(set, slow_sets_[k]);
+      slow_sets_[k] = set;
+    }
+    differs = !ends_in_stop(k) && !is_same(slow_sets_[k], sets_[k]);
   }
 }
 

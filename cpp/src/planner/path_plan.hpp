@@ -13,7 +13,7 @@
 namespace shapegcode {
 
 /// Sets from the end backwards; then forwards how a motion goes that keeps to them, and sets again, as exact as they
-/// can be for that motion: some rounds of it.
+/// can be for that motion: some rounds of it. What the plan before found for intervals that are the same is kept.
 class PathPlan {
  public:
   /// At most so many stations are planned; 0: as many as there are, with memory allocated for them. `max_across`:
@@ -24,6 +24,9 @@ class PathPlan {
   /// Plans from a position on, where the motion is in a state, to the end of what is known, or as far as the stations
   /// reach.
   void make(const PathStart& start, const AlongPath& state, std::uint64_t end, const FeedRatios& ratios);
+
+  /// Nothing of the plan before holds for what comes.
+  void forget() noexcept { count_ = 0; }
 
   /// Whether it ends before the end of what is known.
   [[nodiscard]] bool is_cut() const noexcept { return is_cut_; }
@@ -67,8 +70,12 @@ class PathPlan {
  private:
   void resize(std::size_t capacity);
   void make_stations();
-  enum class Round : std::uint8_t { first, exact, slow };
-  void make_sets(Round round) noexcept;
+  void keep(const Station& station, std::size_t before, std::size_t before_end) noexcept;
+  [[nodiscard]] bool is_changed(std::size_t index) const noexcept;
+  void make_sets(bool is_first) noexcept;
+  void make_slow_sets() noexcept;
+  [[nodiscard]] Making making_of(std::size_t index) const noexcept;
+  [[nodiscard]] bool is_approach(std::size_t index) const noexcept;
   void expect() noexcept;
   bool lay_tangents() noexcept;
   [[nodiscard]] double cap_at(std::size_t index) const noexcept;
@@ -89,6 +96,8 @@ class PathPlan {
     PathState expected;
     double laid = -1.0;  // the square of the speed at which its tangents were laid
     bool relaid = false;
+    bool is_kept = false;   // from the plan before
+    bool is_remade = true;  // its set, in this plan
     bool approaches = false;
     PathState approach;
     double approach_begin = 0.0;

@@ -65,6 +65,7 @@ struct Station {
   double max_acceleration = 0.0, max_jerk = 0.0;      ///< along the path: of a straight one, or of its segment
   AxisValues position{}, first{}, second{}, third{};  ///< at its begin
 
+  bool operator==(const Station&) const = default;
   [[nodiscard]] double squared_limit() const noexcept { return speed_limit * speed_limit; }
 };
 
