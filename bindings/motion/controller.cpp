@@ -25,6 +25,7 @@ namespace {
 
 using AxisLimit = std::optional<PerAxis>;
 using AxisShaper = std::variant<Shaper, Fir, Mode>;
+using AnyAxisShaper = std::variant<Shaper, Fir, Mode, std::vector<AxisShaper>>;
 using AnyShaper = std::optional<std::variant<Shaper, Fir, Mode, std::vector<AxisShaper>, FollowingFir>>;
 
 void limit_axes(Vector3& limits, const AxisLimit& given) {
@@ -39,7 +40,7 @@ Fir filter_of(const Fir& fir, double /*period_s*/) { return fir; }
 
 ControllerShaper filter_of(const FollowingFir& following, double /*period_s*/) { return following; }
 
-ControllerShaper filter_of(const std::vector<AxisShaper>& given, double period_s) {
+std::vector<Fir> filter_of(const std::vector<AxisShaper>& given, double period_s) {
   std::vector<Fir> each;
   for (const AxisShaper& one : given) {
     each.push_back(std::visit([period_s](const auto& shaper) { return filter_of(shaper, period_s); }, one));
@@ -52,6 +53,10 @@ ControllerShaper shaper_of(const AnyShaper& given, double period_s) {
   return std::visit([period_s](const auto& shaper) -> ControllerShaper { return filter_of(shaper, period_s); }, *given);
 }
 
+AxisShapers shaper_of(const AnyAxisShaper& given, double period_s) {
+  return std::visit([period_s](const auto& shaper) -> AxisShapers { return filter_of(shaper, period_s); }, given);
+}
+
 // What Python names one by one.
 PyController make_controller(double period_s, const std::optional<MotionLimits>& limits, const AxisLimit& max_feed,
                              const AxisLimit& max_acceleration, const AxisLimit& max_jerk,
@@ -60,7 +65,8 @@ PyController make_controller(double period_s, const std::optional<MotionLimits>&
                              py::ssize_t window, py::ssize_t queue, std::optional<int> lead_periods,
                              const std::vector<std::pair<double, double>>& travel, std::vector<OffsetLimits> offset,
                              std::vector<double> emergency_acceleration, double spindle_bandwidth_hz,
-                             py::ssize_t retrace_periods) {
+                             py::ssize_t retrace_periods, const std::vector<AnyAxisShaper>& other_shapers,
+                             double fade_time_s) {
   ControllerSettings settings;
   settings.period_s = period_s;
   if (limits) {
@@ -84,6 +90,8 @@ PyController make_controller(double period_s, const std::optional<MotionLimits>&
   settings.offset = std::move(offset);
   settings.emergency_acceleration = std::move(emergency_acceleration);
   settings.spindle_bandwidth_hz = spindle_bandwidth_hz;
+  for (const AnyAxisShaper& other : other_shapers) settings.other_shapers.push_back(shaper_of(other, period_s));
+  settings.fade_time_s = fade_time_s;
   settings.retrace_periods = count_of(retrace_periods, "retrace_periods");
   return PyController(settings);
 }
@@ -276,6 +284,11 @@ void register_state(py::module_& module) {
       .def_property_readonly(
           "offset", [](const PyState& self) { return axis_values(self, self.state.offset); },
           "Offset of each axis before smoothing and shaper, (n_axes,), mm or the axis' unit.")
+      .def_property_readonly(
+          "rapid_override", [](const PyState& self) { return self.state.rapid_override; }, "Ratio of the rapids.")
+      .def_property_readonly(
+          "shaper", [](const PyState& self) { return self.state.shaper; },
+          "Number of the one that acts, or that is being faded to.")
       .def("__repr__", [](const PyState& self) {
         const ControllerState& state = self.state;
         return "ControllerState(activity=" + std::string(text_of(state.activity)) +
@@ -290,7 +303,8 @@ void register_state(py::module_& module) {
                ", set_point_line=" + std::to_string(state.set_point_line) +
                ", travel_stops=" + std::to_string(state.travel_stops) +
                ", spindle_speed=" + shown(state.spindle_speed) + ", spindle_error_mm=" + shown(state.spindle_error_mm) +
-               ", offset=" + shown(axis_values(self, state.offset).attr("tolist")()) + ")";
+               ", offset=" + shown(axis_values(self, state.offset).attr("tolist")()) +
+               ", rapid_override=" + shown(state.rapid_override) + ", shaper=" + std::to_string(state.shaper) + ")";
       });
 }
 
@@ -325,6 +339,9 @@ Args:
     emergency_acceleration: What each axis can do at the most, for emergency_stop(); empty: it brakes as abort() does.
     spindle_bandwidth_hz: With which a spindle is followed.
     retrace_periods: Periods of motion that are kept for retrace().
+    other_shapers: What `shaper`, number 0, may be exchanged for in motion, numbers 1 and up: each one for all axes, or a list
+        with one for each.
+    fade_time_s: How long an exchange takes, s; what it may need of the limits, less the longer it takes, is not the path's.
 
 Raises:
     ArgumentError: A value outside its range.
@@ -403,17 +420,18 @@ void register_controller(py::module_& module) {
   register_answers(module);
   register_state(module);
   py::class_<PyController> controller(module, "MotionController", controller_doc);
-  controller.def(py::init(&make_controller), py::kw_only(), py::arg("period_s") = 0.001, py::arg("limits") = py::none(),
-                 py::arg("max_feed_mm_per_s") = py::none(), py::arg("max_acceleration_mm_per_s2") = py::none(),
-                 py::arg("max_jerk_mm_per_s3") = py::none(), py::arg("following") = py::tuple(),
-                 py::arg("contour_tolerance_mm") = ControllerSettings{}.contour_tolerance_mm,
-                 py::arg("smoothing_time_s") = ControllerSettings{}.smoothing_time_s, py::arg("shaper") = py::none(),
-                 py::arg("contour_correction") = false, py::arg("window") = ControllerSettings{}.window,
-                 py::arg("queue") = ControllerSettings{}.queue, py::arg("lead_periods") = py::none(),
-                 py::arg("travel") = py::tuple(), py::arg("offset") = py::tuple(),
-                 py::arg("emergency_acceleration") = py::tuple(),
-                 py::arg("spindle_bandwidth_hz") = ControllerSettings{}.spindle_bandwidth_hz,
-                 py::arg("retrace_periods") = 0, "ArgumentError if it is not what the class asks for.");
+  controller.def(
+      py::init(&make_controller), py::kw_only(), py::arg("period_s") = 0.001, py::arg("limits") = py::none(),
+      py::arg("max_feed_mm_per_s") = py::none(), py::arg("max_acceleration_mm_per_s2") = py::none(),
+      py::arg("max_jerk_mm_per_s3") = py::none(), py::arg("following") = py::tuple(),
+      py::arg("contour_tolerance_mm") = ControllerSettings{}.contour_tolerance_mm,
+      py::arg("smoothing_time_s") = ControllerSettings{}.smoothing_time_s, py::arg("shaper") = py::none(),
+      py::arg("contour_correction") = false, py::arg("window") = ControllerSettings{}.window,
+      py::arg("queue") = ControllerSettings{}.queue, py::arg("lead_periods") = py::none(),
+      py::arg("travel") = py::tuple(), py::arg("offset") = py::tuple(), py::arg("emergency_acceleration") = py::tuple(),
+      py::arg("spindle_bandwidth_hz") = ControllerSettings{}.spindle_bandwidth_hz, py::arg("retrace_periods") = 0,
+      py::arg("other_shapers") = py::tuple(), py::arg("fade_time_s") = ControllerSettings{}.fade_time_s,
+      "ArgumentError if it is not what the class asks for.");
   register_pushes(controller);
   controller
       .def(
@@ -507,6 +525,18 @@ Raises:
       .def(
           "rapid_override", [](PyController& self, double ratio) { self.control().rapid_override(ratio); },
           py::arg("ratio"), "The same of rapids, which the feed override leaves alone.")
+      .def(
+          "exchange_shaper",
+          [](PyController& self, std::size_t number) { return self.control().exchange_shaper(number); },
+          py::arg("number"), R"(Fades to another shaper, in motion or at rest; the limits hold.
+
+From the next period on, or when an earlier fade or a synchronous segment ends; a synchronous segment waits for it.
+
+Args:
+    number: 0: `shaper`; 1 and up: `other_shapers`.
+
+Returns:
+    False: there is no such number.)")
       .def(
           "hold", [](PyController& self) { self.control().hold(); }, "Come to rest along the path.")
       .def(

@@ -1633,6 +1633,11 @@ class ControllerState:
         Offset of each axis before smoothing and shaper, (n_axes,), mm or the axis' unit.
         """
     @property
+    def rapid_override(self) -> float:
+        """
+        Ratio of the rapids.
+        """
+    @property
     def segments_done(self) -> int:
         """
         Run to their ends.
@@ -1656,6 +1661,11 @@ class ControllerState:
     def set_point_line(self) -> int:
         """
         Likewise its line.
+        """
+    @property
+    def shaper(self) -> int:
+        """
+        Number of the one that acts, or that is being faded to.
         """
     @property
     def speed_mm_per_s(self) -> float:
@@ -1719,6 +1729,9 @@ class MotionController:
         emergency_acceleration: What each axis can do at the most, for emergency_stop(); empty: it brakes as abort() does.
         spindle_bandwidth_hz: With which a spindle is followed.
         retrace_periods: Periods of motion that are kept for retrace().
+        other_shapers: What `shaper`, number 0, may be exchanged for in motion, numbers 1 and up: each one for all axes, or a list
+            with one for each.
+        fade_time_s: How long an exchange takes, s; what it may need of the limits, less the longer it takes, is not the path's.
     
     Raises:
         ArgumentError: A value outside its range.
@@ -1726,7 +1739,7 @@ class MotionController:
     
     Source: this project, as time_optimal_trajectory.
     """
-    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limits: MotionLimits | None = None, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, following: collections.abc.Sequence[FollowingLimits] = (), contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = 0.05, smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, shaper: Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode] | FollowingFir | None = None, contour_correction: bool = False, window: typing.SupportsInt | typing.SupportsIndex = 128, queue: typing.SupportsInt | typing.SupportsIndex = 1024, lead_periods: typing.SupportsInt | typing.SupportsIndex | None = None, travel: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = (), offset: collections.abc.Sequence[OffsetLimits] = (), emergency_acceleration: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = (), spindle_bandwidth_hz: typing.SupportsFloat | typing.SupportsIndex = 20.0, retrace_periods: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limits: MotionLimits | None = None, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, following: collections.abc.Sequence[FollowingLimits] = (), contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = 0.05, smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, shaper: Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode] | FollowingFir | None = None, contour_correction: bool = False, window: typing.SupportsInt | typing.SupportsIndex = 128, queue: typing.SupportsInt | typing.SupportsIndex = 1024, lead_periods: typing.SupportsInt | typing.SupportsIndex | None = None, travel: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = (), offset: collections.abc.Sequence[OffsetLimits] = (), emergency_acceleration: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = (), spindle_bandwidth_hz: typing.SupportsFloat | typing.SupportsIndex = 20.0, retrace_periods: typing.SupportsInt | typing.SupportsIndex = 0, other_shapers: collections.abc.Sequence[Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode]] = (), fade_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> None:
         """
         ArgumentError if it is not what the class asks for.
         """
@@ -1737,6 +1750,18 @@ class MotionController:
     def emergency_stop(self) -> None:
         """
         Come to rest along the path with all that `emergency_acceleration` allows, whatever the jerk; then as abort().
+        """
+    def exchange_shaper(self, number: typing.SupportsInt | typing.SupportsIndex) -> bool:
+        """
+        Fades to another shaper, in motion or at rest; the limits hold.
+        
+        From the next period on, or when an earlier fade or a synchronous segment ends; a synchronous segment waits for it.
+        
+        Args:
+            number: 0: `shaper`; 1 and up: `other_shapers`.
+        
+        Returns:
+            False: there is no such number.
         """
     def feed_override(self, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """

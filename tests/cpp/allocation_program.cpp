@@ -77,6 +77,7 @@ class ProgramRun {
       plan();
       control_.offset(part % 3, 0.01 * part);
       control_.rapid_override(0.5 + 0.01 * part);
+      control_.exchange_shaper(part % 2);
       control_.travel(part % 3, {-500.0 - part, 500.0});
       steps += step(10);
     }
@@ -118,7 +119,8 @@ class ProgramRun {
     settings.limits.max_acceleration_mm_per_s2.setConstant(2000.0);
     settings.limits.max_jerk_mm_per_s3.setConstant(50000.0);
     settings.shaper = Fir({0, 11}, {0.516, 0.484});
-    settings.contour_correction = true;
+    settings.other_shapers = {Fir({0, 16}, {0.5, 0.5})};
+    settings.limits.max_feed_mm_per_s.setConstant(300.0);
     settings.plans_in_step = false;
     settings.window = 16;
     settings.queue = 32;

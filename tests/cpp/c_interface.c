@@ -325,6 +325,50 @@ static void refused_settings(void) {
   CHECK(shapegcode_settings_destroy(NULL) == SHAPEGCODE_OK);
 }
 
+/* A shaper that is exchanged in motion: twice the delay, no jump. */
+static void other_shapers(void) {
+  static const int32_t delays[2] = {0, 20};
+  static const int32_t later[2] = {0, 40};
+  static const double taps[2] = {0.5, 0.5};
+  const shapegcode_shaper first = {delays, taps, 2};
+  const shapegcode_shaper second = {later, taps, 2};
+  const shapegcode_shaper no_taps = {delays, NULL, 2};
+  const double end[3] = {100, 0, 0};
+  shapegcode_settings* settings = plain_settings();
+  shapegcode_controller* control;
+  double set_point[3];
+  double before = 0.0;
+  double delay;
+  int step;
+  for (step = 0; step < 3; ++step) {
+    CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_MAX_FEED, step, 200.0) == SHAPEGCODE_OK);
+  }
+  CHECK(shapegcode_settings_set_shaper(settings, -1, &first) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_add_shapers(settings, &second, 0) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(shapegcode_settings_add_shapers(settings, &no_taps, 1) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_settings_add_shapers(NULL, &second, 1) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_settings_add_shapers(settings, &second, 1) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_FADE_TIME_S, 0.4) == SHAPEGCODE_OK);
+  control = made(settings);
+  CHECK(shapegcode_controller_delay(control, &delay) == SHAPEGCODE_OK && delay == 10.0);
+  CHECK(shapegcode_controller_push_line(control, end, 50.0, NULL) == SHAPEGCODE_OK);
+  for (step = 0; step < 1500; ++step) {
+    CHECK(shapegcode_controller_step(control, set_point, NULL) == SHAPEGCODE_OK);
+    CHECK(fabs(set_point[0] - before) < 0.055);
+    before = set_point[0];
+    if (step == 600) {
+      CHECK(shapegcode_controller_exchange_shaper(control, -1) == SHAPEGCODE_ERROR_ARGUMENT);
+      CHECK(shapegcode_controller_exchange_shaper(control, 2) == SHAPEGCODE_ERROR_ARGUMENT);
+      CHECK(shapegcode_controller_exchange_shaper(NULL, 1) == SHAPEGCODE_ERROR_NULL);
+      CHECK(shapegcode_controller_exchange_shaper(control, 1) == SHAPEGCODE_OK);
+      CHECK(state_of(control).shaper == 0);
+    }
+  }
+  CHECK(state_of(control).shaper == 1 && state_of(control).rapid_override == 1.0);
+  CHECK(shapegcode_controller_delay(control, &delay) == SHAPEGCODE_OK && delay == 20.0);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
 /* A thread, an axis by hand, an offset, soft limits, an emergency stop. */
 static void beside_the_path(void) {
   shapegcode_settings* settings = plain_settings();
@@ -456,6 +500,7 @@ int main(void) {
   arcs();
   following_axis();
   beside_the_path();
+  other_shapers();
   abort_and_restart();
   full_queue();
   if (failures == 0) printf("the C interface does what its header says\n");

@@ -38,6 +38,11 @@ ControllerSettings settings_of(std::uint32_t seed) {
     settings.smoothing_time_s = 0.008;
     settings.shaper = Fir({0, 7, 15}, {0.3, 0.4, 0.3});
   }
+  if (seed % 5 == 0) {
+    settings.other_shapers = {Fir({0, 22}, {0.5, 0.5}),
+                              std::vector<Fir>(axis_count, Fir({0, 6, 12}, {1.0, -1.0, 1.0}))};
+    settings.fade_time_s = 0.5;
+  }
   return settings;
 }
 
@@ -52,7 +57,11 @@ double distance_to(const Eigen::Vector3d& point, const Eigen::Vector3d& begin, c
 }  // namespace
 
 OperatorSession::OperatorSession(std::uint32_t seed)
-    : draw_{std::mt19937(seed)}, plans_(seed % 2 == 0), offsets_(seed % 4 == 3), control_(settings_of(seed)) {
+    : draw_{std::mt19937(seed)},
+      plans_(seed % 2 == 0),
+      offsets_(seed % 4 == 3),
+      exchanges_(seed % 5 == 0),
+      control_(settings_of(seed)) {
   rows_.push_back({});
 }
 
@@ -184,7 +193,10 @@ void OperatorSession::operate() {
     move_by_hand();
   } else if (kind < 0.0335) {
     emergency_stop();
-  } else if (kind < 0.0355 && offsets_) {
+  } else if (kind < 0.0375 && exchanges_) {
+    const auto number = static_cast<std::size_t>(draw_.between(0.0, 4.0));
+    expect(control_.exchange_shaper(number) == (number < 3), "a shaper that is none was taken, or one was not");
+  } else if (kind < 0.0395 && offsets_) {
     control_.offset(static_cast<int>(draw_.between(0.0, 3.0)), draw_.between(-2.0, 2.0));
   }
 }

@@ -38,7 +38,7 @@ class OperatorSession {
   void expect(bool holds, const std::string& what);
 
   Draw draw_;
-  bool plans_, offsets_;
+  bool plans_, offsets_, exchanges_;
   MotionController control_;
   std::vector<Point> rows_;
   Point at_{};

@@ -44,6 +44,7 @@ ControllerSettings settings_of(std::uint32_t session) {
   settings.lead_periods = session % 8 < 4 ? 20 : 200;
   if (session % 2 == 0) settings.offset.resize(3 + settings.following.size(), {10.0, 100.0, 5'000.0, 0.01});
   settings.retrace_periods = 200;
+  if (session % 2 == 1) settings.other_shapers = {Fir({0, 30}, {0.5, 0.5})};
   settings.queue = 66;  // small: pushing waits for stepping, and places are used again and again
   return settings;
 }
@@ -52,7 +53,10 @@ ControllerSettings settings_of(std::uint32_t session) {
 void operate(MotionController& control, std::mt19937& draw) {
   const int axis = static_cast<int>(draw() % 3);
   const double size = 0.01 * static_cast<double>(draw() % 1001) - 5.0;
-  switch (draw() % 9) {
+  switch (draw() % 10) {
+    case 7:
+      control.exchange_shaper(draw() % 3);
+      break;
     case 0:
       control.hold();
       break;

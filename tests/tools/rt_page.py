@@ -158,6 +158,11 @@ TESTS = {
     "rapids": HeldBy(
         "python/test_spindle_feed.py", "test_rapids_have_an_override_of_their_own", "rapids and their override"
     ),
+    "exchange": HeldBy(
+        "python/test_shaper_exchange.py",
+        "test_limits_hold_whenever_they_are_exchanged",
+        "limits while a shaper is exchanged",
+    ),
     "thread": HeldBy(
         "python/test_spindle_feed.py",
         "test_a_thread_keeps_its_pitch",
@@ -212,6 +217,12 @@ CALLS = (
     ),
     Call(("feed_override",), "any", "a word", ("allocation", "threads", "override", "random")),
     Call(("rapid_override",), "any", "a word", ("by hand", "threads", "rapids")),
+    Call(
+        ("exchange_shaper",),
+        "any",
+        "a word; every step runs all shapers of the settings",
+        ("by hand", "threads", "exchange", "sessions"),
+    ),
     Call(("spindle",), "the real-time one", "two filters of third order", ("by hand", "thread")),
     Call(
         ("jog", "jog_by"),

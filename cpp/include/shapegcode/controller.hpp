@@ -59,6 +59,8 @@ struct OffsetLimits {
 
 /// Shapers of a control: one for all axes, one for each, or a set followed along an axis (of X, Y, Z).
 using ControllerShaper = std::variant<Fir, std::vector<Fir>, FollowingFir>;
+/// Those of them that another one may be exchanged for.
+using AxisShapers = std::variant<Fir, std::vector<Fir>>;
 
 /// What a control is made of. Speeds, accelerations and jerks that are finite are kept by the set-points that leave it.
 struct ControllerSettings {
@@ -77,6 +79,11 @@ struct ControllerSettings {
   /// One that follows an axis is read in front of the smoothing. Its changes take up to a quarter of acceleration and
   /// jerk, and limit the feed where that would not be enough.
   ControllerShaper shaper = Fir({0}, {1.0});
+  /// What `shaper` (number 0, one for all axes or one for each) may be exchanged for in motion, numbers 1 and up, and
+  /// how long that takes: it is faded from one to the other. Limits and tolerance hold meanwhile; what the fade may
+  /// need of the limits, less the longer it takes, is not the path's. Not beside a contour correction.
+  std::vector<AxisShapers> other_shapers;
+  double fade_time_s = 0.5;
   /// Take back, to the second order, what smoothing and shaper cut off arcs. Costs `correction_delay()` periods, and of
   /// every limit what the correction may need for itself.
   bool contour_correction = false;
@@ -179,6 +186,7 @@ struct ControllerState {
   double speed_mm_per_s = 0.0;                          ///< along the path, before smoothing and shaper
   double distance_mm = 0.0;                             ///< since the last rest
   double feed_override = 1.0;
+  double rapid_override = 1.0;
   std::uint64_t segments_done = 0;  ///< run to their ends
   std::uint64_t segments_waiting = 0;
   std::uint64_t steps = 0;
@@ -190,6 +198,7 @@ struct ControllerState {
   double spindle_speed = 0.0;          ///< revolutions per s
   double spindle_error_mm = 0.0;       ///< of a synchronous segment: the motion less what the angle asks for
   std::array<double, max_controller_axes> offset{};  ///< of the axes, before smoothing and shaper
+  std::uint64_t shaper = 0;                          ///< number of the one that acts, or that is being faded to
 };
 
 /// A path that grows while it is run: look-ahead over a window of segments, motion nearly as fast as the limits of the
@@ -280,13 +289,18 @@ class MotionController {
   /// stop that is planned. From any thread. False: there is no such axis, or `low` is above `high`.
   bool travel(int axis, const AxisTravel& travel) noexcept;
 
+  /// Fades to one of the settings' shapers, from the next period on, or when an earlier fade or a synchronous segment
+  /// ends; a synchronous segment waits for it. From any thread. False: there is no such number.
+  bool exchange_shaper(std::size_t number) noexcept;
+
   /// At rest at a position (axes() values), the queue empty. Not while another thread pushes or steps. False, and
   /// nothing is changed: a value is not finite.
   bool restart(std::span<const double> position) noexcept;
 
   [[nodiscard]] ControllerState state() const noexcept;
   [[nodiscard]] int axes() const noexcept;
-  /// Periods by which set-points lag behind the profile: mean delay of jerk time, correction, smoothing and shaper.
+  /// Periods by which set-points lag behind the profile: mean delay of correction, smoothing and the shaper that was
+  /// asked for last.
   [[nodiscard]] double delay_periods() const noexcept;
   /// Periods of that which are the correction's.
   [[nodiscard]] int correction_delay() const noexcept;

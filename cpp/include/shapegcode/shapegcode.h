@@ -30,7 +30,7 @@ extern "C" {
 #endif
 
 /// Version of this interface: 1000 times the major one, by which it breaks, and the minor one, by which it grows.
-#define SHAPEGCODE_C_VERSION 1000
+#define SHAPEGCODE_C_VERSION 1001
 
 /// The version that the library was built with.
 int shapegcode_c_version(void);
@@ -113,7 +113,8 @@ typedef enum shapegcode_number {
   SHAPEGCODE_POLYLINE_ACCELERATION = 17,
   SHAPEGCODE_ARC_FEED_RATIO = 18,        ///< feed on arcs relative to the programmed one
   SHAPEGCODE_SPINDLE_BANDWIDTH_HZ = 19,  ///< with which a spindle is followed
-  SHAPEGCODE_RETRACE_PERIODS = 20        ///< periods of motion that are kept for retrace
+  SHAPEGCODE_RETRACE_PERIODS = 20,       ///< periods of motion that are kept for retrace
+  SHAPEGCODE_FADE_TIME_S = 21            ///< from one shaper to another that it is exchanged for
 } shapegcode_number;
 
 /// A number of an axis, in its unit (mm or degrees) and s.
@@ -156,6 +157,11 @@ shapegcode_status shapegcode_settings_set_axis(shapegcode_settings* settings, in
 shapegcode_status shapegcode_settings_set_shaper(shapegcode_settings* settings, int axis,
                                                  const shapegcode_shaper* shaper);
 
+/// What the shaper, number 0, may be exchanged for in motion, numbers 1 and up in the order in which they are added:
+/// one shaper for all axes (`count` 1), or one for each; copied.
+shapegcode_status shapegcode_settings_add_shapers(shapegcode_settings* settings, const shapegcode_shaper* shapers,
+                                                  size_t count);
+
 /// Shapers for all axes, each valid where `axis` (0 to 2) is at its position, mm, ascending; copied.
 shapegcode_status shapegcode_settings_set_following_shaper(shapegcode_settings* settings, int axis,
                                                            const double* positions_mm, const shapegcode_shaper* shapers,
@@ -181,6 +187,8 @@ typedef struct shapegcode_state {
   double spindle_speed;          ///< revolutions per s
   double spindle_error_mm;       ///< of a synchronous segment: the motion less what the angle asks for
   double offset[SHAPEGCODE_MOST_AXES];  ///< of the axes, before smoothing and shaper
+  uint64_t shaper;                      ///< number of the one that acts, or that is being faded to
+  double rapid_override;
 } shapegcode_state;
 
 /// A control. One thread may push, one may step, one may plan, any may call the rest but create, destroy and restart.
@@ -283,6 +291,10 @@ shapegcode_status shapegcode_controller_feed_override(shapegcode_controller* con
 
 /// The same of rapids, which the feed override leaves alone. One that is 0 stops a motion that it acts on.
 shapegcode_status shapegcode_controller_rapid_override(shapegcode_controller* controller, double ratio);
+
+/// Fades to a shaper of the settings by its number, from the next period on, or when an earlier fade or a synchronous
+/// segment ends; a synchronous segment waits for it. From any thread.
+shapegcode_status shapegcode_controller_exchange_shaper(shapegcode_controller* controller, int number);
 
 /// Where the spindle is in this period, in revolutions that go on counting; from the thread that steps, in front of
 /// every step.

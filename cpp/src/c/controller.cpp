@@ -320,6 +320,12 @@ shapegcode_status shapegcode_controller_rapid_override(shapegcode_controller* co
   return SHAPEGCODE_OK;
 }
 
+shapegcode_status shapegcode_controller_exchange_shaper(shapegcode_controller* controller, int number) {
+  if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
+  const bool is_one = number >= 0 && controller->control.exchange_shaper(static_cast<std::size_t>(number));
+  return is_one ? SHAPEGCODE_OK : SHAPEGCODE_ERROR_ARGUMENT;
+}
+
 shapegcode_status shapegcode_controller_spindle(shapegcode_controller* controller, double revolutions) {
   if (controller == nullptr) return SHAPEGCODE_ERROR_NULL;
   controller->control.spindle(revolutions);
@@ -439,6 +445,8 @@ shapegcode_status shapegcode_controller_state(const shapegcode_controller* contr
   all.spindle_speed = now.spindle_speed;
   all.spindle_error_mm = now.spindle_error_mm;
   std::ranges::copy(now.offset, all.offset);
+  all.shaper = now.shaper;
+  all.rapid_override = now.rapid_override;
   std::memcpy(state, &all, struct_size);
   return SHAPEGCODE_OK;
 }

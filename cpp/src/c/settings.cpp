@@ -55,6 +55,8 @@ double* double_of(ControllerSettings& control, int number) noexcept {
       return &control.limits.arc_feed_ratio;
     case SHAPEGCODE_SPINDLE_BANDWIDTH_HZ:
       return &control.spindle_bandwidth_hz;
+    case SHAPEGCODE_FADE_TIME_S:
+      return &control.fade_time_s;
     default:
       return nullptr;
   }
@@ -254,6 +256,24 @@ shapegcode_status shapegcode_settings_set_shaper(shapegcode_settings* settings, 
       settings->control.shaper = fir_of(*shaper);
     } else {
       settings->axes[static_cast<std::size_t>(axis)].shaper = fir_of(*shaper);
+    }
+  });
+}
+
+shapegcode_status shapegcode_settings_add_shapers(shapegcode_settings* settings, const shapegcode_shaper* shapers,
+                                                  size_t count) {
+  if (settings == nullptr || shapers == nullptr) return SHAPEGCODE_ERROR_NULL;
+  const std::span given(shapers, count);
+  if (!std::ranges::all_of(given, is_whole)) return SHAPEGCODE_ERROR_NULL;
+  if (count == 0) return SHAPEGCODE_ERROR_ARGUMENT;
+  return status_of_setting([&] {
+    std::vector<shapegcode::Fir> each;
+    for (const shapegcode_shaper& shaper : given) each.push_back(fir_of(shaper));
+    auto& others = settings->control.other_shapers;
+    if (count == 1) {
+      others.emplace_back(each.front());
+    } else {
+      others.emplace_back(std::move(each));
     }
   });
 }

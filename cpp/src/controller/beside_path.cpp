@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "controller/settings.hpp"
+
 namespace shapegcode {
 namespace {
 
@@ -193,11 +195,14 @@ void Jog::add_to(AxisValues& position, AxisValues& velocity, AxisValues& acceler
   add_trackers(axes_, position, velocity, acceleration);
 }
 
-ExternalOffset::ExternalOffset(const ControllerSettings& settings, double gain) {
-  for (const OffsetLimits& offset : settings.offset) {
+ExternalOffset::ExternalOffset(const ControllerSettings& settings, const SetPointFilters& filters) {
+  for (std::size_t i = 0; i < settings.offset.size(); ++i) {
+    const OffsetLimits& offset = settings.offset[i];
+    const InputShare share = input_share(settings, filters, i);
     // As of a motion: no more than what changes the acceleration within a period.
     const double jerk = std::min(offset.max_jerk, offset.max_acceleration / settings.period_s);
-    const TrackerLimits limits{offset.max_feed / gain, offset.max_acceleration / gain, jerk / gain};
+    const TrackerLimits limits{offset.max_feed * share.speed, offset.max_acceleration * share.acceleration,
+                               jerk * share.jerk};
     axes_.push_back({AxisTracker(settings.period_s), limits, offset.backlash});
   }
 }

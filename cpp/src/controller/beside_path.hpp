@@ -14,6 +14,8 @@
 
 namespace shapegcode {
 
+class SetPointFilters;
+
 /// What an axis may be at, as any thread sets it.
 class SoftLimits {
  public:
@@ -88,7 +90,7 @@ class Jog {
 class ExternalOffset {
  public:
   /// `gain`: of the filters behind.
-  ExternalOffset(const ControllerSettings& settings, double gain);
+  ExternalOffset(const ControllerSettings& settings, const SetPointFilters& filters);
   [[nodiscard]] bool is_none() const noexcept { return axes_.empty(); }
   bool set(std::size_t axis, double value) noexcept;
   /// One period on; `position` is that of the path and the jog.

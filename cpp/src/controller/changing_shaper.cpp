@@ -5,13 +5,6 @@
 #include <cstddef>
 
 namespace shapegcode {
-namespace {
-
-double tap_of(const Fir& chain, std::size_t delay) noexcept {
-  return delay < chain.taps().size() ? chain.taps()[delay] : 0.0;
-}
-
-}  // namespace
 
 ChangeCost cost_of_change(std::span<const Fir> chains, std::span<const double> position_mm, double period_s,
                           double fastest_mm_per_s) {

@@ -8,6 +8,11 @@
 
 namespace shapegcode {
 
+/// Of a chain with a tap at every delay.
+[[nodiscard]] inline double tap_of(const Fir& chain, std::size_t delay) noexcept {
+  return delay < chain.taps().size() ? chain.taps()[delay] : 0.0;
+}
+
 /// An increment keeps the filter of the position where it begins. So an axis of speed v has, behind filters h(x) that
 /// change along the path x, besides the response to its own acceleration one to v dx/dt with the taps dh/dx: at most
 /// `acceleration_per_mm` v dx/dt, and of jerk `jerk_per_mm_s` v dx/dt and `acceleration_per_mm` dx/dt times the

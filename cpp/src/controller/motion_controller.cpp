@@ -105,8 +105,8 @@ class MotionController::Implementation {
         travel_(settings),
         retrace_(settings.retrace_periods, planned_limits(rules_.limits, settings.period_s), settings.period_s),
         jog_(settings, planned_limits(rules_.limits, settings.period_s), travel_),
-        offset_(settings, filters_.gain()),
-        brake_(emergency_of(settings, filters_.gain()), axes(), settings.period_s),
+        offset_(settings, filters_),
+        brake_(emergency_of(settings, filters_), axes(), settings.period_s),
         brakes_(!settings.emergency_acceleration.empty()),
         spindle_(settings.spindle_bandwidth_hz, settings.period_s, filters_.mean_samples() * settings.period_s),
         spindle_feed_(planned_limits(rules_.limits, settings.period_s), settings.period_s),
@@ -270,6 +270,12 @@ class MotionController::Implementation {
     return true;
   }
 
+  bool exchange_shaper(std::size_t number) noexcept {
+    if (number >= filters_.shapers()) return false;
+    shaper_.store(number, std::memory_order_relaxed);
+    return true;
+  }
+
   bool restart(std::span<const double> position) noexcept {
     if (!std::ranges::all_of(position, [](double value) { return std::isfinite(value); })) return false;
     hold_.store(false, std::memory_order_relaxed);
@@ -293,7 +299,9 @@ class MotionController::Implementation {
 
   [[nodiscard]] ControllerState state() const noexcept { return shared_.read(); }
   [[nodiscard]] std::size_t axes() const noexcept { return axis_count + n_following_; }
-  [[nodiscard]] double delay_periods() const noexcept { return filters_.mean_samples(); }
+  [[nodiscard]] double delay_periods() const noexcept {
+    return filters_.mean_samples(shaper_.load(std::memory_order_relaxed));
+  }
   [[nodiscard]] int correction_delay() const noexcept { return filters_.correction_samples(); }
 
  private:
@@ -344,7 +352,7 @@ class MotionController::Implementation {
     is_bound_ = true;
     const bool brakes =
         abort_.load(std::memory_order_relaxed) || flush_.load(std::memory_order_relaxed) == Flush::asked;
-    spindle_feed_.step(spindle_, is_settled() && !is_stopping() && !is_beside_, brakes);
+    spindle_feed_.step(spindle_, is_settled() && !is_stopping() && !is_beside_ && !fades_, brakes);
     if (spindle_feed_.is_lost()) abort_.store(true, std::memory_order_relaxed);
     if (spindle_feed_.at_end()) {
       sections.pass();
@@ -414,7 +422,15 @@ class MotionController::Implementation {
     offset_.step(position);
     offset_.add_to(position, velocity, acceleration);
     set_values(position, velocity, acceleration);
+    // What is bound to the spindle has begun with the delay of its shaper.
+    const bool fades =
+        (!is_bound_ || spindle_feed_.waits()) && filters_.choose(shaper_.load(std::memory_order_relaxed));
     filters_.step(values_);
+    if (fades || fades_) {
+      delay_ = static_cast<std::size_t>(std::lround(filters_.mean_samples()));
+      spindle_.set_ahead(filters_.mean_samples() * period_s_);
+    }
+    fades_ = fades;
   }
 
   // Between flush() and flushed() what is planned is not looked at.
@@ -536,6 +552,7 @@ class MotionController::Implementation {
     state_.speed_mm_per_s = point.point.state.speed;
     state_.distance_mm = point.distance;
     state_.feed_override = override_.load(std::memory_order_relaxed);
+    state_.rapid_override = rapid_override_.load(std::memory_order_relaxed);
     state_.line = point.line;
     state_.spindle_speed = spindle_.smooth().speed;
     state_.spindle_error_mm = is_bound_ ? spindle_feed_.error_mm() : 0.0;
@@ -545,6 +562,7 @@ class MotionController::Implementation {
     state_.set_point_distance_mm = behind.distance_mm;
     state_.set_point_line = behind.line;
     for (std::size_t i = 0; i < axes(); ++i) state_.offset[i] = offset_.of(i);
+    state_.shaper = filters_.shaper();
     shared_.write(state_);
   }
 
@@ -577,6 +595,7 @@ class MotionController::Implementation {
   std::atomic<bool> hold_{false};
   std::atomic<bool> abort_{false};
   std::atomic<bool> emergency_{false};
+  std::atomic<std::size_t> shaper_{0};
   std::atomic<bool> stops_beside_{false};
   std::atomic<bool> settled_{true};
   std::atomic<Flush> flush_{Flush::none};
@@ -592,7 +611,7 @@ class MotionController::Implementation {
   bool runs_out_ = false;
   int rest_periods_ = 0, still_periods_ = 0;
   bool is_measured_ = false;  // the spindle, for this period
-  bool is_braked_ = false, is_bound_ = false, is_beside_ = false;
+  bool is_braked_ = false, is_bound_ = false, is_beside_ = false, fades_ = false;
   std::vector<double> values_;  // as the filters have them
   double period_s_;
   struct Event {
@@ -663,6 +682,7 @@ bool MotionController::travel(int axis, const AxisTravel& travel) noexcept {
 bool MotionController::restart(std::span<const double> position) noexcept { return implementation_->restart(position); }
 ControllerState MotionController::state() const noexcept { return implementation_->state(); }
 int MotionController::axes() const noexcept { return static_cast<int>(implementation_->axes()); }
+bool MotionController::exchange_shaper(std::size_t number) noexcept { return implementation_->exchange_shaper(number); }
 double MotionController::delay_periods() const noexcept { return implementation_->delay_periods(); }
 int MotionController::correction_delay() const noexcept { return implementation_->correction_delay(); }
 

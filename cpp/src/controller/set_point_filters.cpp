@@ -23,16 +23,35 @@ Fir scaled_to_one(const Fir& fir) {
   return Fir(fir.delays(), std::move(taps));
 }
 
-// The shapers that may act on any axis.
-std::vector<Fir> shapers_of(const ControllerSettings& settings, int n_axes) {
-  if (const auto* one = std::get_if<Fir>(&settings.shaper)) return {scaled_to_one(*one)};
-  if (const auto* following = std::get_if<FollowingFir>(&settings.shaper)) return following->fir().set();
-  std::vector<Fir> each = std::get<std::vector<Fir>>(settings.shaper);
+// Shapers that are chosen from: the derivatives of what turns one into the other in a time of 1, at their largest.
+constexpr double fade_first = 1.875;
+constexpr double fade_second = 5.7736;
+constexpr double fade_third = 60.0;
+// Places of a fade where it is looked at.
+constexpr int fade_places = 8;
+
+// One shaper for all axes, or one for each.
+template <typename Shapers>
+std::vector<Fir> each_of(const Shapers& shapers, int n_axes) {
+  if (const auto* one = std::get_if<Fir>(&shapers)) return {scaled_to_one(*one)};
+  std::vector<Fir> each = std::get<std::vector<Fir>>(shapers);
   if (each.size() != static_cast<std::size_t>(n_axes)) {
     detail::refuse("{} shapers for {} axes: one for all, or one for each", each.size(), n_axes);
   }
   for (Fir& fir : each) fir = scaled_to_one(fir);
   return each;
+}
+
+// The shapers that may act on any axis.
+std::vector<Fir> shapers_of(const ControllerSettings& settings, int n_axes) {
+  if (const auto* following = std::get_if<FollowingFir>(&settings.shaper)) return following->fir().set();
+  return each_of(settings.shaper, n_axes);
+}
+
+double largest_mean(const std::vector<Fir>& chains) {
+  double mean = 0.0;
+  for (const Fir& chain : chains) mean = std::max(mean, chain.mean_samples());
+  return mean;
 }
 
 // The second difference over `delay` samples, scaled so that an arc comes out of both with its own radius.
@@ -64,7 +83,7 @@ void SetPointFilters::AxisFilters::step(std::span<double> values) noexcept {
 }
 
 SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
-    : rest_(values(static_cast<std::size_t>(n_axes))) {
+    : period_s_(settings.period_s), rest_(values(static_cast<std::size_t>(n_axes))) {
   require_not_below_zero(settings.smoothing_time_s, "smoothing time", "s");
   const double periods = std::round(settings.smoothing_time_s / settings.period_s);
   const auto length =
@@ -94,6 +113,7 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
     chain_.emplace_back(corrections, n_axes);
   }
   for (const Fir& chain : chains) measure(chain, settings.period_s);
+  means_ = {largest_mean(chains)};
   if (length > 1) {
     chain_.emplace_back(std::vector{average}, n_axes);
     chain_.emplace_back(std::vector{average}, n_axes);
@@ -102,8 +122,56 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
     const double fastest = settings.limits.max_feed_mm_per_s[following_->axis()];
     change_ = cost_of_change(chains, following_->position_mm(), settings.period_s, fastest);
     gain_ = std::max(gain_, change_.gain);
-  } else {
+  } else if (settings.other_shapers.empty()) {
     chain_.emplace_back(shapers, n_axes);
+  } else {
+    shapers_.emplace_back(shapers, n_axes);
+  }
+  if (!settings.other_shapers.empty()) add_others(settings, smoothing, std::move(chains), n_axes);
+}
+
+void SetPointFilters::add_others(const ControllerSettings& settings, const Fir& smoothing, std::vector<Fir> first,
+                                 int n_axes) {
+  if (following_) detail::refuse("shapers to exchange beside one that follows an axis");
+  if (settings.contour_correction) detail::refuse("shapers to exchange beside a contour correction");
+  require_above_zero(settings.fade_time_s, "time of a fade", "s");
+  fade_s_ = settings.fade_time_s;
+  std::vector<std::vector<Fir>> sets{std::move(first)};
+  for (const AxisShapers& other : settings.other_shapers) {
+    const std::vector<Fir> shapers = each_of(other, n_axes);
+    shapers_.emplace_back(shapers, n_axes);
+    std::vector<Fir> chains;
+    for (const Fir& shaper : shapers) chains.push_back(convolved(smoothing, shaper));
+    for (const Fir& chain : chains) measure(chain, settings.period_s);
+    means_.push_back(largest_mean(chains));
+    for (const std::vector<Fir>& set : sets) measure_fade(set, chains, settings.period_s);
+    sets.push_back(std::move(chains));
+  }
+  outputs_.assign(shapers_.size(), std::vector<double>(rest_.size()));
+  cost_of_fade_.first = fade_first / fade_s_;
+  cost_of_fade_.second = fade_second / (fade_s_ * fade_s_);
+  cost_of_fade_.third = fade_third / (fade_s_ * fade_s_ * fade_s_);
+}
+
+// Of an axis' outputs y1 and y2 the difference is what comes in, differenced, through the sum of what the taps differ
+// by. On the way from one to the other both act, each with its share.
+void SetPointFilters::measure_fade(const std::vector<Fir>& one, const std::vector<Fir>& other, double period_s) {
+  for (std::size_t i = 0; i < std::max(one.size(), other.size()); ++i) {
+    const Fir& from = one[one.size() == 1 ? 0 : i];
+    const Fir& to = other[other.size() == 1 ? 0 : i];
+    const std::size_t count = std::max(from.taps().size(), to.taps().size());
+    std::vector<int> delays(count);
+    std::iota(delays.begin(), delays.end(), 0);
+    double sum = 0.0;
+    double apart = 0.0;
+    for (std::size_t k = 0; k < count; ++k) apart += std::abs(sum += tap_of(to, k) - tap_of(from, k));
+    cost_of_fade_.apart_s = std::max(cost_of_fade_.apart_s, apart * period_s);
+    for (int place = 1; place < fade_places; ++place) {
+      const double share = static_cast<double>(place) / fade_places;
+      std::vector<double> taps(count);
+      for (std::size_t k = 0; k < count; ++k) taps[k] = (1.0 - share) * tap_of(from, k) + share * tap_of(to, k);
+      measure(Fir(delays, std::move(taps)), period_s);
+    }
   }
 }
 
@@ -117,7 +185,6 @@ void SetPointFilters::measure(const Fir& chain, double period_s) {
     deviation += std::abs(taps[k]) * std::abs(static_cast<double>(k) - mean);
   }
   duration_ = std::max(duration_, static_cast<int>(taps.size()) - 1);
-  mean_ = std::max(mean_, mean);
   if (gain > 1.0 + tap_rounding) gain_ = std::max(gain_, gain);
   // After the correction rounding may leave less than nothing.
   const double variance = correction_delay_ > 0 ? 0.0 : chain.variance_samples2();
@@ -129,6 +196,9 @@ void SetPointFilters::reset(std::span<const double> position) noexcept {
   std::ranges::fill(rest_, 0.0);
   std::ranges::copy(position, rest_.begin());
   for (AxisFilters& filters : chain_) filters.reset(rest_);
+  for (AxisFilters& filters : shapers_) filters.reset(rest_);
+  from_ = to_;
+  fade_ = {};
   for (VaryingFirStream& varying : varying_) varying.reset(rest_);
   if (following_) followed_mm_ = position[static_cast<std::size_t>(following_->axis())];
 }
@@ -141,6 +211,45 @@ void SetPointFilters::step(std::span<double> values) noexcept {
     followed_mm_ = now_mm;
   }
   for (AxisFilters& filters : chain_) filters.step(values);
+  if (!shapers_.empty()) step_shapers(values);
+}
+
+bool SetPointFilters::choose(std::size_t shaper) noexcept {
+  if (from_ != to_) return true;
+  to_ = shaper;
+  faded_s_ = 0.0;
+  return from_ != to_;
+}
+
+void SetPointFilters::step_shapers(std::span<double> values) noexcept {
+  for (std::size_t i = 0; i < shapers_.size(); ++i) {
+    std::ranges::copy(values, outputs_[i].begin());
+    shapers_[i].step(outputs_[i]);
+  }
+  if (from_ != to_) {
+    faded_s_ += period_s_;
+    if (faded_s_ >= fade_s_) {
+      from_ = to_;
+      fade_ = {};
+    } else {
+      const double u = faded_s_ / fade_s_;
+      const double rest = 1.0 - u;
+      fade_ = {u * u * u * (10.0 + u * (-15.0 + 6.0 * u)), 30.0 * u * u * rest * rest / fade_s_,
+               60.0 * u * rest * (rest - u) / (fade_s_ * fade_s_)};
+    }
+  }
+  const std::size_t n = values.size() / orders;
+  const std::vector<double>& one = outputs_[from_];
+  const std::vector<double>& other = outputs_[to_];
+  for (std::size_t i = 0; i < n; ++i) {
+    const double position = other[i] - one[i];
+    const double velocity = other[n + i] - one[n + i];
+    const double acceleration = other[2 * n + i] - one[2 * n + i];
+    values[i] = one[i] + fade_.value * position;
+    values[n + i] = one[n + i] + fade_.value * velocity + fade_.first * position;
+    values[2 * n + i] =
+        one[2 * n + i] + fade_.value * acceleration + 2.0 * fade_.first * velocity + fade_.second * position;
+  }
 }
 
 }  // namespace shapegcode

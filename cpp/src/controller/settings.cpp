@@ -17,6 +17,9 @@ constexpr std::size_t max_segments = std::size_t{1} << 24;
 // Share of acceleration and jerk that the changes of a shaper may take which follows a position.
 constexpr double change_share = 0.25;
 
+// Of acceleration and jerk that a fade has to leave.
+constexpr double least_beside_fade = 0.5;
+
 // Stands for no limit of the acceleration, mm/s^2.
 constexpr double no_acceleration = 1e8;
 
@@ -144,10 +147,44 @@ void check_settings(const ControllerSettings& settings) {
   require(settings.queue <= max_segments, "queue", static_cast<double>(settings.queue), "segments", "0 ... 16777216");
 }
 
+// A motion of v, a and j that is multiplied with w: w v + w' s, w a + 2 w' v + w'' s and so on, each at its most.
+InputShare input_share(const ControllerSettings& settings, const SetPointFilters& filters, std::size_t axis) noexcept {
+  const double own = own_share(filters) / filters.gain();
+  const FadeCost& fade = filters.fade();
+  if (fade.apart_s <= 0.0) return {1.0 / filters.gain(), own, own};
+  const double gain = filters.gain();
+  const AxisSettings most = axis_settings(settings, axis);
+  const double first = fade.first * fade.apart_s;
+  const double v = most.max_feed / (gain + first);
+  const double a =
+      (std::min(most.max_acceleration, no_acceleration) - fade.second * fade.apart_s * v) / (gain + 2.0 * first);
+  InputShare share{1.0 / (gain + first), a / std::min(most.max_acceleration, no_acceleration), 1.0 / gain};
+  if (std::isfinite(most.max_jerk)) {
+    const double others = fade.apart_s * (3.0 * fade.second * a + fade.third * v);
+    share.jerk = (most.max_jerk - others) / (gain + 3.0 * first) / most.max_jerk;
+  }
+  return share;
+}
+
 namespace {
 
+void check_fade(const ControllerSettings& settings, const SetPointFilters& filters) {
+  if (filters.fade().apart_s <= 0.0) return;
+  for (std::size_t i = 0; i < axis_count + settings.following.size(); ++i) {
+    if (!std::isfinite(axis_settings(settings, i).max_feed)) {
+      detail::refuse("axis {}: a fade between shapers wants a limit of the feed", i);
+    }
+    const InputShare share = input_share(settings, filters, i);
+    const double least = std::min(share.acceleration, share.jerk) * filters.gain();
+    if (least < least_beside_fade) {
+      detail::refuse("axis {}: a fade of {} s leaves the share {} of acceleration or jerk, must be at least {}: longer",
+                     i, settings.fade_time_s, least, least_beside_fade);
+    }
+  }
+}
+
 AxisLimits axis_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
-  const double share = own_share(filters) / filters.gain();
+  check_fade(settings, filters);
   const double speed = changing_speed(settings, filters);
   AxisLimits limits;
   limits.axes = axis_count + settings.following.size();
@@ -159,14 +196,15 @@ AxisLimits axis_limits_of(const ControllerSettings& settings, const SetPointFilt
       axis.max_acceleration -= settings.offset[i].max_acceleration;
       axis.max_jerk -= settings.offset[i].max_jerk;
     }
-    limits.speed[i] = axis.max_feed / filters.gain();
+    const InputShare share = input_share(settings, filters, i);
+    limits.speed[i] = axis.max_feed * share.speed;
     if (i < axis_count) {
       limits.speed[i] = std::min(limits.speed[i], speed);
     } else if (changes(filters)) {
       limits.speed[i] = std::min(limits.speed[i], feed_beside_changes(axis, speed, filters.change()));
     }
-    limits.acceleration[i] = axis.max_acceleration * share;
-    limits.jerk[i] = axis.max_jerk * share;
+    limits.acceleration[i] = axis.max_acceleration * share.acceleration;
+    limits.jerk[i] = axis.max_jerk * share.jerk;
   }
   return limits;
 }
@@ -193,11 +231,17 @@ PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPoi
   return rules;
 }
 
-AxisValues emergency_of(const ControllerSettings& settings, double gain) noexcept {
+AxisValues emergency_of(const ControllerSettings& settings, const SetPointFilters& filters) noexcept {
+  const FadeCost& fade = filters.fade();
   AxisValues most{};
   for (std::size_t i = 0; i < settings.emergency_acceleration.size(); ++i) {
     const double offset = i < settings.offset.size() ? settings.offset[i].max_acceleration : 0.0;
-    most[i] = (settings.emergency_acceleration[i] - offset) / gain;
+    // As fast as it is at the most.
+    const double beside = fade.apart_s > 0.0 ? fade.second * fade.apart_s * axis_settings(settings, i).max_feed *
+                                                   input_share(settings, filters, i).speed
+                                             : 0.0;
+    most[i] =
+        (settings.emergency_acceleration[i] - offset - beside) / (filters.gain() + 2.0 * fade.first * fade.apart_s);
   }
   return most;
 }

@@ -22,6 +22,7 @@ class Spindle {
   /// `ahead_s`: by how much later the motion leaves the control.
   Spindle(double bandwidth_hz, double period_s, double ahead_s) noexcept;
 
+  void set_ahead(double ahead_s) noexcept { ahead_s_ = ahead_s; }
   /// Once in every period; from the thread that steps.
   void measure(double revolutions) noexcept;
   /// Or nothing was measured: it goes on as it did.

@@ -17,6 +17,8 @@ constexpr double tangent_on_lines = 1.1;
 constexpr double tangent_on_curves = 1.3;
 // As near to where the motion is expected as that is near enough: what it costs grows with its square.
 constexpr double near_share = 0.02;
+// Motions that differ by less, as a share of the square of their speed, are one.
+constexpr double joining_share = 1e-4;
 // Sets that differ by less are the same, as a share of each coordinate.
 constexpr double same_share = 1e-9;
 // A motion is as good as at rest whose square of the speed is less than this, of what rest becomes on the interval.
@@ -128,6 +130,13 @@ bool is_same(const ControllableSet& one, const ControllableSet& other) noexcept 
   return true;
 }
 
+// Whether two states at the begin of an interval go on alike.
+bool is_near(PathState one, PathState other, double length) noexcept {
+  return std::abs(one.speed_squared - other.speed_squared) +
+             2.0 * length * std::abs(one.acceleration - other.acceleration) <=
+         joining_share * std::abs(one.speed_squared);
+}
+
 }  // namespace
 
 Making PathPlan::making_of(std::size_t index) const noexcept {
@@ -143,8 +152,7 @@ bool PathPlan::is_approach(std::size_t index) const noexcept {
 
 // Whether what a set is made from is another than in the plan before.
 bool PathPlan::is_changed(std::size_t index) const noexcept {
-  return index == 0 || stations_[index].valley || !courses_[index - 1].is_kept || !courses_[index].is_kept ||
-         !courses_[index + 1].is_kept;
+  return index == 0 || !courses_[index - 1].is_kept || !courses_[index].is_kept || !courses_[index + 1].is_kept;
 }
 
 // Of the first round, those of intervals that are not those of the plan before; later, those that depend on tangents
@@ -177,6 +185,7 @@ void PathPlan::make_sets(bool is_first) noexcept {
     if (here.valley) making.least_acceleration = 0.0;
     const ControllableSet set = rules_.before(here, segment, making, sets_[k + 1]);
     differs = !is_same(set, sets_[k]);
+    course.is_another = course.is_another || differs;
     sets_[k] = set;
     course.is_remade = true;
     if (here.valley) {
@@ -256,12 +265,22 @@ double PathPlan::best_passing(std::size_t index) const noexcept {
   return best;
 }
 
-// How a motion goes.
+// How a motion goes; where it joins one that was expected before, on sets that are the same, it goes on as that did.
 void PathPlan::expect() noexcept {
   PathState state = begin_;
   for (std::size_t k = 0; k < end(); ++k) {
     if (stations_[k].stop) state = {};
-    courses_[k].expected = state;
+    Course& course = courses_[k];
+    Course& next = courses_[k + 1];
+    const bool is_known = course.is_expected && next.is_expected && !next.is_another &&
+                          is_near(course.expected, state, stations_[k].length);
+    next.is_another = false;
+    if (is_known) {
+      state = next.expected;
+      continue;
+    }
+    course.expected = state;
+    course.is_expected = true;
     state = ends_in_stop(k) ? PathState{} : fastest_after(k, state);
   }
   courses_[end()].expected = {};

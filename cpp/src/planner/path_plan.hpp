@@ -96,8 +96,10 @@ class PathPlan {
     PathState expected;
     double laid = -1.0;  // the square of the speed at which its tangents were laid
     bool relaid = false;
-    bool is_kept = false;   // from the plan before
-    bool is_remade = true;  // its set, in this plan
+    bool is_kept = false;      // from the plan before
+    bool is_remade = true;     // its set, in this plan
+    bool is_expected = false;  // `expected` belongs to it
+    bool is_another = true;    // its set is another than when that was expected
     bool approaches = false;
     PathState approach;
     double approach_begin = 0.0;

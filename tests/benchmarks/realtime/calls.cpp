@@ -38,6 +38,7 @@ class Session {
     settings.travel.assign(shapegcode::axis_count, {-1000.0, 1000.0});
     settings.emergency_acceleration.assign(shapegcode::axis_count, 10'000.0);
     settings.retrace_periods = 4000;
+    settings.other_shapers = {shapegcode::Fir({0, 30}, {0.5, 0.5})};
     return settings;
   }
 
@@ -87,6 +88,7 @@ class Session {
       if (n % 50 == 0) timed("offset()", [&] { control_.offset(n % 3, 0.001 * (n % 70)); });
       if (n % 50 == 1) timed("feed_override()", [&] { control_.feed_override(0.8 + 0.1 * (n % 5)); });
       if (n % 50 == 2) timed("rapid_override()", [&] { control_.rapid_override(0.5); });
+      if (n % 50 == 4) timed("exchange_shaper()", [&] { control_.exchange_shaper(n % 100 < 50 ? 1 : 0); });
       if (n % 50 == 3) timed("travel()", [&] { control_.travel(n % 3, {-900.0, 900.0}); });
     }
     timed("hold()", [&] { control_.hold(); });
