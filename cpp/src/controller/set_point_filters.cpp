@@ -141,6 +141,7 @@ void SetPointFilters::add_others(const ControllerSettings& settings, const Fir& 
     const std::vector<Fir> shapers = each_of(other, n_axes);
     shapers_.emplace_back(shapers, n_axes);
     std::vector<Fir> chains;
+    chains.reserve(shapers.size());
     for (const Fir& shaper : shapers) chains.push_back(convolved(smoothing, shaper));
     for (const Fir& chain : chains) measure(chain, settings.period_s);
     means_.push_back(largest_mean(chains));
