@@ -79,6 +79,7 @@ class PlainProgram:
         self._files: list[int] = [0]
         self.notes: dict[str, Note] = {}
         self.names: list[str] = []
+        self.size = 2  # characters
 
     def put(self, text: str, line: int, file: int = 0) -> None:
         """Add one line.
@@ -89,6 +90,7 @@ class PlainProgram:
             file: 0 the source, n the n-th of `names`.
         """
         self._parts.append(text + "\n")
+        self.size += len(text) + 1
         self._lines.append(line)
         self._files.append(file)
 
@@ -102,6 +104,7 @@ class PlainProgram:
         """
         count = text.count("\n")
         self._parts.append(text)
+        self.size += len(text)
         self._lines.extend(range(first_line, first_line + count))
         self._files.extend([file] * count)
 
