@@ -25,7 +25,7 @@ class RandomProgram:
         self.inches = self._random.random() < 0.3
         self._unit = 25.4 if self.inches else 1.0
         self._plane = 17
-        self._depth = 0
+        self._broke = False
         self.pecks = not self.inches
 
     def text(self) -> str:
@@ -137,7 +137,9 @@ class RandomProgram:
         if self._random.random() < 0.4:
             inner = self._name()
             self._put(f"  O{inner} if [#1 EQ 2]")
-            self._put(f"    O{label} {self._random.choice(['continue', 'break'])}")
+            word = self._random.choice(["continue", "break"])
+            self._broke = self._broke or word == "break"
+            self._put(f"    O{label} {word}")
             self._put(f"  O{inner} endif")
         self._put(f"  G1 X[#1 * {self._length(1, 5)}] Y[SIN[#1 * 30] * {self._length(3, 9)}]")
         self._put(f"O{label} endwhile")
@@ -163,6 +165,8 @@ class RandomProgram:
         self._put(f"o{label} endif")
 
     def _do(self) -> None:
+        if self._broke:  # LinuxCNC 2.9.0~pre1 runs a DO loop behind a BREAK once, against its own documentation
+            return
         label = self._name()
         self._put("#<_count> = 3")
         self._put(f"O{label} do")

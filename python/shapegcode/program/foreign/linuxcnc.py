@@ -36,12 +36,12 @@ _MAX_ARGUMENTS = 30
 _MAX_FILE_BYTES = 10_000_000
 
 # No word that means another thing on FANUC, and no number with more digits than FANUC's reader takes.
-_NUMBER = r"[-+]?(?:\d{1,5}\.?\d{0,3}|\d{1,4}\.\d{4}|\d{1,3}\.\d{5}|\d\d?\.\d{6}|\.\d{1,7})(?![\d.])"
+_NUMBER = r"[-+]?(?=[\d.]{1,9}(?![\d.]))\d*\.?\d*"
 _AXES = rf"(?:[XYZ][ \t]*{_NUMBER}[ \t]*)"
-_LINE = rf"(?:N\d+[ \t]*)?(?:G0?[01](?![\d.])[ \t]*)?{_AXES}+(?:F[ \t]*\d{{1,6}}\.?\d{{0,2}}(?![\d.])[ \t]*)?\n"
+_LINE = rf"(?:N\d+[ \t]*)?(?:G0?[01](?![\d.])[ \t]*)?{_AXES}+(?:F[ \t]*{_NUMBER}[ \t]*)?\n"
 _ARC = (
     rf"(?:N\d+[ \t]*)?G0?[23](?![\d.])[ \t]*{_AXES}+(?:[IJK][ \t]*{_NUMBER}[ \t]*)+"
-    rf"(?:F[ \t]*\d{{1,6}}\.?\d{{0,2}}(?![\d.])[ \t]*)?\n"
+    rf"(?:F[ \t]*{_NUMBER}[ \t]*)?\n"
 )
 _MOVES = re.compile(rf"(?:[ \t]*{_LINE})+", re.IGNORECASE)
 _MOVES_AND_ARCS = re.compile(rf"(?:[ \t]*(?:{_LINE}|{_ARC}))+", re.IGNORECASE)
@@ -107,6 +107,7 @@ class _Interpreter:
         self._parameters = ParameterTable(self._state, self._frames[-1])
         self._next = 0
         self._steps = 0
+        self._broke = False
         self._read_lines = self._main.count
 
     def run(self) -> ForeignProgram:
@@ -192,7 +193,7 @@ class _Interpreter:
         self._runner.written_motion = modes.motion
         modes.feed = _last_number(text, "F", modes.feed)
         self._runner.written_feed = modes.feed
-        self._state.polar = self._state.cycle = None
+        self._state.cycle = None
         position, unit = self._state.position, self._state.unit_mm
         for axis, letter in enumerate("XYZ"):
             here = position[axis]
@@ -394,6 +395,12 @@ class _Interpreter:
         if self._file.closes_do(index, line.label):
             opening = self._file.before(index, line.label, ("do",))
             if holds and opening is not None:
+                if self._broke:
+                    self._plain.note(
+                        index + 1,
+                        "a DO loop behind a BREAK: read as documented; LinuxCNC 2.9.0~pre1 runs it once only",
+                        "DO behind BREAK",
+                    )
                 self._next = opening + 1
         elif not holds:
             self._next = self._behind(index, line, "endwhile") + 1
@@ -425,6 +432,7 @@ class _Interpreter:
             self._next = opening + 1
 
     def _on_break(self, index: int, line: OLine) -> None:
+        self._broke = True
         self._next = self._loop_end(index, line) + 1
 
     def _on_continue(self, index: int, line: OLine) -> None:

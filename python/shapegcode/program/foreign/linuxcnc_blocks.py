@@ -6,7 +6,7 @@ Order of execution: LinuxCNC's G-code overview, "G-Code Order of Execution".
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from shapegcode.program.foreign.linuxcnc_cycles import drill
 from shapegcode.program.foreign.linuxcnc_offsets import Offsets
@@ -293,12 +293,21 @@ class BlockRunner:
             raise ValueError("a drilling cycle in G93")
         feed = self._written_f() if modes.feed > 0.0 else ""
         self.written_motion = None
-        lines = [*drill(self.state, modes.motion, values, fresh)]
+        lines = [*self._holes(values, fresh=fresh)]
         if self.written_distance != 900:
             self.put("G90")
             self.written_distance = 900
         for index, line in enumerate(lines):
             self.put(line + (feed if index == 0 or line.startswith("G01") else ""))
+
+    def _holes(self, values: Mapping[str, float], *, fresh: bool) -> Iterator[str]:
+        """The lines of a block of a cycle; with polar words each repetition goes on from the hole before it."""
+        polar = "@" in values or "^" in values
+        times = int(values.get("l", 1.0)) if polar else 1
+        if polar:
+            values = {letter: value for letter, value in values.items() if letter != "l"}
+        for time in range(times):
+            yield from drill(self.state, self.state.modes.motion, self._cartesian(values), fresh and time == 0)
 
     def _move(self, values: Mapping[str, float], codes: Sequence[str], *, machine: bool) -> None:
         """G0 to G3."""
@@ -348,7 +357,6 @@ class BlockRunner:
     def _cartesian(self, values: Mapping[str, float]) -> Mapping[str, float]:
         """Polar words @ and ^ as X and Y."""
         if "@" not in values and "^" not in values:
-            self.state.polar = None if "x" in values or "y" in values else self.state.polar
             return values
         state = self.state
         x, y = state.position[0], state.position[1]
@@ -358,13 +366,12 @@ class BlockRunner:
             raise ValueError("the position of X and Y is not known, from which @ and ^ go on")
         unit = state.unit_mm
         radius, angle = math.hypot(x, y) / unit, math.degrees(math.atan2(y, x))
-        if state.polar is not None:
-            radius, angle = state.polar
+        if radius == 0.0 and "^" not in values:
+            raise ValueError("a polar radius @ without an angle ^ at the origin")
         if state.modes.distance == 910:
             radius, angle = radius + values.get("@", 0.0), angle + values.get("^", 0.0)
         else:
             radius, angle = values.get("@", radius), values.get("^", angle)
-        state.polar = radius, angle
         to = radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle))
         if state.modes.distance == 910:
             to = to[0] - x / unit, to[1] - y / unit

@@ -40,6 +40,9 @@ def drill(state: State, code: int, words: Mapping[str, float], fresh: bool) -> I
         row = state.cycle = CycleWords(state.position[normal])
     incremental = modes.distance == 910
     _read_words(row, code, words, AXES[normal], fresh)
+    if code in {740, 840} and row.dwell is None:
+        row.dwell = state.cycle_dwell
+    state.cycle_dwell = row.dwell if row.dwell is not None else state.cycle_dwell
     r, bottom = _levels(row, incremental, unit, AXES[normal])
     if bottom > r:
         raise ValueError(f"R {r / unit:g} is below the bottom {bottom / unit:g} of the hole")

@@ -81,7 +81,7 @@ class ParameterTable:
             self.frame.locals[number] = value
         elif 1 <= number <= _LAST_USER:
             self._numbered[number] = value
-        else:
+        elif number != 5599:  # whether (DEBUG,) comments are shown
             raise ValueError(f"parameter #{number} is LinuxCNC's own: programs that set it are not read")
 
     def _of_state(self, number: int) -> float | None:

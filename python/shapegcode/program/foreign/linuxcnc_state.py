@@ -55,7 +55,7 @@ class State:
         lengths: of tools, as far as they are known.
         radii: likewise.
         table: the tool table, if there is one.
-        polar: radius and angle of the last polar words, in the program's unit and degrees.
+        cycle_dwell: the last P of a drilling cycle, s: G74 and G84 without P take it, even from before G80.
         machine_unit_mm: length of the machine's own unit.
         cycle: what a row of drilling cycles keeps.
     """
@@ -74,7 +74,7 @@ class State:
     radii: dict[int, float] = field(default_factory=dict)
     table: ToolTable | None = None
     cycle: CycleWords | None = None
-    polar: tuple[float, float] | None = None
+    cycle_dwell: float = 0.0
     machine_unit_mm: float = 1.0
 
     @property
