@@ -252,7 +252,17 @@ class RandomProgram:
 
     def _dwell(self) -> None:
         r = self._random
-        self._put(r.choice(["G4 P0.5", "G4 P2", f"G4 P[{r.uniform(0, 3):.4f}]", "G4 P0.0005", f"G04 P1.25 G1 X{self._length(1, 9)}"]))
+        self._put(
+            r.choice(
+                [
+                    "G4 P0.5",
+                    "G4 P2",
+                    f"G4 P[{r.uniform(0, 3):.4f}]",
+                    "G4 P0.0005",
+                    f"G04 P1.25 G1 X{self._length(1, 9)}",
+                ]
+            )
+        )
 
     def _cycle(self) -> None:
         r = self._random

@@ -385,7 +385,10 @@ def _read(
     foreign: ForeignProgram | None = None,
 ) -> Program:
     if foreign is not None:
-        return _read_foreign(data, source, reading, number, foreign)
+        if number is not None:
+            message = f"--program {number}: a file for {CONTROLS[foreign.dialect]} is one program"
+            raise located_error(source, 1, 1, message)
+        return _read_foreign(data, source, reading, folder, foreign)
     options = _options(data, source, reading, folder, number)
     try:
         core = _core.read_program(data, options)
@@ -398,15 +401,14 @@ def _read(
     return Program(core, source, reading, whole, folder, number)
 
 
-def _read_foreign(
-    data: bytes, source: str, reading: Reading, number: int | str | None, foreign: ForeignProgram
-) -> Program:
+def _read_foreign(data: bytes, source: str, reading: Reading, folder: Path | None, foreign: ForeignProgram) -> Program:
     """A program in another control's words: its plain program is read, and its lines lead back."""
-    if number is not None:
-        raise located_error(source, 1, 1, f"--program {number}: a file for {CONTROLS[foreign.dialect]} is one program")
+    folders = [folder] if folder is not None and foreign.settings.called_text is not None else []
     try:
-        core = _core.read_program(foreign.text.encode("ascii", "replace"), reading.options([], foreign.settings))
+        core = _core.read_program(foreign.text.encode("latin-1", "replace"), reading.options(folders, foreign.settings))
     except ProgramError as error:
+        if error.file:
+            raise located_error(error.file, error.line, error.column, str(error), error.alarm) from None
         line = min(max(error.line, 1), len(foreign.lines)) - 1
         index = foreign.line_files[line] if foreign.line_files else 0
         file = foreign.files[index - 1] if index else source
@@ -415,7 +417,7 @@ def _read_foreign(
     if foreign.reason:
         notes.insert(0, (1, f"read as a program for {CONTROLS[foreign.dialect]}: {foreign.reason}"))
     core.lead_back(data, list(foreign.lines), list(foreign.line_files), list(foreign.files), notes)
-    return Program(core, source, reading, data, None, None, foreign)
+    return Program(core, source, reading, data, folder, None, foreign)
 
 
 def least_increment_mm(machine: Machine, units: int) -> float:

@@ -71,6 +71,8 @@ class Reading:
         folders = [*folders, *(Path(name).expanduser() for name in self.machine.input.program_folders)]
         if folders:
             load = program_loader(folders, self.machine.controller.max_program_bytes)
+            if foreign is not None and foreign.called_text is not None:
+                load = partial(_in_fanuc_words, load, foreign.called_text)
             options.load_program = partial(_called, self.called, load)
         return options
 
@@ -97,6 +99,14 @@ def _called(
     return known.get(number)
 
 
+def _in_fanuc_words(
+    load: Callable[[int], tuple[str, bytes] | None], write: Callable[[str, str], str], number: int
+) -> tuple[str, bytes] | None:
+    """A program of another file that one in another control's words calls."""
+    found = load(number)
+    return None if found is None else (found[0], write(found[1].decode("latin-1"), found[0]).encode("latin-1"))
+
+
 def _settings_of_reading(machine: Machine) -> dict[str, object]:
     tables = (
         ("controller", {name: getattr(machine.controller, name) for name in _CONTROLLER_KEYS}),
@@ -113,7 +123,8 @@ def _shown(value: object) -> str:
 
 def _apply(foreign: ForeignSettings, options: _core.ReaderOptions) -> None:
     """What differs where a plain program was made of one in another control's words."""
-    options.calculator_decimal_point = True
+    if foreign.calculator_decimal_point is not None:
+        options.calculator_decimal_point = foreign.calculator_decimal_point
     options.absolute_arc_centres = False
     options.max_line_length = max(options.max_line_length, _PLAIN_LINE)
     tools = dict(options.tool_offsets)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from shapegcode._core import ProgramError
@@ -33,12 +33,16 @@ class ForeignSettings:
         tool_radius_mm: by D number, likewise.
         peck_clearance_mm: distance to which a peck of G73 and G83 returns; None: the machine file's.
         arc_radius_tolerance_mm: largest difference of start and end radius; None: the machine file's.
+        calculator_decimal_point: whether X10 is 10 mm; None: as the machine file says.
+        called_text: writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none.
     """
 
     tool_length_mm: Mapping[int, float] = field(default_factory=dict)
     tool_radius_mm: Mapping[int, float] = field(default_factory=dict)
     peck_clearance_mm: float | None = None
     arc_radius_tolerance_mm: float | None = None
+    calculator_decimal_point: bool | None = True
+    called_text: Callable[[str, str], str] | None = None
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class ForeignProgram:
     """A program in another control's words, as a plain program in FANUC's.
 
     Its numbers have a point where a unit hangs on it (`X10.`), I J K are distances from the start, dwells are
-    `G04 X` in seconds; it begins and ends with a line `%`.
+    `G04 X` in seconds; it begins and ends with a line `%`. One that calls programs of its own may keep these calls.
 
     Attributes:
         dialect: "linuxcnc", "haas", "siemens".

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
@@ -47,7 +48,7 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
         return None
     if find_spec(f"shapegcode.program.foreign.{dialect}") is None:
         raise refusal(source, signs[0].line if signs else 1, f"{reason}: programs for {CONTROLS[dialect]} are not read")
-    text = data.decode("utf-8", "replace").removeprefix("\ufeff")
+    text = data.removeprefix(BOM_UTF8).decode("latin-1")
     read = _reader(dialect)
     program = read(text, file=source, machine=machine, folder=folder)
     return replace(program, reason=reason)
