@@ -227,7 +227,7 @@ class RandomProgram:
             self._put(f"G10 L2 P{number} X{self._length(-50, 50)} Y{self._length(-50, 50)}")
             self._put(["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"][number - 1])
             self._put(f"G1 X#5420 Y[#5421 + {self._length(1, 5)}]")
-            self._put(f"G1 X[#[5201 + 20 * #5220] / 10]")
+            self._put("G1 X[#[5201 + 20 * #5220] / 10]")
         elif choice == 3:
             self._put(f"G10 L20 P{r.choice([0, 1])} X{self._length(-9, 9)}" if not self.inches else "G54")
         elif choice == 4:

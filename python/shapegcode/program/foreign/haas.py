@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 _AS_FANUC = frozenset((
-    "0", "1", "2", "3", "4", "9", "10", "17", "18", "19", "20", "21", "28", "40", "41", "42", "43", "49", "52", "53", "54",
-    "54.1", "55", "56", "57", "58", "59", "61", "64", "65", "73", "74", "80", "81", "82", "83", "84", "85", "86", "89",
-    "90", "91", "92", "94", "95", "98", "99",
+    "0", "1", "2", "3", "4", "9", "10", "17", "18", "19", "20", "21", "28", "40", "41", "42", "43", "49", "52", "53",
+    "54", "54.1", "55", "56", "57", "58", "59", "61", "64", "65", "73", "74", "80", "81", "82", "83", "84", "85", "86",
+    "89", "90", "91", "92", "94", "95", "98", "99",
 ))  # fmt: skip
 _REFUSED: Mapping[str, str] = {
     "12": "circular pocket milling", "13": "circular pocket milling", "47": "engraving of a text",
@@ -47,6 +47,7 @@ _OLD_OFFSET = re.compile(r"G[ \t]*(1[12]\d)(?![\d.])", re.IGNORECASE)
 _M97 = re.compile(r"M[ \t]*97[ \t]*P[ \t]*(\d+)((?:[ \t]*L[ \t]*\d+)?)", re.IGNORECASE)
 _M98 = re.compile(r"M[ \t]*98[ \t]*P[ \t]*(\d{5,})(?![ \t]*\d)(?![ \t]*L)", re.IGNORECASE)
 _N = re.compile(r"[ \t]*/?[ \t]*N[ \t]*0*(\d+)", re.IGNORECASE)
+_O = re.compile(r"[ \t]*[O:][ \t]*\d", re.IGNORECASE)
 _M99 = re.compile(r"M[ \t]*99(?!\d)", re.IGNORECASE)
 _MACRO = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?(?:#|IF|WHILE|END|GOTO|DPRNT|POPEN|PCLOS)", re.IGNORECASE)
 
@@ -227,6 +228,10 @@ def _with_subprograms(lines: list[str], called: Mapping[int, int], file: str) ->
     if head and not head[-1].endswith("\n"):
         head[-1] += end
     numbers = [*range(1, last + 1)]
+    first = next((index for index, line in enumerate(plain) if line.strip() not in {"", "%"}), 0)
+    if _O.match(plain[first]) is None:  # behind a program without a number another one would be its own
+        head.insert(first, f"O{_CALL_BASE}{end}")
+        numbers.insert(first, first + 1)
     for number, call in sorted(called.items()):
         if number not in begins:
             raise refusal(file, call, f"M97 P{number}: there is no N{number} in the program")

@@ -93,8 +93,9 @@ class BlockRunner:
         if not words:
             return
         modes = self.state.modes
-        modes.feed_mode = by_group.get("feed", modes.feed_mode)
-        self._feed(values, changed="feed" in by_group)
+        before = modes.feed_mode
+        modes.feed_mode = by_group.get("feed", before)
+        self._feed(values, changed=modes.feed_mode != before)
         self._functions(functions, values)
         if "dwell" in by_group:
             self._dwell(values)
@@ -136,7 +137,6 @@ class BlockRunner:
         modes = self.state.modes
         if changed:
             modes.feed = self.written_feed = 0.0
-            self.put(f"G{modes.feed_mode // 10}")
         if "f" in values:
             if values["f"] < 0.0:
                 raise ValueError(f"F{values['f']:g} is negative")
@@ -189,12 +189,12 @@ class BlockRunner:
     def _modal_codes(self, by_group: Mapping[str, int], values: Mapping[str, float]) -> list[str]:
         """Codes that change a mode; those that may stand in the block of a move."""
         state, modes = self.state, self.state.modes
-        pending: list[str] = []
+        pending = [f"G{modes.feed_mode // 10}"] if "feed" in by_group else []
         if "plane" in by_group:
             modes.plane = by_group["plane"]
             pending.append(f"G{modes.plane // 10}")
         if "units" in by_group:
-            pending.append(self._unit(by_group["units"]))
+            pending.append(self._unit(by_group["units"], values))
         if "spindle" in by_group:
             if by_group["spindle"] == 960:
                 raise ValueError("G96 is constant surface speed of a lathe: it is not read")
@@ -218,15 +218,21 @@ class BlockRunner:
             pending.append(f"G{modes.retract // 10}")
         return pending
 
-    def _unit(self, code: int) -> str:
+    def _unit(self, code: int, values: Mapping[str, float]) -> str:
         """G20, G21: the feed in force stays what it is in mm."""
-        before = self.state.unit_mm
-        modes = self.state.modes
+        before, modes = self.state.unit_mm, self.state.modes
         modes.units = code
-        if before == self.state.unit_mm or modes.feed_mode == 930 or modes.feed <= 0.0:
-            return f"G{code // 10}"
-        modes.feed *= before / self.state.unit_mm
-        return f"G{code // 10}{self._written_f()}"
+        if "f" in values and before != self.state.unit_mm:
+            old, new = ("mm", "inch") if code == 200 else ("inch", "mm")
+            self.note(
+                f"F{values['f']:g} in the block of G{code // 10} is in {old} still: LinuxCNC sets F before the unit; "
+                f"FANUC would read it in {new}",
+                "F and unit",
+            )
+        if modes.feed_mode != 930:
+            modes.feed *= before / self.state.unit_mm
+            self.written_feed *= before == self.state.unit_mm
+        return f"G{code // 10}"
 
     def _path_mode(self, code: int, values: Mapping[str, float]) -> str:
         self.state.modes.path = code

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-_EQUAL = 1e-4  # EQ, NE, LE, GE: values nearer to each other are equal
+_EQUAL = 1e-4  # EQ, NE: values nearer to each other are equal; in later versions than 2.9.0~pre1 for LE and GE too
 
 Value = Callable[["Parameters"], float]
 
@@ -78,8 +78,8 @@ _OPERATORS: dict[str, tuple[int, Callable[[float, float], float]]] = {
     "ne": (3, lambda a, b: float(abs(a - b) >= _EQUAL)),
     "lt": (3, lambda a, b: float(a < b)),
     "gt": (3, lambda a, b: float(a > b)),
-    "le": (3, lambda a, b: float(a <= b or abs(a - b) < _EQUAL)),
-    "ge": (3, lambda a, b: float(a >= b or abs(a - b) < _EQUAL)),
+    "le": (3, lambda a, b: float(a <= b)),
+    "ge": (3, lambda a, b: float(a >= b)),
     "and": (2, lambda a, b: float(a != 0.0 and b != 0.0)),
     "or": (2, lambda a, b: float(a != 0.0 or b != 0.0)),
     "xor": (2, lambda a, b: float((a != 0.0) != (b != 0.0))),

@@ -93,6 +93,7 @@ class PlainProgram:
             line: of the source, from 1.
             file: 0 the source, n the n-th of `names`.
         """
+        self._keep_up(line, file)
         self._parts.append(text + "\n")
         self.size += len(text) + 1
         self._lines.append(line)
@@ -106,11 +107,21 @@ class PlainProgram:
             first_line: the line of the source with which they begin.
             file: as `put` takes it.
         """
+        self._keep_up(first_line, file)
         count = text.count("\n")
         self._parts.append(text)
         self.size += len(text)
         self._lines.extend(range(first_line, first_line + count))
         self._files.extend([file] * count)
+
+    def _keep_up(self, line: int, file: int) -> None:
+        """Blank lines, so that a line has the number that it has in the source, as long as that is possible."""
+        missing = line - 1 - len(self._lines)
+        if file == 0 and missing > 0:
+            self._parts.append("\n" * missing)
+            self.size += missing
+            self._files.extend([0] * missing)
+            self._lines.extend(range(len(self._lines) + 1, line))
 
     def note(self, line: int, text: str, key: str = "") -> None:
         """Tell something once.
