@@ -76,7 +76,6 @@ class Input(TomlTable):
         "unit of LinuxCNC's machine ([TRAJ] LINEAR_UNITS), in which its tool table, its offsets #5211 to #5383 and "
         "those of the tool #5401 to #5410 are; an INI file in tool_table comes first",
         default="mm",
-        assumed=True,
     )
     tool_length_wear_mm: _Lengths = key("wear of the length by offset number H", default={})
     compensation: Literal["refuse", "expand", "keep"] = key(
@@ -162,7 +161,7 @@ class Emission(TomlTable):
     """How shaped programs are written."""
 
     dialect: DialectName = key(
-        "control whose words `convert` writes; programs are read in FANUC's words whatever this says, and other "
+        "control whose words `convert` writes; in whose words programs are read says controller.dialect, and other "
         "commands that write a program refuse all but fanuc",
         default="fanuc",
     )

@@ -508,7 +508,8 @@ class _Interpreter:
     def _note_table(self) -> None:
         table = self._state.table
         if table is not None:
-            self._plain.note(1, f"{table.file}: {len(table.tools)} tools, lengths and diameters in {table.units}")
+            unit = f"lengths and diameters in {table.units} (input.machine_unit, or the INI file)"
+            self._plain.note(1, f"{table.file}: {len(table.tools)} tools, {unit}")
 
 
 def _first_state(machine: Machine, folder: Path | None) -> State:

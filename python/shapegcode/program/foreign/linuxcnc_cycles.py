@@ -6,6 +6,7 @@ of G98, G86 waits and starts the spindle again, G84 waits once, G73 and G83 come
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 from shapegcode.program.foreign.linuxcnc_state import AXES, CycleWords, State, normal_axis, plane_axes
@@ -112,12 +113,14 @@ def _levels(row: CycleWords, incremental: bool, unit: float, normal: str) -> tup
 def _hole(state: State, code: int, row: CycleWords, place: str, levels: tuple[float, float, float]) -> Iterator[str]:
     """One hole."""
     unit = state.unit_mm
-    r, bottom, clear = levels
+    r, _, clear = levels
     axis = AXES[normal_axis(state.modes.plane)].upper()
     at_r, at_bottom, at_clear = (f"{axis}{number_text(level / unit)}" for level in levels)
     dwell = row.dwell or 0.0
     begun = state.position[normal_axis(state.modes.plane)]
-    if _moves_as_fanuc(code, row, unit, returns_to_r=clear == r) and (clear == r or clear in {row.entered, begun}):
+    if _moves_as_fanuc(code, row, levels, unit, returns_to_r=clear == r) and (
+        clear == r or clear in {row.entered, begun}
+    ):
         if row.entered is not None and clear not in {r, row.entered}:
             yield "G80"  # the level of G98 is that at which FANUC's row begins
             row.entered = None
@@ -131,7 +134,7 @@ def _hole(state: State, code: int, row: CycleWords, place: str, levels: tuple[fl
     yield f"G00{place}" if place else "G00"
     yield f"G00{at_r}"
     if code in {730, 830}:
-        yield from _pecks(code, row, (r, bottom), axis, unit)
+        yield from _pecks(code, row, levels, axis, unit)
     yield f"G01{at_bottom}"
     spindle = state.modes.spindle
     if code in {840, 740}:
@@ -150,24 +153,33 @@ def _hole(state: State, code: int, row: CycleWords, place: str, levels: tuple[fl
         yield f"M{spindle:02d}"
 
 
-def _pecks(code: int, row: CycleWords, levels: tuple[float, float], axis: str, unit: float) -> Iterator[str]:
+def _pecks(code: int, row: CycleWords, levels: tuple[float, float, float], axis: str, unit: float) -> Iterator[str]:
     """The pecks before the last one."""
-    r, bottom = levels
-    peck = (row.peck or 0.0) * unit
-    depth = r - peck
-    while depth > bottom:
-        yield f"G01{axis}{number_text(depth / unit)}"
+    for depth in _depths(row.peck or 0.0, levels, unit):
+        yield f"G01{axis}{number_text(depth)}"
         if code == 830:
-            yield f"G00{axis}{number_text(r / unit)}"
-        yield f"G00{axis}{number_text((depth + PECK_CLEARANCE_MM) / unit)}"
+            yield f"G00{axis}{number_text(levels[0] / unit)}"
+        yield f"G00{axis}{number_text(depth + PECK_CLEARANCE_MM / unit)}"
+
+
+def _depths(peck: float, levels: tuple[float, float, float], unit: float) -> Iterator[float]:
+    """Where the pecks before the last one end, in the program's unit, summed up as LinuxCNC does."""
+    depth, bottom = levels[0] / unit - peck, levels[1] / unit
+    while depth > bottom:
+        yield depth
         depth -= peck
 
 
-def _moves_as_fanuc(code: int, row: CycleWords, unit: float, *, returns_to_r: bool) -> bool:
+def _moves_as_fanuc(
+    code: int, row: CycleWords, levels: tuple[float, float, float], unit: float, *, returns_to_r: bool
+) -> bool:
     """Whether FANUC's cycle of the same number makes the same moves and waits."""
     dwell = row.dwell or 0.0
     if code in {730, 830}:
-        return (row.peck or 0.0) * unit > PECK_CLEARANCE_MM
+        # Depths are summed up: the last peck may be one more than the division says, of next to nothing.
+        peck = row.peck or 0.0
+        count = math.ceil((levels[0] - levels[1]) / unit / peck)
+        return peck * unit > PECK_CLEARANCE_MM and len([*_depths(peck, levels, unit)]) == count - 1
     if code in {840, 740}:
         return dwell == 0.0 and returns_to_r
     if code in {820, 890}:  # FANUC's P is whole milliseconds

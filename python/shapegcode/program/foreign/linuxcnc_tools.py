@@ -17,7 +17,7 @@ _UNITS_MM = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.
 
 
 @dataclass(frozen=True)
-class Tool:
+class ToolRow:
     """A row of the tool table.
 
     Attributes:
@@ -35,7 +35,7 @@ class Tool:
 class ToolTable:
     """The tools by number, and the file from which they come."""
 
-    tools: dict[int, Tool]
+    tools: dict[int, ToolRow]
     file: str
     units: str
 
@@ -93,7 +93,7 @@ def read_tool_table(path: Path, unit: str) -> ToolTable:
         OSError: the file cannot be read.
     """
     factor = _UNITS_MM[unit]
-    tools: dict[int, Tool] = {}
+    tools: dict[int, ToolRow] = {}
     text = read_file(path, _MAX_BYTES).decode("utf-8", "replace")
     for number, line in enumerate(text.splitlines(), start=1):
         code = line.split(";")[0].strip()
@@ -103,7 +103,7 @@ def read_tool_table(path: Path, unit: str) -> ToolTable:
         if "T" not in words or _WORD.sub("", code).strip():
             raise refusal(str(path), number, f"{code[:40]!r} is no row of a tool table (T1 P1 Z12.5 D6)")
         x, y, z = (words.get(axis, 0.0) * factor for axis in "XYZ")
-        tools[int(words["T"])] = Tool((x, y, z), words.get("D", 0.0) * factor, int(words.get("P", 0.0)))
+        tools[int(words["T"])] = ToolRow((x, y, z), words.get("D", 0.0) * factor, int(words.get("P", 0.0)))
     return ToolTable(tools, str(path), unit)
 
 
