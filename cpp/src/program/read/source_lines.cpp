@@ -14,8 +14,8 @@ void lead_back(Program& program, std::string source, const std::vector<LineOrigi
                const std::vector<std::string>& files, std::vector<Finding> notes) {
   const std::uint32_t needed = program.expanded ? 0U : program.line_count;
   if (lines.size() < std::max<std::size_t>(needed, 1)) {
-    throw Error(ErrorKind::argument, fmt::format("{} lines of the source are given for {} of the program", lines.size(),
-                                                 needed));
+    throw Error(ErrorKind::argument,
+                fmt::format("{} lines of the source are given for {} of the program", lines.size(), needed));
   }
   const auto own_files = static_cast<std::uint32_t>(program.files.size());
   for (const LineOrigin& line : lines) {

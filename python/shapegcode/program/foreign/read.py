@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.program.foreign.plain import ForeignProgram, refusal
-from shapegcode.program.foreign.recognize import CONTROLS, Recognition, recognize
+from shapegcode.program.foreign.recognize import CONTROLS, recognize
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -38,25 +38,35 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
         ProgramError: it is of another dialect than `controller.dialect` says, mixes dialects, or cannot be read; the
             message starts with ``source:line:column``.
     """
-    stated = machine.controller.dialect
-    # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
-    expected = stated if stated != "auto" else machine.controller.kind
-    signs = recognize(data, of_fanuc=expected in {"linuxcnc", "siemens"})
-    dialect, reason = _dialect(signs, machine, source)
-    reason = reason or f"controller.dialect = {dialect}"
+    dialect, reason, line = input_dialect(data, machine, source)
     if dialect == "fanuc":
         return None
     if find_spec(f"shapegcode.program.foreign.{dialect}") is None:
-        raise refusal(source, signs[0].line if signs else 1, f"{reason}: programs for {CONTROLS[dialect]} are not read")
+        raise refusal(source, line, f"{reason}: programs for {CONTROLS[dialect]} are not read")
     text = data.removeprefix(BOM_UTF8).decode("latin-1")
     read = _reader(dialect)
     program = read(text, file=source, machine=machine, folder=folder)
     return replace(program, reason=reason)
 
 
-def _dialect(signs: tuple[Recognition, ...], machine: Machine, source: str) -> tuple[str, str]:
-    """The dialect of a program and the reason."""
+def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str, int]:
+    """In whose words a program is.
+
+    Args:
+        data: the program.
+        machine: on which it is to run.
+        source: its name, for messages.
+
+    Returns:
+        The dialect, the reason in words, and the line that tells.
+
+    Raises:
+        ProgramError: it is of another dialect than `controller.dialect` says, or mixes dialects.
+    """
     stated = machine.controller.dialect
+    # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
+    expected = stated if stated != "auto" else machine.controller.kind
+    signs = recognize(data, of_fanuc=expected in {"linuxcnc", "siemens"})
     if stated != "auto":
         for sign in signs:
             if sign.dialect != stated:
@@ -67,7 +77,7 @@ def _dialect(signs: tuple[Recognition, ...], machine: Machine, source: str) -> t
                     f"{CONTROLS[stated]} does not know; controller.dialect is {stated}: "
                     f"--set controller.dialect={sign.dialect} reads it",
                 )
-        return stated, ""
+        return stated, f"controller.dialect = {stated}", 1
     if len(signs) > 1:
         first, second = signs[0], signs[1]
         raise refusal(
@@ -78,10 +88,10 @@ def _dialect(signs: tuple[Recognition, ...], machine: Machine, source: str) -> t
             "controller.dialect says which control reads it",
         )
     if signs:
-        return signs[0].dialect, signs[0].reason
+        return signs[0].dialect, signs[0].reason, signs[0].line
     if machine.controller.kind == "linuxcnc":
-        return "linuxcnc", "controller.kind = linuxcnc"
-    return "fanuc", ""
+        return "linuxcnc", "controller.kind = linuxcnc", 1
+    return "fanuc", "", 1
 
 
 def _reader(dialect: str) -> Reader:

@@ -14,33 +14,44 @@ CONTROLS: dict[str, str] = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "haas": "H
 _LOOKED_AT_BYTES = 65536
 _COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
 
-_SIGNS: tuple[tuple[InputDialect, re.Pattern[bytes], str], ...] = (
+_SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ...] = (
     (
         "linuxcnc",
+        (b"SUB", b"CALL", b"IF", b"WHILE", b"DO", b"REPEAT"),
         re.compile(
             rb"(?m)^[ \t]*O[ \t]*(?:<[^>\n]+>|\d+|\[[^\]\n]+\])[ \t]*"
             rb"(?:SUB|ENDSUB|CALL|RETURN|IF|ELSEIF|ELSE|ENDIF|WHILE|ENDWHILE|DO|REPEAT|ENDREPEAT|BREAK|CONTINUE)\b"
         ),
         "O word of control flow",
     ),
-    ("linuxcnc", re.compile(rb"#<[^>\n]+>"), "named parameter"),
-    ("linuxcnc", re.compile(rb"G9[01]\.1(?!\d)"), "centres of arcs"),
-    ("linuxcnc", re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"), "tolerance of the path; FANUC's G64 has no P"),
-    ("linuxcnc", re.compile(rb"G0*61\.1(?!\d)"), "exact stop; not known on FANUC"),
-    ("linuxcnc", re.compile(rb"G59\.[123](?!\d)"), "work coordinate system 7 to 9"),
-    ("linuxcnc", re.compile(rb"G38\.[2-5](?!\d)"), "straight probe"),
-    ("haas", re.compile(rb"G154[ \t]*P[ \t]*\d+"), "additional work offset"),
-    ("haas", re.compile(rb"G187(?!\d)[ \t]*(?:[PE][ \t]*[\d.]+)?"), "smoothness"),
-    ("haas", re.compile(rb"G103[ \t]*(?:P[ \t]*\d+)?(?![\d.])"), "limit of the look-ahead"),
-    ("haas", re.compile(rb"M97[ \t]*P[ \t]*\d+"), "call of a subprogram by its N number"),
-    ("haas", re.compile(rb"G150(?!\d)"), "general pocket milling"),
-    ("siemens", re.compile(rb"(?<![A-Z])CR[ \t]*="), "radius of an arc"),
-    ("siemens", re.compile(rb"(?<![A-Z])MSG(?=\s|\()"), "message"),
-    ("siemens", re.compile(rb"G0*4[ \t]*F[ \t]*[\d.]+"), "dwell in seconds; FANUC's F is a feed"),
-    ("siemens", re.compile(rb"%_N_\w+"), "name of a program"),
-    ("siemens", re.compile(rb"G7[01]0(?![\d.])"), "inch or mm"),
+    ("linuxcnc", (b"#<",), re.compile(rb"#<[^>\n]+>"), "named parameter"),
+    ("linuxcnc", (b"G90.1", b"G91.1"), re.compile(rb"G9[01]\.1(?!\d)"), "centres of arcs"),
+    (
+        "linuxcnc",
+        (b"G64", b"G064"),
+        re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"),
+        "tolerance of the path; FANUC's G64 has no P",
+    ),
+    ("linuxcnc", (b"61.1",), re.compile(rb"G0*61\.1(?!\d)"), "exact stop; not known on FANUC"),
+    ("linuxcnc", (b"G59.",), re.compile(rb"G59\.[123](?!\d)"), "work coordinate system 7 to 9"),
+    ("linuxcnc", (b"G38.",), re.compile(rb"G38\.[2-5](?!\d)"), "straight probe"),
+    ("haas", (b"G154",), re.compile(rb"G154[ \t]*P[ \t]*\d+"), "additional work offset"),
+    ("haas", (b"G187",), re.compile(rb"G187(?!\d)[ \t]*(?:[PE][ \t]*[\d.]+)?"), "smoothness"),
+    ("haas", (b"G103",), re.compile(rb"G103[ \t]*(?:P[ \t]*\d+)?(?![\d.])"), "limit of the look-ahead"),
+    ("haas", (b"M97",), re.compile(rb"M97[ \t]*P[ \t]*\d+"), "call of a subprogram by its N number"),
+    ("haas", (b"G150",), re.compile(rb"G150(?!\d)"), "general pocket milling"),
+    ("siemens", (b"CR",), re.compile(rb"(?<![A-Z])CR[ \t]*="), "radius of an arc"),
+    ("siemens", (b"MSG",), re.compile(rb"(?<![A-Z])MSG(?=\s|\()"), "message"),
+    (
+        "siemens",
+        (b"G4F", b"G04F", b"G4 ", b"G04 "),
+        re.compile(rb"G0*4[ \t]*F[ \t]*[\d.]+"),
+        "dwell in seconds; FANUC's F is a feed",
+    ),
+    ("siemens", (b"%_N_",), re.compile(rb"%_N_\w+"), "name of a program"),
+    ("siemens", (b"G700", b"G710"), re.compile(rb"G7[01]0(?![\d.])"), "inch or mm"),
 )
-"""Words that no FANUC control knows."""
+"""Words that no FANUC control knows: one of the short texts is in a program that has the word."""
 
 _OF_FANUC: tuple[tuple[re.Pattern[bytes], str], ...] = (
     (re.compile(rb"(?<![A-Z])(?:GOTO|THEN)(?![A-Z])"), "jump of a macro"),
@@ -91,8 +102,9 @@ def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]
     """
     code = re.sub(rb";[^\n]*", b"", _COMMENT.sub(b" ", text[:_LOOKED_AT_BYTES].upper()))
     found: dict[InputDialect, tuple[int, Recognition]] = {}
-    for dialect, sign, meaning in _SIGNS:
-        _note(found, dialect, code, sign, meaning)
+    for dialect, hints, sign, meaning in _SIGNS:
+        if any(hint in code for hint in hints):
+            _note(found, dialect, code, sign, meaning)
     if found or of_fanuc:
         for sign, meaning in _OF_FANUC:
             _note(found, "fanuc", code, sign, meaning)
