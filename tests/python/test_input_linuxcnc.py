@@ -275,3 +275,24 @@ def test_what_is_not_shaped_is_written_in_the_words_that_are_asked_for() -> None
     assert b"G04X0.5" in sg.convert(text, machine_with()).text
     own = sg.convert(text, machine_with({"emission.dialect": "linuxcnc"})).text
     assert b"G04P0.5" in own.replace(b" ", b"").replace(b"G4P", b"G04P")
+
+
+def test_restart_points_name_the_lines_of_the_source() -> None:
+    """A zigzag in a loop: the cut is lines 3 to 10 of the source, whatever the plain program has."""
+    text = (
+        "G21 G17 G90 G94 G64 P0.01\nG0 X0 Y0 Z2\nG1 Z-1 F600\n\n#1 = 0\no1 while [#1 LT 12]\n  G1 X60 F2400\n  X0\n"
+        "  #1 = [#1 + 1]\n  G1 Y#1\no1 endwhile\nG0 Z50\nM2\n"
+    )
+    keys = {"emission.restart_interval_s": 5.0}
+    conversion = sg.convert(sg.Program.from_text(text, machine_with(keys)), machine_with(keys), shape_all=True)
+    assert conversion.restart_points and {point.lines for point in conversion.restart_points} == {(3, 10)}
+
+
+def test_one_program_in_a_file(tmp_path: Path) -> None:
+    (tmp_path / "loop.ngc").write_text(LOOP)
+    for choice, message in (
+        ("all", "a file for LinuxCNC is one program"),
+        ("O1", "a file for LinuxCNC is one program"),
+    ):
+        done = run(tmp_path, "time", "loop.ngc", "-m", "vx500", "--program", choice)
+        assert done.returncode == 2 and message in done.stderr

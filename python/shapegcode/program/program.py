@@ -326,6 +326,20 @@ class Program:
         number, file = self.core.origin(line)
         return f"{file or self.source}:{number}"
 
+    def source_lines(self, first: int, last: int) -> tuple[int, int]:
+        """Lines of the expanded text, as they are told: of the source where that is in another control's words.
+
+        Args:
+            first: of them, from 1.
+            last: of them.
+
+        Returns:
+            First and last line.
+        """
+        if self.foreign is None:
+            return first, last
+        return int(self.core.origin(first)[0]), int(self.core.origin(last)[0])
+
     def lines(self, region: _core.Region) -> str:
         """The lines of a region in words: of the source, or of the expanded text.
 
@@ -335,6 +349,8 @@ class Program:
         Returns:
             The lines, first to last.
         """
+        if self.foreign is not None:
+            return "lines {} to {}".format(*self.source_lines(region.first_line, region.last_line))
         return f"lines {region.first_line} to {region.last_line}{' expanded' if self.core.expanded else ''}"
 
     def other_arc_centre(self, data: bytes) -> str:
