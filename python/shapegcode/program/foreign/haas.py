@@ -6,7 +6,9 @@ Sources, by topic: docs/reference/input_dialects.md. A code for which no text wa
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Callable, Mapping
+from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,12 +33,13 @@ _CALL_BASE = 90_000_000  # O numbers of the subprograms that M97 calls, by their
 _EXTRA_OFFSETS = range(110, 130)
 
 _NOT_THE_SAME = re.compile(
-    r";|G0*4(?![\d.])|G[ \t]*(?!(?:0*[0-3]|17|18|19|2[018]|4[0-39]|5[3-9]|6[14]|8[0-2]|9[0-2]|9[89])(?![\d.]))[\d.]+"
-    r"|M[ \t]*9[678](?!\d)|F[ \t]*[-+]?\d+(?![\d.])|P[ \t]*\d*\.\d*",
-    re.IGNORECASE,
+    r"[;GMFP](?:(?<=;)|(?<=G)[ \t]*(?:0*4(?![\d.])"
+    r"|(?!(?:0*[0-3]|17|18|19|2[018]|4[0-39]|5[3-9]|6[14]|8[0-2]|9[0-2]|9[89])(?![\d.]))[\d.]+)"
+    r"|(?<=M)[ \t]*9[678](?!\d)|(?<=F)[ \t]*[-+]?\d+(?![\d.])|(?<=P)[ \t]*\d*\.\d*)"
 )
-"""One look at a whole program: where nothing of this stands, it is FANUC's to the letter."""
+"""One look at a whole program in capitals: where nothing of this stands, it is FANUC's to the letter."""
 
+_LINE = re.compile(r"[^\n]*\n|[^\n]+")
 _COMMENT = re.compile(r"\([^)\n]*\)?")
 _G = re.compile(r"G[ \t]*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _P = re.compile(r"P[ \t]*([#\[]|[-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
@@ -99,14 +102,15 @@ def called_haas_text(source: str, file: str) -> str:
 
 def _lines(source: str, file: str, notes: dict[str, Note]) -> tuple[list[str], dict[int, int]]:
     """The lines in FANUC's words, and the N numbers that M97 calls, each with the line of its first call."""
-    lines = source.splitlines(keepends=True)
-    code = _COMMENT.sub(lambda comment: " " * len(comment[0]), source)
+    lines = _LINE.findall(source)
+    code = _COMMENT.sub(lambda comment: " " * len(comment[0]), source) if "(" in source else source
+    found = [match.start() for match in _NOT_THE_SAME.finditer(code.upper())]
     called: dict[int, int] = {}
-    if _NOT_THE_SAME.search(code) is None:
+    if not found:
         return lines, called
-    for index, line in enumerate(code.splitlines(keepends=True)):
-        if _NOT_THE_SAME.search(line) is None:
-            continue
+    starts = [0, *accumulate(map(len, lines))]
+    for index in sorted({bisect_right(starts, at) - 1 for at in found}):
+        line = code[starts[index] : starts[index + 1]]
 
         def note(key: str, text: str, number: int = index + 1) -> None:
             notes.setdefault(key, Note(number, text))
