@@ -218,6 +218,16 @@ def test_the_kind_of_the_control_decides_where_nothing_tells() -> None:
     assert dwells(sg.Program.from_text(f"O0001\n{text}", own)) == [0.005]  # a program number
 
 
+def test_a_dwell_that_nothing_tells_is_said_with_both_meanings() -> None:
+    program = sg.Program.from_text("G21\nG0 X0\nG4 P2\nM30\n", "vx500", source="a.nc")
+    assert dwells(program) == [0.002]
+    assert program.warnings[0].startswith("a.nc:3: G04 P2 is read as 2 ms (FANUC, Haas); on LinuxCNC it is 2 s")
+    for text, machine_ in (("G4 P500", machine_with()), ("G4 P2", machine_with({"controller.dialect": "fanuc"}))):
+        assert not any(
+            "LinuxCNC" in each for each in sg.Program.from_text(f"G21\nG0 X0\n{text}\nM30\n", machine_).warnings
+        )
+
+
 def test_mixed_and_misstated_programs_are_refused() -> None:
     mixed = "G21\n#<depth> = 3\nIF [#1 EQ 2] GOTO 10\nM2\n"
     with pytest.raises(

@@ -15,7 +15,7 @@ from shapegcode._core import ProgramError
 from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.foreign.plain import ForeignProgram
 from shapegcode.program.foreign.read import foreign_program
-from shapegcode.program.foreign.recognize import CONTROLS
+from shapegcode.program.foreign.recognize import CONTROLS, LOOKED_AT_BYTES, doubtful_dwell
 from shapegcode.program.reading import Reading, given_text, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
@@ -304,7 +304,18 @@ class Program:
     @property
     def warnings(self) -> list[str]:
         """What the reader noticed, each ``source:line: text``."""
-        return [f"{file or self.source}:{line}: {message}" for line, _, _, message, file in self.core.warnings]
+        own = [f"{file or self.source}:{line}: {message}" for line, _, _, message, file in self.core.warnings]
+        return own if self.doubt is None else [f"{self.source}:{self.doubt[0]}: {self.doubt[1]}", *own]
+
+    @cached_property
+    def doubt(self) -> tuple[int, str] | None:
+        """A word that means another thing on another control, where nothing tells for which one the program is."""
+        stated = self.reading.machine.controller.dialect != "auto"
+        return (
+            None
+            if stated or self.reading.emitted or self.foreign is not None
+            else doubtful_dwell(self.text_slice(0, LOOKED_AT_BYTES))
+        )
 
     @property
     def expanded_text(self) -> bytes:

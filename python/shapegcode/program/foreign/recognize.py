@@ -11,7 +11,8 @@ InputDialect = Literal["fanuc", "linuxcnc", "haas", "siemens"]
 CONTROLS: dict[str, str] = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "haas": "Haas", "siemens": "a Sinumerik"}
 """Names of the controls for people."""
 
-_LOOKED_AT_BYTES = 65536
+LOOKED_AT_BYTES = 65536
+_SHORT_DWELL = re.compile(rb"G0*4[ \t]*P[ \t]*0*([1-9])(?![\d.])")
 _COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
 
 _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ...] = (
@@ -100,7 +101,7 @@ def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]
     Returns:
         One for each control, in the order of their lines; empty: nothing tells, it is in FANUC's words.
     """
-    code = re.sub(rb";[^\n]*", b"", _COMMENT.sub(b" ", text[:_LOOKED_AT_BYTES].upper()))
+    code = re.sub(rb";[^\n]*", b"", _COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
     found: dict[InputDialect, tuple[int, Recognition]] = {}
     for dialect, hints, sign, meaning in _SIGNS:
         if any(hint in code for hint in hints):
@@ -111,6 +112,29 @@ def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]
         if "haas" in found:
             found.pop("fanuc", None)  # macros, additional offsets and corner words are Haas' own too
     return tuple(sign for _, sign in sorted(found.values(), key=lambda each: each[0]))
+
+
+def doubtful_dwell(text: bytes) -> tuple[int, str] | None:
+    """The first dwell of a program that is next to nothing on FANUC, and usual in LinuxCNC's seconds.
+
+    Args:
+        text: a program in which no word tells for which control it is.
+
+    Returns:
+        Line and sentence; None: there is none.
+    """
+    capitals = text[:LOOKED_AT_BYTES].upper()
+    if b"G4" not in capitals and b"G04" not in capitals:
+        return None
+    code = _COMMENT.sub(b" ", capitals)
+    match = _SHORT_DWELL.search(code)
+    if match is None:
+        return None
+    value = int(match[1])
+    return (
+        code.count(b"\n", 0, match.start()) + 1,
+        f"G04 P{value} is read as {value} ms (FANUC, Haas); on LinuxCNC it is {value} s: controller.dialect says which",
+    )
 
 
 def _note(
