@@ -351,6 +351,30 @@ void register_gcode(py::module_& module) {
             return py::make_tuple(origin.line, self.files[origin.file]);
           },
           py::arg("line"), "(line, file) of the source from which a line of `text` comes.")
+      .def(
+          "lead_back",
+          [](Program& self, const py::bytes& source, const std::vector<std::uint32_t>& lines,
+             const std::vector<std::uint32_t>& line_files, const std::vector<std::string>& files,
+             const std::vector<std::pair<std::uint32_t, std::string>>& notes) {
+            if (!line_files.empty() && line_files.size() != lines.size()) {
+              throw Error(ErrorKind::argument, "line_files has another size than lines");
+            }
+            std::vector<LineOrigin> origins;
+            origins.reserve(lines.size());
+            for (std::size_t i = 0; i < lines.size(); ++i) {
+              origins.push_back({lines[i], line_files.empty() ? 0U : line_files[i]});
+            }
+            std::vector<Finding> findings;
+            for (const auto& [line, message] : notes) {
+              findings.push_back({line, message, 0, 0, ""});
+            }
+            lead_back(self, static_cast<std::string>(source), origins, files, std::move(findings));
+          },
+          py::arg("source"), py::arg("lines"), py::arg("line_files"), py::arg("files"), py::arg("notes"),
+          "Make it the plain program of a text in another control's words. `source`: that text (bytes); `lines`: for "
+          "each line of the text that was read the line of the source; `line_files`: its file, 0 the source, n the "
+          "n-th of `files`; empty: all of the source; `notes`: (line of the source, message), told as warnings. Raises "
+          "ArgumentError if lines are missing.")
       .def_readonly("called", &Program::called,
                     "Positions of programs of the file that others called, see list_programs.")
       .def_readonly("program_numbers", &Program::program_numbers, "All O numbers in the file.")

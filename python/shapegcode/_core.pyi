@@ -2741,6 +2741,10 @@ class ProgramText:
         """
         Index of the first occurrence of bytes in the text, or -1.
         """
+    def lead_back(self, source: bytes, lines: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], line_files: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], files: collections.abc.Sequence[str], notes: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, str]]) -> None:
+        """
+        Make it the plain program of a text in another control's words. `source`: that text (bytes); `lines`: for each line of the text that was read the line of the source; `line_files`: its file, 0 the source, n the n-th of `files`; empty: all of the source; `notes`: (line of the source, message), told as warnings. Raises ArgumentError if lines are missing.
+        """
     def origin(self, line: typing.SupportsInt | typing.SupportsIndex) -> tuple:
         """
         (line, file) of the source from which a line of `text` comes.

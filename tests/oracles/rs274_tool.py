@@ -125,6 +125,7 @@ def canonical_moves(lines: Iterable[str]) -> Iterator[CanonicalMove]:
     """The moves and dwells of rs274's output, in order."""
     place = np.zeros(3)
     offsets = {"SET_G5X_OFFSET": np.zeros(3), "SET_G92_OFFSET": np.zeros(3)}
+    length = np.zeros(3)
     unit, feed, per_turn, spindle, tool, axes = 1.0, 0.0, False, 0.0, 0, (0, 1, 2)
     for line in lines:
         match = _CALL.search(line)
@@ -138,12 +139,15 @@ def canonical_moves(lines: Iterable[str]) -> Iterator[CanonicalMove]:
             new = unit * np.array([float(word) for word in words[-6:-3]])
             place = place + offsets[name] - new
             offsets[name] = new
+        elif name == "USE_TOOL_LENGTH_OFFSET":
+            new = unit * np.array([float(word) for word in words[:3]])
+            place, length = place + length - new, new
         elif name == "SELECT_PLANE":
             axes = _PLANES[words[0]]
         elif name == "SET_FEED_MODE":
             per_turn = words[-1] == "1"
         elif name == "SET_FEED_RATE":
-            feed = float(words[0])
+            feed = unit * float(words[0])  # a later change of the unit leaves the feed what it is
         elif name == "SET_SPINDLE_SPEED":
             spindle = float(words[-1])
         elif name == "CHANGE_TOOL":
@@ -152,7 +156,7 @@ def canonical_moves(lines: Iterable[str]) -> Iterator[CanonicalMove]:
             yield CanonicalMove("dwell", place, place, dwell_s=float(words[0]), tool=tool)
         elif name in {"STRAIGHT_TRAVERSE", "STRAIGHT_FEED", "ARC_FEED"}:
             numbers = [unit * float(word) for word in words]
-            speed = feed * unit * (spindle if per_turn else 1.0)
+            speed = feed * (spindle if per_turn else 1.0)
             if name == "ARC_FEED":
                 a, b, normal = axes
                 end, centre = np.empty(3), np.zeros(3)

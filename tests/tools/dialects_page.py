@@ -11,7 +11,8 @@ _HEAD = """\
 
     shapegcode convert part.nc -m mine.toml --dialect linuxcnc -o shaped.ngc
 
-`emission.dialect` says for which control `convert` writes; programs are read in FANUC's words. Where a page or a
+`emission.dialect` says for which control `convert` writes; programs are read in
+[other dialects](input_dialects.md) too. Where a page or a
 recording says what holds, it is named. What nobody found a text for is *assumed*, and the header of the program and the
 answer of `convert` say so.
 

@@ -243,4 +243,11 @@ struct ProgramEntry {
 /// read, passed through and refused). Pure function of its arguments. Throws Error(program) with line and column.
 [[nodiscard]] Program read_program(std::string text, const ReaderOptions& options = {});
 
+/// Says of a program that was read where its lines come from: it is the plain program of `source`, a text in another
+/// control's words. `lines` has for each line of the program's text (as it was handed over) the line of the source, and
+/// its file: 0 the source itself, n the n-th of `files`. Findings and origins name lines of the source from then on;
+/// `notes` about lines of the source join the warnings. Throws Error(argument) if lines or files are missing.
+void lead_back(Program& program, std::string source, const std::vector<LineOrigin>& lines,
+               const std::vector<std::string>& files, std::vector<Finding> notes);
+
 }  // namespace shapegcode

@@ -222,6 +222,8 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
         line, _, _, _, file = program.core.alarms[-1]
         message = f"reading stopped here after {_MAX_ALARMS} alarms: what follows is not checked"
         yield Finding("note", "reader", 0, file or program.source, line, 0, message)
+    if (doubt := program.doubt) is not None:
+        yield _finding("warning", "reader", 0, program.source, doubt[0], 0, doubt[1])
     for line, column, alarm, message, file in program.core.warnings:
         severity = "warning" if _NOT_AS_WRITTEN.search(message) else "note"
         yield _finding(severity, "reader", alarm, file or program.source, line, column, message)

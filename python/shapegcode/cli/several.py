@@ -19,6 +19,8 @@ from shapegcode.cli.options import load_machine
 from shapegcode.cli.runner import check_files, output_console, standard_output, write_results
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.program.foreign.read import input_dialect
+from shapegcode.program.foreign.recognize import CONTROLS
 from shapegcode.program.reading import program_bytes
 from shapegcode.program.several import ProgramPlace, is_subprogram, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN
@@ -36,6 +38,8 @@ def run_all(args: argparse.Namespace) -> int:
     check_files(args)
     source = args.input if hasattr(args, "input") else args.inputs[0]
     text = program_bytes(source, machine.controller.max_program_bytes)
+    if (dialect := input_dialect(text, machine, str(source))[0]) != "fanuc":
+        raise ArgumentError(f"--program all: a file for {CONTROLS[dialect]} is one program; leave --program out")
     try:
         several = Gathered(str(source), text, programs_of(text))
     except ProgramError as error:

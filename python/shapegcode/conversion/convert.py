@@ -269,6 +269,8 @@ def _as_it_was(plan: ConversionPlan, shaped: Shaped) -> Shaped:
     rapids_shaped = shaped.rapids is not None and shaped.rapids.outcome.shaped > 0
     if shaped.written.placed or rapids_shaped or plan.program.number is not None:
         return shaped
+    if plan.program.foreign is not None:  # it was given in another control's words than those that are written
+        return shaped
     return replace(shaped, written=replace(shaped.written, size=plan.program.size), emitted=plan.program)
 
 

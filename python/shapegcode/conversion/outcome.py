@@ -146,8 +146,11 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
             shaped.written.restarts,
         ),
         restart_points=restart_points(
-            (place, restarts, tools.get(plan.aims.index(place.region)))
-            for place, restarts in zip(shaped.written.placed, shaped.written.restarts, strict=True)
+            program,
+            (
+                (place, restarts, tools.get(plan.aims.index(place.region)))
+                for place, restarts in zip(shaped.written.placed, shaped.written.restarts, strict=True)
+            ),
         ),
         emitted=emitted,
         placed=tuple(shaped.written.placed),

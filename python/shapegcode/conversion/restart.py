@@ -124,13 +124,15 @@ def system_of(state: _core.ModalState) -> str:
     return f"G54.1P{state.coordinate_number}" if extra else f"G{state.coordinate_system}"
 
 
-def restart_points(cuts: Iterable[tuple[Placed, CutRestarts, int | None]]) -> tuple[RestartPoint, ...]:
+def restart_points(
+    program: Program, cuts: Iterable[tuple[Placed, CutRestarts, int | None]]
+) -> tuple[RestartPoint, ...]:
     """The restart points of a program, with what is in force at each; the third of a cut is its tool."""
     return tuple(
         RestartPoint(
             number=mark.number,
             line=place.first_line + mark.line,
-            lines=place.original_lines,
+            lines=program.source_lines(*place.original_lines),
             time_s=mark.time_s,
             position_mm=mark.position_mm,
             speed_mm_per_s=mark.speed_mm_per_s,

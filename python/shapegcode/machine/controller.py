@@ -34,6 +34,12 @@ class Controller(TomlTable):
         "be switched off. motion, law, corner_rule and their keys are then those by which the shaped motion is planned",
         default="fanuc",
     )
+    dialect: Literal["auto", "fanuc", "linuxcnc", "haas", "siemens"] = key(
+        'in whose words programs are read. "auto": told by words that one control alone knows, and a warning says '
+        "which; where none tells, LinuxCNC's with kind = \"linuxcnc\", else FANUC's. A program with words of another "
+        "control than this says is refused",
+        default="auto",
+    )
     linuxcnc: LinuxcncPlanner | None = key(
         'settings of kind = "linuxcnc"; left out: the control\'s own defaults', default=None
     )

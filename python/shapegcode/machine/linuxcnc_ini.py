@@ -115,6 +115,8 @@ def read_ini(file: str | Path, *, name: str | None = None) -> IniMachine:
         "description": f"read from {Path(file).name}",
         "axes": axes, "controller": controller, "emission": {"dialect": "linuxcnc"},
     }  # fmt: skip
+    if unit_mm != 1.0:  # of the tool table
+        data = {**data, "input": {"machine_unit": "inch"}}
     machine = Machine.from_data(dict(data), str(file)).with_remarks(remarks)
     return IniMachine(machine, len(remarks), tuple(_notes(ini)))
 

@@ -66,6 +66,17 @@ class Input(TomlTable):
     tool_length_mm: _Lengths = key(
         "tool length by offset number H; with it the Z travel of a tool length change is known", default={}
     )
+    tool_table: Text = key(
+        "LinuxCNC's tool table, or the INI file that names it ([EMCIO] TOOL_TABLE, [TRAJ] LINEAR_UNITS), for programs "
+        "in its words; left out: tool.tbl beside the program, if there is one. tool_length_mm and tool_radius_mm come "
+        "first",
+        default="",
+    )
+    machine_unit: Literal["mm", "inch"] = key(
+        "unit of LinuxCNC's machine ([TRAJ] LINEAR_UNITS), in which its tool table, its offsets #5211 to #5383 and "
+        "those of the tool #5401 to #5410 are; an INI file in tool_table comes first",
+        default="mm",
+    )
     tool_length_wear_mm: _Lengths = key("wear of the length by offset number H", default={})
     compensation: Literal["refuse", "expand", "keep"] = key(
         'what `convert` does with cutter compensation G41/G42. "refuse": says so and stops; "expand": shapes the tool '
@@ -150,7 +161,7 @@ class Emission(TomlTable):
     """How shaped programs are written."""
 
     dialect: DialectName = key(
-        "control whose words `convert` writes; programs are read in FANUC's words whatever this says, and other "
+        "control whose words `convert` writes; in whose words programs are read says controller.dialect, and other "
         "commands that write a program refuse all but fanuc",
         default="fanuc",
     )

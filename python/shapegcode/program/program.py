@@ -13,7 +13,10 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.computer import require_memory_for_lines
-from shapegcode.program.reading import Reading, given_text, signs_of_other_control, signs_of_turning
+from shapegcode.program.foreign.plain import ForeignProgram
+from shapegcode.program.foreign.read import foreign_program
+from shapegcode.program.foreign.recognize import CONTROLS, LOOKED_AT_BYTES, doubtful_dwell
+from shapegcode.program.reading import Reading, given_text, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
 
@@ -36,6 +39,7 @@ class Program:
         unexpanded: the text that was read, where the core's is the plain program that it comes to.
         folder: where programs that it calls are looked for.
         number: which program of the text it is, as it was asked for; None: the first.
+        foreign: the plain program that was read, where the text is in another control's words.
     """
 
     core: _core.ProgramText
@@ -44,6 +48,7 @@ class Program:
     unexpanded: bytes | None = None
     folder: Path | None = None
     number: int | str | None = None
+    foreign: ForeignProgram | None = None
 
     @classmethod
     def read(
@@ -130,12 +135,11 @@ class Program:
         machine = Machine.of(machine or "vx500")
         data = text.encode() if isinstance(text, str) else text
         require_memory_for_lines(data, source)
-        if not emitted and (turning := signs_of_turning(data)) is not None:
+        foreign = None if emitted else foreign_program(data, machine, source, folder)
+        if not emitted and foreign is None and (turning := signs_of_turning(data)) is not None:
             line, signs = turning
             message = f"this is a turning program: {signs}, and no Y; shapegcode shapes milling programs"
             raise located_error(source, line, 1, message)
-        if not emitted and (other := signs_of_other_control(data)) is not None:
-            raise located_error(source, other[0], 1, f"{other[1]}; shapegcode reads FANUC's words")
         reading = Reading(
             machine,
             # What shapegcode wrote has FANUC's arcs, whatever those of its original were.
@@ -144,7 +148,7 @@ class Program:
             expand_compensation=expand_compensation,
             collect_alarms=collect_alarms,
         )
-        return _read(data, source, reading, folder, program_number)
+        return _read(data, source, reading, folder, program_number, foreign)
 
     @classmethod
     def from_parts(
@@ -173,7 +177,7 @@ class Program:
 
     def __reduce__(self) -> tuple[Callable[..., Program], tuple[object, ...]]:
         """Read again from its text, and from those of the programs that it called."""
-        return _read, (self.text, self.source, self.reading, self.folder, self.number)
+        return _read, (self.text, self.source, self.reading, self.folder, self.number, self.foreign)
 
     def __eq__(self, other: object) -> bool:
         """Whether it is the same text, read in the same way."""
@@ -263,6 +267,8 @@ class Program:
     def own_text(self) -> bytes:
         """The lines of this program alone, of a text that holds several; else the whole text."""
         text = self.text
+        if self.foreign is not None:
+            return text
         try:
             places = programs_of(text)
             index = 0 if self.number is None else index_of(text, self.number, self.source)
@@ -274,7 +280,7 @@ class Program:
     def kept_calls(self) -> tuple[ProgramPlace, ...]:
         """Other programs of its file that its plain program still calls; none where it stands in the whole file."""
         kept = {int(match[1]) for warning in self.core.warnings if (match := _KEPT_CALL.match(warning[3]))}
-        if self.unexpanded is None or not kept:
+        if self.unexpanded is None or self.foreign is not None or not kept:
             return ()
         index = 0 if self.number is None else index_of(self.unexpanded, self.number, self.source)
         return called_from(self.unexpanded, index or 0, kept)
@@ -298,7 +304,18 @@ class Program:
     @property
     def warnings(self) -> list[str]:
         """What the reader noticed, each ``source:line: text``."""
-        return [f"{file or self.source}:{line}: {message}" for line, _, _, message, file in self.core.warnings]
+        own = [f"{file or self.source}:{line}: {message}" for line, _, _, message, file in self.core.warnings]
+        return own if self.doubt is None else [f"{self.source}:{self.doubt[0]}: {self.doubt[1]}", *own]
+
+    @cached_property
+    def doubt(self) -> tuple[int, str] | None:
+        """A word that means another thing on another control, where nothing tells for which one the program is."""
+        stated = self.reading.machine.controller.dialect != "auto"
+        return (
+            None
+            if stated or self.reading.emitted or self.foreign is not None
+            else doubtful_dwell(self.text_slice(0, LOOKED_AT_BYTES))
+        )
 
     @property
     def expanded_text(self) -> bytes:
@@ -320,6 +337,20 @@ class Program:
         number, file = self.core.origin(line)
         return f"{file or self.source}:{number}"
 
+    def source_lines(self, first: int, last: int) -> tuple[int, int]:
+        """Lines of the expanded text, as they are told: of the source where that is in another control's words.
+
+        Args:
+            first: of them, from 1.
+            last: of them.
+
+        Returns:
+            First and last line.
+        """
+        if self.foreign is None:
+            return first, last
+        return int(self.core.origin(first)[0]), int(self.core.origin(last)[0])
+
     def lines(self, region: _core.Region) -> str:
         """The lines of a region in words: of the source, or of the expanded text.
 
@@ -329,6 +360,8 @@ class Program:
         Returns:
             The lines, first to last.
         """
+        if self.foreign is not None:
+            return "lines {} to {}".format(*self.source_lines(region.first_line, region.last_line))
         return f"lines {region.first_line} to {region.last_line}{' expanded' if self.core.expanded else ''}"
 
     def other_arc_centre(self, data: bytes) -> str:
@@ -340,6 +373,8 @@ class Program:
         Returns:
             The value of `input.arc_centre` with which the whole program reads; empty: neither explains them.
         """
+        if self.foreign is not None:
+            return ""
         options = _options(data, self.source, self.reading, self.folder, self.number)
         return _other_arc_centre(data, options, " ".join(message for _, _, _, message, _ in self.core.alarms))
 
@@ -368,7 +403,19 @@ def _options(
     return options
 
 
-def _read(data: bytes, source: str, reading: Reading, folder: Path | None, number: int | str | None) -> Program:
+def _read(
+    data: bytes,
+    source: str,
+    reading: Reading,
+    folder: Path | None,
+    number: int | str | None,
+    foreign: ForeignProgram | None = None,
+) -> Program:
+    if foreign is not None:
+        if number is not None:
+            message = f"--program {number}: a file for {CONTROLS[foreign.dialect]} is one program"
+            raise located_error(source, 1, 1, message)
+        return _read_foreign(data, source, reading, folder, foreign)
     options = _options(data, source, reading, folder, number)
     try:
         core = _core.read_program(data, options)
@@ -379,6 +426,25 @@ def _read(data: bytes, source: str, reading: Reading, folder: Path | None, numbe
     # The core leaves the byte-order mark out too.
     whole = data.removeprefix(codecs.BOM_UTF8) if core.expanded else None
     return Program(core, source, reading, whole, folder, number)
+
+
+def _read_foreign(data: bytes, source: str, reading: Reading, folder: Path | None, foreign: ForeignProgram) -> Program:
+    """A program in another control's words: its plain program is read, and its lines lead back."""
+    folders = [folder] if folder is not None and foreign.settings.called_text is not None else []
+    try:
+        core = _core.read_program(foreign.text.encode("latin-1", "replace"), reading.options(folders, foreign.settings))
+    except ProgramError as error:
+        if error.file:
+            raise located_error(error.file, error.line, error.column, str(error), error.alarm) from None
+        line = min(max(error.line, 1), len(foreign.lines)) - 1
+        index = foreign.line_files[line] if foreign.line_files else 0
+        file = foreign.files[index - 1] if index else source
+        raise located_error(file, foreign.lines[line], 1, str(error), error.alarm) from None
+    notes = [(note.line, note.text) for note in foreign.notes]
+    if foreign.reason:
+        notes.insert(0, (1, f"read as a program for {CONTROLS[foreign.dialect]}: {foreign.reason}"))
+    core.lead_back(data, list(foreign.lines), list(foreign.line_files), list(foreign.files), notes)
+    return Program(core, source, reading, data, folder, None, foreign)
 
 
 def least_increment_mm(machine: Machine, units: int) -> float:

@@ -20,9 +20,11 @@ from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
+    from shapegcode.program.foreign import ForeignSettings
 
 _NO_LIMIT = 2**63
 _ANY_PROGRAM = (0, 99_999_999)
+_PLAIN_LINE = 1000  # characters: a plain program's lines are no longer than the words of a block
 _SHOWN_CHARACTERS = 60  # of a value in a message: a table of tools may be long
 
 _CONTROLLER_KEYS = (
@@ -32,6 +34,7 @@ _CONTROLLER_KEYS = (
     "arc_radius_tolerance_mm",
     "offset_memory",
     "nesting_limit_subprogram",
+    "dialect",
 )
 """Of `controller`: what changes how a text is read; limits of memory and time do not."""
 
@@ -52,8 +55,8 @@ class Reading:
     # name and text of programs in other files that it calls, by O number; found when it was read
     called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
-    def options(self, folders: Sequence[Path]) -> _core.ReaderOptions:
-        """Settings with which the core reads a text so."""
+    def options(self, folders: Sequence[Path], foreign: ForeignSettings | None = None) -> _core.ReaderOptions:
+        """Settings with which the core reads a text so; `foreign`: it is the plain program of another control's."""
         options = reader_options(
             self.machine,
             emitted=self.emitted,
@@ -61,11 +64,15 @@ class Reading:
             expand_compensation=self.expand_compensation,
             collect_alarms=self.collect_alarms,
         )
+        if foreign is not None:
+            _apply(foreign, options)
         if self.keeps_calls:
             options.opaque_programs = list(_ANY_PROGRAM)
         folders = [*folders, *(Path(name).expanduser() for name in self.machine.input.program_folders)]
         if folders:
             load = program_loader(folders, self.machine.controller.max_program_bytes)
+            if foreign is not None and foreign.called_text is not None:
+                load = partial(_in_fanuc_words, load, foreign.called_text)
             options.load_program = partial(_called, self.called, load)
         return options
 
@@ -92,6 +99,14 @@ def _called(
     return known.get(number)
 
 
+def _in_fanuc_words(
+    load: Callable[[int], tuple[str, bytes] | None], write: Callable[[str, str], str], number: int
+) -> tuple[str, bytes] | None:
+    """A program of another file that one in another control's words calls."""
+    found = load(number)
+    return None if found is None else (found[0], write(found[1].decode("latin-1"), found[0]).encode("latin-1"))
+
+
 def _settings_of_reading(machine: Machine) -> dict[str, object]:
     tables = (
         ("controller", {name: getattr(machine.controller, name) for name in _CONTROLLER_KEYS}),
@@ -104,6 +119,25 @@ def _settings_of_reading(machine: Machine) -> dict[str, object]:
 def _shown(value: object) -> str:
     text = toml(value)
     return text if len(text) <= _SHOWN_CHARACTERS else f"{text[:_SHOWN_CHARACTERS]}..."
+
+
+def _apply(foreign: ForeignSettings, options: _core.ReaderOptions) -> None:
+    """What differs where a plain program was made of one in another control's words."""
+    if foreign.calculator_decimal_point is not None:
+        options.calculator_decimal_point = foreign.calculator_decimal_point
+    options.absolute_arc_centres = False
+    options.max_line_length = max(options.max_line_length, _PLAIN_LINE)
+    tools = dict(options.tool_offsets)
+    for table, name in ((foreign.tool_length_mm, "length_mm"), (foreign.tool_radius_mm, "radius_mm")):
+        for number, value in table.items():
+            offset = tools.setdefault(number, _core.ToolOffset())
+            if getattr(offset, name) is None:
+                setattr(offset, name, value)
+    options.tool_offsets = tools  # type: ignore[assignment]
+    if foreign.peck_clearance_mm is not None:
+        options.peck_clearance_mm = foreign.peck_clearance_mm
+    if foreign.arc_radius_tolerance_mm is not None:
+        options.arc_tolerance_mm = max(options.arc_tolerance_mm, foreign.arc_radius_tolerance_mm)
 
 
 def is_program_text(given: object) -> bool:
@@ -250,33 +284,6 @@ _LIKELY = (
     (re.compile(rb"G97(?![\d.])(?:\s*S\s*\d+)?"), "constant spindle speed"),
     (re.compile(rb"F0?\.\d+"), "feed per revolution"),
 )
-
-
-_OTHER_CONTROLS = (
-    (
-        re.compile(rb"(?m)^[ \t]*O[ \t]*(?:<\w+>|\d+)[ \t]*(?:SUB|ENDSUB|CALL|IF|WHILE|DO|REPEAT)\b"),
-        "LinuxCNC",
-        "O word",
-    ),
-    (re.compile(rb"#<\w+>"), "LinuxCNC", "named parameter"),
-    (re.compile(rb"G9[01]\.1(?!\d)"), "LinuxCNC", "centres of arcs"),
-    (re.compile(rb"G0*64\s*P[ \t]*[\d.]+"), "LinuxCNC", "tolerance of the path; FANUC's G64 has no P"),
-    (re.compile(rb"(?<![A-Z])CR\s*="), "a Sinumerik", "radius of an arc"),
-    (re.compile(rb"(?<![A-Z])MSG(?=\s)"), "a Sinumerik", "message"),
-    (re.compile(rb"G0*4\s*F[ \t]*[\d.]+"), "a Sinumerik", "dwell in seconds; FANUC's F is a feed"),
-    (re.compile(rb"%_N_\w+"), "a Sinumerik", "name of a program"),
-    (re.compile(rb"G7[01]0(?![\d.])"), "a Sinumerik", "inch or mm"),
-)
-
-
-def signs_of_other_control(text: bytes) -> tuple[int, str] | None:
-    """What shows that a program is written for another control, in words that no FANUC control knows."""
-    code = re.sub(rb";[^\n]*", b"", _COMMENT.sub(b" ", text[:_LOOKED_AT_BYTES].upper()))
-    for sign, control, meaning in _OTHER_CONTROLS:
-        if (found := sign.search(code)) is not None:
-            words = " ".join(found[0].decode("latin-1").split())
-            return code.count(b"\n", 0, found.start()) + 1, f"this is a program for {control}: {words} ({meaning})"
-    return None
 
 
 def signs_of_turning(text: bytes) -> tuple[int, str] | None:

@@ -1,0 +1,251 @@
+"""Programs in a Haas mill's words: FANUC's, but for a few that are written anew, line by line.
+
+Sources, by topic: docs/reference/input_dialects.md. A code for which no text was found is refused, not guessed.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from itertools import accumulate
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, Note, number_text, refusal
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+
+_AS_FANUC = frozenset((
+    "0", "1", "2", "3", "4", "9", "10", "17", "18", "19", "20", "21", "28", "40", "41", "42", "43", "49", "52", "53",
+    "54", "54.1", "55", "56", "57", "58", "59", "61", "64", "65", "73", "74", "80", "81", "82", "83", "84", "85", "86",
+    "89", "90", "91", "92", "94", "95", "98", "99",
+))  # fmt: skip
+_REFUSED: Mapping[str, str] = {
+    "12": "circular pocket milling", "13": "circular pocket milling", "47": "engraving of a text",
+    "70": "a bolt hole circle", "71": "a bolt hole arc", "72": "bolt holes along an angle",
+    "76": "fine boring, whose shift a setting gives", "77": "back boring", "87": "boring with a manual retract (FANUC: "
+    "back boring)", "88": "boring with a manual retract", "93": "inverse time, of which no text says how F counts in "
+    "arcs", "96": "constant surface speed", "150": "general pocket milling",
+}  # fmt: skip
+_CALL_BASE = 90_000_000  # O numbers of the subprograms that M97 calls, by their N number
+_EXTRA_OFFSETS = range(110, 130)
+
+_NOT_THE_SAME = re.compile(
+    r"[;GMFP](?:(?<=;)|(?<=G)[ \t]*(?:0*4(?![\d.])"
+    r"|(?!(?:0*[0-3]|17|18|19|2[018]|4[0-39]|5[3-9]|6[14]|8[0-2]|9[0-2]|9[89])(?![\d.]))[\d.]+)"
+    r"|(?<=M)[ \t]*9[678](?!\d)|(?<=F)[ \t]*[-+]?\d+(?![\d.])|(?<=P)[ \t]*\d*\.\d*)"
+)
+"""One look at a whole program in capitals: where nothing of this stands, it is FANUC's to the letter."""
+
+_LINE = re.compile(r"[^\n]*\n|[^\n]+")
+_COMMENT = re.compile(r"\([^)\n]*\)?")
+_G = re.compile(r"G[ \t]*(\d+(?:\.\d+)?)", re.IGNORECASE)
+_P = re.compile(r"P[ \t]*([#\[]|[-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
+_INTEGER_F = re.compile(r"F[ \t]*([-+]?\d+)(?![\d.])", re.IGNORECASE)
+_LEFT_OUT = re.compile(r"G[ \t]*(103|187)(?![\d.])((?:[ \t]*[PE][ \t]*[\d.]+)*)", re.IGNORECASE)
+_OFFSET = re.compile(r"G[ \t]*154[ \t]*P[ \t]*(\d+)", re.IGNORECASE)
+_OLD_OFFSET = re.compile(r"G[ \t]*(1[12]\d)(?![\d.])", re.IGNORECASE)
+_M97 = re.compile(r"M[ \t]*97[ \t]*P[ \t]*(\d+)((?:[ \t]*L[ \t]*\d+)?)", re.IGNORECASE)
+_M98 = re.compile(r"M[ \t]*98[ \t]*P[ \t]*(\d{5,})(?![ \t]*\d)(?![ \t]*L)", re.IGNORECASE)
+_N = re.compile(r"[ \t]*/?[ \t]*N[ \t]*0*(\d+)", re.IGNORECASE)
+_O = re.compile(r"[ \t]*[O:][ \t]*\d", re.IGNORECASE)
+_M99 = re.compile(r"M[ \t]*99(?!\d)", re.IGNORECASE)
+_MACRO = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?(?:#|IF|WHILE|END|GOTO|DPRNT|POPEN|PCLOS)", re.IGNORECASE)
+
+
+def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
+    """The program in FANUC's words: what means another thing on a Haas is written anew, everything else stays.
+
+    Args:
+        source: the program.
+        file: its name, for messages.
+        machine: `controller.calculator_decimal_point` says what a number without a point is (setting 162).
+        folder: not used: programs that it calls are looked for as those of FANUC's.
+
+    Returns:
+        The program; its text is the source's to the letter where nothing differs.
+
+    Raises:
+        ProgramError: a word is refused.
+    """
+    notes: dict[str, Note] = {}
+    lines, called = _lines(source, file, notes)
+    numbers = [*range(1, len(lines) + 1)]
+    if called:
+        lines, numbers = _with_subprograms(lines, called, file)
+    settings = ForeignSettings(calculator_decimal_point=None, called_text=called_haas_text)
+    found = tuple(sorted(notes.values(), key=lambda note: note.line))
+    return ForeignProgram("haas", "".join(lines), numbers, notes=found, settings=settings)
+
+
+def called_haas_text(source: str, file: str) -> str:
+    """A program of another file that one for a Haas calls, in FANUC's words, line by line.
+
+    Args:
+        source: the program.
+        file: its name, for messages.
+
+    Returns:
+        The text.
+
+    Raises:
+        ProgramError: a word is refused.
+    """
+    lines, called = _lines(source, file, {})
+    if called:
+        line = min(called.values())
+        raise refusal(file, line, "M97 in a program that another file calls is not read: put it into that file")
+    return "".join(lines)
+
+
+def _lines(source: str, file: str, notes: dict[str, Note]) -> tuple[list[str], dict[int, int]]:
+    """The lines in FANUC's words, and the N numbers that M97 calls, each with the line of its first call."""
+    lines = _LINE.findall(source)
+    code = _COMMENT.sub(lambda comment: " " * len(comment[0]), source) if "(" in source else source
+    found = [match.start() for match in _NOT_THE_SAME.finditer(code.upper())]
+    called: dict[int, int] = {}
+    if not found:
+        return lines, called
+    starts = [0, *accumulate(map(len, lines))]
+    for index in sorted({bisect_right(starts, at) - 1 for at in found}):
+        line = code[starts[index] : starts[index + 1]]
+
+        def note(key: str, text: str, number: int = index + 1) -> None:
+            notes.setdefault(key, Note(number, text))
+
+        try:
+            lines[index] = _plain_line(lines[index], line, note)
+        except ValueError as error:
+            raise refusal(file, index + 1, str(error)) from None
+        for call in _M97.finditer(line):
+            called.setdefault(int(call[1]), index + 1)
+    return lines, called
+
+
+def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
+    """One line; `code` is the same without its comments, as long as it."""
+    end = line[len(line.rstrip("\r\n")) :]
+    text, code = line[: len(line) - len(end)], code[: len(line) - len(end)]
+    if ";" in code:
+        text, code = text[: code.index(";")], code[: code.index(";")]
+    if _MACRO.match(code):
+        return text + end
+    codes = [_code(match[1]) for match in _G.finditer(code)]
+    _refuse(codes, code)
+    comments = "".join(_COMMENT.findall(text)) if "(" in text else ""
+    words = code.rstrip()
+    for match in _LEFT_OUT.finditer(words):
+        limits = match[1] == "103"
+        what = "limits the blocks that the control looks ahead" if limits else "sets smoothness and corner rounding"
+        note(f"G{match[1]}", f"G{match[1]} {what}: no path, and left out here; no model of it acts on the time")
+    words = _LEFT_OUT.sub("", words)
+    words = _OFFSET.sub(r"G54.1P\1", words)
+    words = _OLD_OFFSET.sub(lambda match: _old_offset(match[1], match[0]), words)
+    words = _M97.sub(lambda match: f"M98P{_CALL_BASE + int(match[1])}{match[2].strip() or 'L1'}", words)
+    words = _M98.sub(r"M98P\1L1", words)  # five digits are a program's number, not FANUC's repetitions and four digits
+    words = _with_dwell(words, codes, note)
+    if "52" in codes or "92" in codes:
+        note("setting 33", "G52 and G92 as setting 33 = FANUC or HAAS has them; YASNAC's G92 sets G52")
+    return words.rstrip() + comments + end
+
+
+def _code(text: str) -> str:
+    """A code without leading zeros: 04 is 4."""
+    whole, point, decimals = text.partition(".")
+    return str(int(whole)) + (point + decimals if decimals.strip("0") else "")
+
+
+def _refuse(codes: list[str], code: str) -> None:
+    """Words that are not read."""
+    for name in codes:
+        if name in _REFUSED:
+            raise ValueError(f"G{name} is {_REFUSED[name]} on a Haas: it is not read")
+        if name not in _AS_FANUC and name not in {"103", "154", "187"} and not _is_old_offset(name):
+            raise ValueError(f"G{name}: no text was found that says what it is on a Haas: it is not read")
+    if (feed := _INTEGER_F.search(code)) is not None:
+        value = int(feed[1])
+        raise ValueError(
+            f"F{feed[1]} without a decimal point: setting 77 of a Haas makes it F{value}. or F{value / 1000:g} mm (F"
+            f"{value / 10000:g} inch), FANUC F{value}.: write the point"
+        )
+    if re.search(r"M[ \t]*96(?!\d)", code, re.IGNORECASE):
+        raise ValueError("M96 jumps where an input is not set, which only the machine knows: it is not read")
+    if {"73", "74", "83", "84"} & {*codes} and (word := re.search(r"[IJK][ \t]*[\d.]", code, re.IGNORECASE)):
+        raise ValueError(
+            f"{word[0][0].upper()} in a drilling cycle changes the pecks or the retract of a Haas, and K counts the "
+            "holes on FANUC: it is not read"
+        )
+    if "10" in codes and (word := re.search(r"L[ \t]*(1[23])(?!\d)", code, re.IGNORECASE)):
+        raise ValueError(
+            f"G10 L{word[1]}: a diameter or a radius, as setting 40 of a Haas says; FANUC's is a radius: write the "
+            "radius into input.tool_radius_mm"
+        )
+    if "10" in codes and re.search(r"L[ \t]*2(?!\d)", code, re.IGNORECASE) and re.search(r"P[ \t]*0+(?!\d)", code):
+        raise ValueError("G10 L2 P0 sets the origin of G52 on a Haas, and an external offset on FANUC: it is not read")
+
+
+def _is_old_offset(name: str) -> bool:
+    return name.isdigit() and int(name) in _EXTRA_OFFSETS
+
+
+def _old_offset(number: str, otherwise: str) -> str:
+    """G110 ... G129 are G154 P1 ... P20."""
+    return f"G54.1P{int(number) - 109}" if int(number) in _EXTRA_OFFSETS else otherwise
+
+
+def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) -> str:
+    """P of a dwell: seconds with a point, milliseconds without."""
+    others = {"10", "54.1", "65", "154"} & {*codes} or re.search(r"M[ \t]*9[789](?!\d)", words, re.IGNORECASE)
+    match = _P.search(words)
+    if match is None or (others and "4" not in codes):
+        return words
+    if match[1] in {"#", "["}:
+        if "4" in codes:
+            raise ValueError("a dwell by a variable is seconds or milliseconds, as the point of its value says")
+        return words
+    if "." not in match[1]:
+        return words  # milliseconds, as FANUC's
+    seconds = float(match[1])
+    note(
+        "dwell",
+        f"P{match[1]} with a point is a dwell of {seconds:g} s on a Haas, without one milliseconds; FANUC's P is "
+        "milliseconds and has no point",
+    )
+    if "4" in codes:
+        return words[: match.start()] + f"X{number_text(seconds)}" + words[match.end() :]
+    milliseconds = round(seconds * 1e3)
+    if abs(milliseconds - seconds * 1e3) > 1e-6:
+        raise ValueError(f"P{match[1]} is no whole number of milliseconds, in which FANUC's cycles wait")
+    return words[: match.start()] + f"P{milliseconds}" + words[match.end() :]
+
+
+def _with_subprograms(lines: list[str], called: Mapping[int, int], file: str) -> tuple[list[str], list[int]]:
+    """The lines, and behind them each part that M97 calls as a program of its own: from its N number to M99."""
+    end = "\r\n" if lines[0].endswith("\r\n") else "\n"
+    plain = [_COMMENT.sub("", line) for line in lines]
+    begins = {int(match[1]): index for index, line in reversed([*enumerate(plain)]) if (match := _N.match(line))}
+    closing = next((i for i in range(len(lines) - 1, 0, -1) if lines[i].strip() == "%"), None)
+    last = len(lines) if closing is None else closing
+    head, tail = lines[:last], lines[last:]
+    if head and not head[-1].endswith("\n"):
+        head[-1] += end
+    numbers = [*range(1, last + 1)]
+    first = next((index for index, line in enumerate(plain) if line.strip() not in {"", "%"}), 0)
+    if _O.match(plain[first]) is None:  # behind a program without a number another one would be its own
+        head.insert(first, f"O{_CALL_BASE}{end}")
+        numbers.insert(first, first + 1)
+    for number, call in sorted(called.items()):
+        if number not in begins:
+            raise refusal(file, call, f"M97 P{number}: there is no N{number} in the program")
+        begin = begins[number]
+        stop = next((i for i in range(begin, last) if _M99.search(plain[i])), None)
+        if stop is None:
+            raise refusal(file, begin + 1, f"N{number}, which M97 calls, does not end with M99")
+        head.append(f"O{_CALL_BASE + number}{end}")
+        numbers.append(begin + 1)
+        for index in range(begin, stop + 1):
+            head.append(lines[index] if lines[index].endswith("\n") else lines[index] + end)
+            numbers.append(index + 1)
+    return [*head, *tail], [*numbers, *range(last + 1, len(lines) + 1)]

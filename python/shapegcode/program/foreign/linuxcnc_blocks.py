@@ -1,0 +1,557 @@
+"""One block of a LinuxCNC program in FANUC's words, in the order in which LinuxCNC executes its words.
+
+Order of execution: LinuxCNC's G-code overview, "G-Code Order of Execution".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from shapegcode.program.foreign.linuxcnc_cycles import drill
+from shapegcode.program.foreign.linuxcnc_offsets import Offsets
+from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, plane_axes, system_words
+from shapegcode.program.foreign.plain import PlainProgram, number_text
+
+_MOTION = frozenset({0, 10, 20, 30, 800}) | CYCLES
+_ONE_SHOT = frozenset({40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923})
+_GROUPS: dict[int, str] = {
+    **dict.fromkeys(_MOTION, "motion"),
+    **dict.fromkeys(_ONE_SHOT - {40, 530}, "one-shot"),
+    40: "dwell", 530: "machine", 170: "plane", 180: "plane", 190: "plane", 900: "distance", 910: "distance",
+    901: "centres", 911: "centres", 930: "feed", 940: "feed", 950: "feed", 200: "units", 210: "units",
+    400: "compensation", 430: "length", 431: "length", 490: "length", 610: "path", 611: "path", 640: "path",
+    980: "retract", 990: "retract", 960: "spindle", 970: "spindle", 80: "lathe",
+    **dict.fromkeys((540, 550, 560, 570, 580, 590, 591, 592, 593), "system"),
+}  # fmt: skip
+_SYSTEMS = {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}
+
+REFUSED: dict[int, str] = {
+    50: "a cubic spline", 51: "a quadratic spline", 52: "a NURBS block", 53: "the end of a NURBS block",
+    60: "a NURBS block", 61: "a NURBS block", 62: "a NURBS block",
+    70: "diameter mode of a lathe", 171: "the UV plane", 181: "the WU plane", 191: "the VW plane",
+    330: "motion that the spindle's encoder leads", 331: "rigid tapping, led by the spindle's encoder",
+    **dict.fromkeys((382, 383, 384, 385), "a probing move: where it ends, only the machine knows"),
+    **dict.fromkeys((410, 411, 420, 421), "cutter compensation, which rounds outer corners with arcs where FANUC's "
+                    "lengthens the lines: write the path of the tool's centre"),
+    432: "a second tool length offset beside the first", 700: "a turning cycle", 710: "a turning cycle",
+    711: "a turning cycle", 712: "a turning cycle", 720: "a turning cycle", 721: "a turning cycle",
+    722: "a turning cycle", 760: "a threading cycle (FANUC's G76 is fine boring)", 870: "back boring, which LinuxCNC "
+    "moves otherwise than FANUC", 880: "boring that waits for the operator",
+}  # fmt: skip
+"""G codes that are not read, in tenths, and what they are."""
+
+_BEFORE_MOTION = (6, 19, 3, 4, 5, 7, 8, 9, 48, 49)
+_STOPS = (0, 1, 2, 30, 60)
+_KEPT_OUTPUTS = {
+    50: "feed override", 51: "spindle override", 52: "adaptive feed", 53: "feed hold switch", 62: "digital output",
+    63: "digital output", 64: "digital output", 65: "digital output", 67: "analog output", 68: "analog output",
+}  # fmt: skip
+_REFUSED_M = {66: "wait for an input: its result, #5399, only the machine knows"}
+_FULL_TURN = 1e-9  # rad
+
+
+class BlockRunner:
+    """Executes blocks and writes what they come to."""
+
+    def __init__(self, state: State, plain: PlainProgram) -> None:
+        """Begin in this state."""
+        self.state = state
+        self.plain = plain
+        self.line = 1
+        self.file = 0
+        self.written_distance = 900  # what the plain program's reader takes for granted
+        self.written_motion: int | None = None  # None: what is in force there is not followed
+        self.written_feed = 0.0
+        self.ended = False
+        self.offsets = Offsets(state, self.put)
+
+    def put(self, text: str) -> None:
+        """Write one line."""
+        self.plain.put(text, self.line, self.file)
+
+    def note(self, text: str, key: str) -> None:
+        """Tell something once."""
+        where = f"{self.plain.names[self.file - 1]}:{self.line}: " if self.file else ""
+        self.plain.note(self.line if not self.file else 1, where + text, key)
+
+    def run(self, words: Sequence[tuple[str, float]], comments: Sequence[str]) -> None:
+        """Execute a block.
+
+        Args:
+            words: in order, with their values.
+            comments: of its line.
+
+        Raises:
+            ValueError: it cannot be read, or is refused.
+        """
+        codes, functions, values = _sorted(words)
+        self._refuse(codes, functions, values)
+        by_group = _by_group(codes)
+        for text in filter(None, map(_plain_comment, comments)):
+            self.put(f"({text})")
+        if not words:
+            return
+        modes = self.state.modes
+        before = modes.feed_mode
+        modes.feed_mode = by_group.get("feed", before)
+        self._feed(values, changed=modes.feed_mode != before)
+        self._functions(functions, values)
+        if "dwell" in by_group:
+            self._dwell(values)
+        pending = self._modal_codes(by_group, values)
+        self._axes(by_group, values, pending)
+        self._stop(functions)
+
+    def sync(self) -> None:
+        """Before lines that are taken as they are: G90 or G91 and F are in force in the plain program too."""
+        modes = self.state.modes
+        if self.written_distance != modes.distance:
+            self.put(f"G{modes.distance // 10}")
+            self.written_distance = modes.distance
+        if self.written_feed != modes.feed and modes.feed > 0.0 and modes.feed_mode != 930:
+            self.put(self._written_f())
+
+    def _written_f(self) -> str:
+        """F of the mode in force, which the plain program has from then on."""
+        self.written_feed = self.state.modes.feed
+        return f"F{number_text(self.written_feed)}"
+
+    # ---- what comes before the move --------------------------------------------------------------------------
+
+    def _refuse(self, codes: Sequence[int], functions: Sequence[int], values: Mapping[str, float]) -> None:
+        for code in codes:
+            if code in REFUSED:
+                raise ValueError(f"{code_text(code)} is {REFUSED[code]}: it is not read")
+            if code not in _GROUPS:
+                raise ValueError(f"{code_text(code)} is no G code of LinuxCNC")
+        for function in functions:
+            if function in _REFUSED_M:
+                raise ValueError(f"M{function} is a {_REFUSED_M[function]}: it is not read")
+        if letter := next((letter for letter in "uvw" if letter in values), None):
+            raise ValueError(f"{letter.upper()} is an axis beside X, Y, Z, and another thing on FANUC: it is not read")
+        if "$" in values and values["$"] != 0.0:
+            raise ValueError("$ selects another spindle: it is not read")
+
+    def _feed(self, values: Mapping[str, float], *, changed: bool) -> None:
+        modes = self.state.modes
+        if changed:
+            modes.feed = self.written_feed = 0.0
+        if "f" in values:
+            if values["f"] < 0.0:
+                raise ValueError(f"F{values['f']:g} is negative")
+            modes.feed = values["f"]
+
+    def _functions(self, functions: Sequence[int], values: Mapping[str, float]) -> None:
+        """S, T and the M codes that come before a move."""
+        state, modes = self.state, self.state.modes
+        if "s" in values:
+            modes.speed = values["s"]
+        if "t" in values:
+            state.selected = int(values["t"])
+        line = [f"T{int(values['t'])}"] if "t" in values else []
+        if 6 in functions:
+            state.tool = state.selected
+            modes.spindle = 5
+            line.append("M06")
+        if 61 in functions:
+            state.tool = int(values.get("q", 0.0))
+            self.note(f"M61 Q{state.tool} says which tool is in the spindle: nothing moves", "M61")
+        if line:
+            self.put("".join(line))
+        line = [f"S{round(values['s'])}"] if "s" in values else []
+        for function in functions:
+            if function in _BEFORE_MOTION and function != 6:
+                line.append(f"M{function:02d}")
+                modes.spindle = function if function in {3, 4, 5} else modes.spindle
+                modes.mist = (modes.mist or function == 7) and function != 9
+                modes.flood = (modes.flood or function == 8) and function != 9
+            elif function in _KEPT_OUTPUTS:
+                self.note(f"M{function} ({_KEPT_OUTPUTS[function]}) moves nothing and is left out", f"M{function}")
+            elif 100 <= function <= 199:
+                self.note(
+                    f"M{function} runs a program of the machine's own: it is kept without P and Q", f"M{function}"
+                )
+                line.append(f"M{function}")
+        for start in range(0, len(line), 3):  # no more M codes in a block than every FANUC control takes
+            self.put("".join(line[start : start + 3]))
+
+    def _dwell(self, values: Mapping[str, float]) -> None:
+        if "p" not in values:
+            raise ValueError("G4 needs P, the dwell in seconds")
+        if values["p"] < 0.0:
+            raise ValueError(f"G4 P{values['p']:g} is negative")
+        self.put(f"G04X{number_text(values['p'])}")
+        self.note(
+            f"G4 P{values['p']:g} is a dwell of {values['p']:g} s on LinuxCNC; on FANUC P counts milliseconds", "G4 P"
+        )
+
+    def _modal_codes(self, by_group: Mapping[str, int], values: Mapping[str, float]) -> list[str]:
+        """Codes that change a mode; those that may stand in the block of a move."""
+        state, modes = self.state, self.state.modes
+        pending = [f"G{modes.feed_mode // 10}"] if "feed" in by_group else []
+        if "plane" in by_group:
+            modes.plane = by_group["plane"]
+            pending.append(f"G{modes.plane // 10}")
+        if "units" in by_group:
+            pending.append(self._unit(by_group["units"], values))
+        if "spindle" in by_group:
+            if by_group["spindle"] == 960:
+                raise ValueError("G96 is constant surface speed of a lathe: it is not read")
+            pending.append("G97")
+        if "compensation" in by_group:
+            pending.append("G40")
+        if "length" in by_group:
+            self.sync()
+            self.offsets.length(by_group["length"], values)
+        if "system" in by_group:
+            state.select_system(_SYSTEMS[by_group["system"]])
+            self.put(system_words(state.modes.system))
+        if "path" in by_group:
+            pending.append(self._path_mode(by_group["path"], values))
+        if "distance" in by_group:
+            modes.distance = self.written_distance = by_group["distance"]
+            pending.append(f"G{modes.distance // 10}")
+        modes.centres = by_group.get("centres", modes.centres)
+        if "retract" in by_group:
+            modes.retract = by_group["retract"]
+            pending.append(f"G{modes.retract // 10}")
+        return pending
+
+    def _unit(self, code: int, values: Mapping[str, float]) -> str:
+        """G20, G21: the feed in force stays what it is in mm."""
+        before, modes = self.state.unit_mm, self.state.modes
+        modes.units = code
+        if "f" in values and before != self.state.unit_mm:
+            old, new = ("mm", "inch") if code == 200 else ("inch", "mm")
+            self.note(
+                f"F{values['f']:g} in the block of G{code // 10} is in {old} still: LinuxCNC sets F before the unit; "
+                f"FANUC would read it in {new}",
+                "F and unit",
+            )
+        if modes.feed_mode != 930:
+            modes.feed *= before / self.state.unit_mm
+            self.written_feed *= before == self.state.unit_mm
+        return f"G{code // 10}"
+
+    def _path_mode(self, code: int, values: Mapping[str, float]) -> str:
+        self.state.modes.path = code
+        if code == 611:
+            self.note("G61.1 stops at the end of every block: FANUC's G61", "G61.1")
+            return "G61"
+        if code == 610:
+            self.note(
+                "G61 follows the path exactly and does not stop where it is smooth; FANUC's G61 would stop in every "
+                "block: read as G64",
+                "G61",
+            )
+        elif "p" in values:
+            blend = values["p"] * self.state.unit_mm
+            self.note(
+                f"G64 P: blends leave the path by up to {blend:g} mm (FANUC's G64 has no P); the planner model takes "
+                "it from controller.linuxcnc.blend_tolerance_mm",
+                "G64 P",
+            )
+        return "G64"
+
+    # ---- the move --------------------------------------------------------------------------------------------
+
+    def _axes(self, by_group: Mapping[str, int], values: Mapping[str, float], pending: list[str]) -> None:
+        """What uses the axis words: one-shot codes, drilling cycles, moves."""
+        state, modes = self.state, self.state.modes
+        one_shot = by_group.get("one-shot")
+        if one_shot is not None:
+            self._flush(pending)
+            self.sync()
+            self.offsets.one_shot(one_shot, values)
+            if "motion" not in by_group:
+                return
+            values = {letter: value for letter, value in values.items() if letter not in "xyzabc"}
+            pending = []
+        before = modes.motion
+        if "motion" in by_group:
+            modes.motion = by_group["motion"]
+        has_axes = any(letter in values for letter in "xyzabc@^") and by_group.get("length") != 431
+        if modes.motion not in CYCLES:
+            state.cycle = None
+        if modes.motion == 800:
+            if has_axes and ("motion" in by_group or "dwell" not in by_group):
+                raise ValueError("axis words while no G code of motion is in force (G80)")
+            self._flush([*pending, *(["G80"] if "motion" in by_group else [])])
+        elif modes.motion in CYCLES:
+            self._flush(pending)
+            if has_axes or "motion" in by_group:
+                self._cycle(values, fresh=before != modes.motion)
+        elif has_axes or (modes.motion in {20, 30} and any(letter in values for letter in "ijk")):
+            self._move(values, pending, machine="machine" in by_group)
+        else:
+            changes = modes.motion < 20 and before != modes.motion
+            self.written_motion = modes.motion if changes else self.written_motion
+            self._flush([*pending, *([f"G{modes.motion // 10:02d}"] * changes)])
+
+    def _flush(self, codes: Sequence[str]) -> None:
+        if codes:
+            self.put("".join(codes))
+
+    def _cycle(self, values: Mapping[str, float], *, fresh: bool) -> None:
+        modes = self.state.modes
+        if modes.feed_mode == 930:
+            raise ValueError("a drilling cycle in G93")
+        feed = self._written_f() if modes.feed > 0.0 else ""
+        self.written_motion = None
+        lines = [*self._holes(values, fresh=fresh)]
+        if self.written_distance != 900:
+            self.put("G90")
+            self.written_distance = 900
+        for index, line in enumerate(lines):
+            self.put(line + (feed if index == 0 or line.startswith("G01") else ""))
+
+    def _holes(self, values: Mapping[str, float], *, fresh: bool) -> Iterator[str]:
+        """The lines of a block of a cycle; with polar words each repetition goes on from the hole before it."""
+        polar = "@" in values or "^" in values
+        times = int(values.get("l", 1.0)) if polar else 1
+        if polar:
+            values = {letter: value for letter, value in values.items() if letter != "l"}
+        for time in range(times):
+            yield from drill(self.state, self.state.modes.motion, self._cartesian(values), fresh and time == 0)
+
+    def _move(self, values: Mapping[str, float], codes: Sequence[str], *, machine: bool) -> None:
+        """G0 to G3."""
+        state, modes = self.state, self.state.modes
+        values = self._cartesian(values)
+        if machine:
+            self._flush(codes)
+            codes = []
+            self.sync()
+            self.written_motion = None
+            if modes.motion > 10:
+                raise ValueError("G53 stands with G0 or G1 only")
+            values = self.offsets.in_program(values, rapid=modes.motion == 0)
+            if not values:
+                return
+        incremental = modes.distance == 910 and not machine
+        start = [*state.position]
+        for axis in range(3):
+            if (given := values.get(AXES[axis])) is not None:
+                here = state.position[axis]
+                state.position[axis] = (
+                    given * state.unit_mm if not incremental else None if here is None else here + given * state.unit_mm
+                )
+        head = [*codes]
+        wanted = 910 if incremental else 900
+        if self.written_distance != wanted:
+            head.append(f"G{wanted // 10}")
+            self.written_distance = wanted
+        head.append(f"G{modes.motion // 10:02d}")
+        self.written_motion = modes.motion
+        if modes.motion < 20:
+            self.put("".join(head) + _words(values, "xyzabc") + self._feed_word(values))
+        else:
+            for number, (axes, feed) in enumerate(self._arc(values, start, incremental=incremental)):
+                self.put(("".join(head) if number == 0 else "") + axes + feed)
+
+    def _feed_word(self, values: Mapping[str, float]) -> str:
+        modes = self.state.modes
+        if modes.motion == 0:
+            return self._written_f() if "f" in values and modes.feed_mode == 940 else ""
+        if modes.feed_mode == 930 and "f" not in values:
+            raise ValueError("a move in G93 without F")
+        if modes.feed <= 0.0:
+            raise ValueError("a cutting move, and no F greater than 0 was given before it")
+        return self._written_f()
+
+    def _cartesian(self, values: Mapping[str, float]) -> Mapping[str, float]:
+        """Polar words @ and ^ as X and Y."""
+        if "@" not in values and "^" not in values:
+            return values
+        state = self.state
+        x, y = state.position[0], state.position[1]
+        if state.modes.plane != 170 or "x" in values or "y" in values:
+            raise ValueError("polar words @ and ^ stand in G17, without X and Y")
+        if x is None or y is None:
+            raise ValueError("the position of X and Y is not known, from which @ and ^ go on")
+        unit = state.unit_mm
+        radius, angle = math.hypot(x, y) / unit, math.degrees(math.atan2(y, x))
+        if radius == 0.0 and "^" not in values:
+            raise ValueError("a polar radius @ without an angle ^ at the origin")
+        if state.modes.distance == 910:
+            radius, angle = radius + values.get("@", 0.0), angle + values.get("^", 0.0)
+        else:
+            radius, angle = values.get("@", radius), values.get("^", angle)
+        to = radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle))
+        if state.modes.distance == 910:
+            to = to[0] - x / unit, to[1] - y / unit
+        return {**{letter: value for letter, value in values.items() if letter not in "@^"}, "x": to[0], "y": to[1]}
+
+    def _arc(
+        self, values: Mapping[str, float], start: Sequence[float | None], *, incremental: bool
+    ) -> list[tuple[str, str]]:
+        """Words of an arc and its F: one block, and one more for each further full turn."""
+        state, modes, unit = self.state, self.state.modes, self.state.unit_mm
+        first, second = plane_axes(modes.plane)
+        names = "ijk"[first], "ijk"[second]
+        turns = values.get("p", 1.0)
+        if turns != int(turns) or turns < 1:
+            raise ValueError(f"P{turns:g}: an arc has a whole number of turns, 1 or more")
+        if "r" in values and any(name in values for name in "ijk"):
+            raise ValueError("an arc with R and I, J or K")
+        if "r" not in values and not any(name in values for name in names):
+            raise ValueError(f"an arc without R, {names[0].upper()} or {names[1].upper()}")
+        known = None not in (start[first], start[second], state.position[first], state.position[second])
+        if not known:
+            if turns > 1 or modes.centres == 901 or modes.feed_mode == 930:
+                raise ValueError("the position is not known, which this arc needs (P turns, G90.1, G93)")
+            return [(_words(values, "xyzabcijkr"), self._feed_word(values))]
+        here = start[first] or 0.0, start[second] or 0.0
+        to = state.position[first] or 0.0, state.position[second] or 0.0
+        sense = 1.0 if modes.motion == 30 else -1.0
+        if "r" in values:
+            centre = _centre_of_radius(here, to, values["r"] * unit, sense)
+        elif modes.centres == 901:
+            if any(name not in values for name in names):
+                raise ValueError(f"G90.1 needs {names[0].upper()} and {names[1].upper()}")
+            centre = values[names[0]] * unit, values[names[1]] * unit
+        else:
+            centre = here[0] + values.get(names[0], 0.0) * unit, here[1] + values.get(names[1], 0.0) * unit
+        words = "".join(
+            f"{name.upper()}{number_text((middle - begin) / unit)}"
+            for name, middle, begin in zip(names, centre, here, strict=True)
+        )
+        sweep = _sweep(here, to, centre, sense)
+        radius = math.hypot(here[0] - centre[0], here[1] - centre[1])
+        feed = self._arc_feed(values, sweep + (turns - 1.0) * math.tau, radius, start)
+        blocks: list[tuple[str, str]] = []
+        normal = 3 - first - second
+        total = sweep + (turns - 1.0) * math.tau
+        rise = values.get(AXES[normal])
+        name = AXES[normal].upper()
+        last = {letter: value for letter, value in values.items() if letter in "xyzabc"}
+        for turn in range(1, int(turns)):
+            axial = ""
+            if rise is not None:
+                if start[normal] is None and not incremental:
+                    raise ValueError(f"the position of {name} is not known, from which the helix rises")
+                share = math.tau / total
+                begin = (start[normal] or 0.0) / unit
+                step = rise * share if incremental else (rise - begin) * share
+                axial = f"{name}{number_text(step if incremental else begin + turn * step)}"
+                if incremental:
+                    last[AXES[normal]] = rise * (1.0 - turn * share)
+            blocks.append((axial + words, feed if turn == 1 else ""))
+        blocks.append((_words(last, "xyzabc") + words, feed if turns < 2 else ""))
+        return blocks
+
+    def _arc_feed(self, values: Mapping[str, float], sweep: float, radius: float, start: Sequence[float | None]) -> str:
+        """F of an arc: in G93 LinuxCNC's counts the whole block, FANUC's the radius."""
+        if self.state.modes.feed_mode != 930:
+            return self._feed_word(values)
+        self._feed_word(values)
+        normal = 3 - sum(plane_axes(self.state.modes.plane))
+        begin, end = start[normal], self.state.position[normal]
+        rise = 0.0 if begin is None or end is None else end - begin
+        length = math.hypot(radius * sweep, rise)
+        self.note("in G93 F counts the whole arc on LinuxCNC; FANUC's counts its radius: worked out", "G93")
+        return f"F{number_text(self.state.modes.feed * length / radius)}"
+
+    def _stop(self, functions: Sequence[int]) -> None:
+        for function in functions:
+            if function in _STOPS:
+                self.put(f"M{0 if function == 60 else function:02d}")
+                self.ended = self.ended or function in {2, 30}
+                if function == 60:
+                    self.note("M60 changes the pallet and stops: kept as M00", "M60")
+
+    def restore(self, saved: Modes) -> None:
+        """Modes of M72: what differs is written."""
+        modes, state = self.state.modes, self.state
+        state.select_system(saved.system)
+        kept = saved.copy()
+        kept.motion = modes.motion
+        codes = [f"G{getattr(kept, name) // 10}" for name in ("plane", "units", "retract")
+                 if getattr(kept, name) != getattr(modes, name)]  # fmt: skip
+        if kept.feed_mode != modes.feed_mode:
+            codes.append(f"G{kept.feed_mode // 10}")
+        if kept.path != modes.path:
+            codes.append("G61" if kept.path == 611 else "G64")
+        self._flush(codes)
+        self.put(system_words(saved.system))
+        if kept.speed != modes.speed:
+            self.put(f"S{round(kept.speed)}")
+        if kept.spindle != modes.spindle:
+            self.put(f"M{kept.spindle:02d}")
+        if (kept.mist, kept.flood) != (modes.mist, modes.flood):
+            self.put("M09")
+            for on, code in ((kept.mist, "M07"), (kept.flood, "M08")):
+                if on:
+                    self.put(code)
+        state.modes = kept
+
+
+def code_text(code: int) -> str:
+    """A G code of tenths."""
+    return f"G{code // 10}" if code % 10 == 0 else f"G{code // 10}.{code % 10}"
+
+
+def _sorted(words: Sequence[tuple[str, float]]) -> tuple[list[int], list[int], dict[str, float]]:
+    """G codes in tenths, M codes, and the other words."""
+    codes: list[int] = []
+    functions: list[int] = []
+    values: dict[str, float] = {}
+    for letter, value in words:
+        if letter == "g":
+            if abs(value * 10.0 - round(value * 10.0)) > 1e-3 or value < 0.0:
+                raise ValueError(f"G{value:g} is no G code of LinuxCNC")
+            codes.append(round(value * 10.0))
+        elif letter == "m":
+            if abs(value - round(value)) > 1e-4 or value < 0.0:
+                raise ValueError(f"M{value:g} is no M code of LinuxCNC")
+            functions.append(round(value))
+        elif letter != "n":
+            values[letter] = value
+    return codes, functions, values
+
+
+def _by_group(codes: Sequence[int]) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for code in codes:
+        group = _GROUPS[code]
+        if group in found:
+            raise ValueError(f"{code_text(found[group])} and {code_text(code)} in one block")
+        found[group] = code
+    return found
+
+
+def _words(values: Mapping[str, float], letters: str) -> str:
+    return "".join(f"{letter.upper()}{number_text(values[letter])}" for letter in letters if letter in values)
+
+
+def _plain_comment(text: str) -> str:
+    """A comment that FANUC's reader takes; those that LinuxCNC executes are left out."""
+    if text.lower().startswith(("msg,", "debug,", "print,", "log", "probe")):
+        return ""
+    return "".join(c for c in text.upper() if " " <= c <= "~" and c not in "()%;").strip()
+
+
+def _centre_of_radius(
+    here: tuple[float, float], to: tuple[float, float], radius: float, sense: float
+) -> tuple[float, float]:
+    """The centre of an arc with R; negative: more than half a turn."""
+    chord = math.hypot(to[0] - here[0], to[1] - here[1])
+    if chord == 0.0 or radius == 0.0:
+        raise ValueError("an arc with R ends where it begins, or its R is 0")
+    half = chord / 2.0
+    if half - abs(radius) > 0.00127:
+        raise ValueError(f"R{abs(radius):g} mm is too small for a chord of {chord:g} mm")
+    height = math.sqrt(max(0.0, radius * radius - half * half))
+    side = sense * (1.0 if radius > 0.0 else -1.0) * height / chord
+    middle = (here[0] + to[0]) / 2.0, (here[1] + to[1]) / 2.0
+    return middle[0] - side * (to[1] - here[1]), middle[1] + side * (to[0] - here[0])
+
+
+def _sweep(here: tuple[float, float], to: tuple[float, float], centre: tuple[float, float], sense: float) -> float:
+    """The angle of an arc's last turn, rad; a full circle where it ends as it begins."""
+    begin = math.atan2(here[1] - centre[1], here[0] - centre[0])
+    end = math.atan2(to[1] - centre[1], to[0] - centre[0])
+    sweep = math.fmod(sense * (end - begin), math.tau)
+    sweep += math.tau if sweep < 0.0 else 0.0
+    return math.tau if sweep < _FULL_TURN else sweep

@@ -1,0 +1,138 @@
+"""LinuxCNC's parameters: numbered and named, of a subroutine or of all, and those that its interpreter keeps itself."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from shapegcode.program.foreign.linuxcnc_state import AXES, State
+
+_LAST_LOCAL = 30
+_LAST_USER = 5000
+
+
+class Frame(Protocol):
+    """What a subroutine that runs has of its own."""
+
+    locals: list[float]
+    names: dict[str, float]
+
+
+class ParameterTable:
+    """Values of parameters while a program runs."""
+
+    def __init__(self, state: State, frame: Frame) -> None:
+        """No parameter has a value yet: the numbered ones are 0."""
+        self.frame = frame
+        self.call_level = 0
+        self._state = state
+        self._numbered: dict[int, float] = {}
+        self._global: dict[str, float] = {}
+
+    def numbered(self, number: int) -> float:
+        """The value of `#number`; #1 to #30 are the subroutine's own.
+
+        Raises:
+            ValueError: only the machine knows it.
+        """
+        if 1 <= number <= _LAST_LOCAL:
+            return self.frame.locals[number]
+        if 1 <= number <= _LAST_USER:
+            return self._numbered.get(number, 0.0)
+        value = self._of_state(number)
+        if value is None:
+            raise ValueError(
+                f"parameter #{number} is known to the machine only (its parameter file, a probe, an offset)"
+            )
+        return value
+
+    def named(self, name: str) -> float:
+        """The value of `#<name>`; those that begin with _ are known everywhere.
+
+        Raises:
+            ValueError: it has none.
+        """
+        own = self._global if name.startswith("_") else self.frame.names
+        if name in own:
+            return own[name]
+        value = self._predefined(name) if name.startswith("_") else None
+        if value is None:
+            raise ValueError(f"parameter #<{name}> has no value here")
+        return value
+
+    def exists(self, name: str) -> bool:
+        """Whether `#<name>` has a value."""
+        try:
+            self.named(name)
+        except ValueError:
+            return False
+        return True
+
+    def set(self, name: str | float, value: float) -> None:
+        """Give a parameter a value.
+
+        Raises:
+            ValueError: a program may not set it.
+        """
+        if isinstance(name, str):
+            (self._global if name.startswith("_") else self.frame.names)[name] = value
+            return
+        number = round(name)
+        if 1 <= number <= _LAST_LOCAL:
+            self.frame.locals[number] = value
+        elif 1 <= number <= _LAST_USER:
+            self._numbered[number] = value
+        elif number != 5599:  # whether (DEBUG,) comments are shown
+            raise ValueError(f"parameter #{number} is LinuxCNC's own: programs that set it are not read")
+
+    def _of_state(self, number: int) -> float | None:
+        """#5210 ... #5428, #5599: offsets in the machine's unit, the position in the program's."""
+        state = self._state
+        value: float | None = None
+        unit = state.unit_mm if number >= 5400 else state.machine_unit_mm
+        if 5211 <= number <= 5213:
+            value = state.g92[number - 5211]
+        elif number == 5220:
+            return float(state.modes.system)
+        elif 5221 <= number <= 5383 and 1 <= (number - 5200) % 20 <= 3:
+            value = state.offsets((number - 5201) // 20)[(number - 5200) % 20 - 1]
+        elif number == 5400:
+            return float(state.tool)
+        elif 5401 <= number <= 5410:
+            return self._of_tool(number)
+        elif 5420 <= number <= 5422:
+            value = state.position[number - 5420]
+        elif 5423 <= number <= 5428:
+            return 0.0
+        elif number == 5599:
+            return 1.0
+        return None if value is None else value / unit
+
+    def _of_tool(self, number: int) -> float | None:
+        """#5401 ... #5410: the row of the tool in the spindle, in the unit of the table whatever the program's is."""
+        table, tool = self._state.table, self._state.tool
+        if table is None or tool not in table.tools:
+            return None
+        row = table.tools[tool]
+        value = row.offset_mm[number - 5401] if number <= 5403 else row.diameter_mm if number == 5410 else 0.0
+        return value / table.unit_mm
+
+    def _predefined(self, name: str) -> float | None:
+        """Named parameters that LinuxCNC defines."""
+        state, modes = self._state, self._state.modes
+        if name in {"_x", "_y", "_z"}:
+            here = state.position[AXES.index(name[1])]
+            return None if here is None else here / state.unit_mm
+        values: dict[str, float] = {
+            "_vmajor": 2.9, "_vminor": 0.0, "_task": 0.0, "_motion_mode": float(modes.motion),
+            "_plane": float(modes.plane), "_coord_system": float(530 + 10 * modes.system if modes.system <= 6
+                                                                 else 584 + modes.system),
+            "_metric": float(modes.units == 210), "_imperial": float(modes.units == 200),
+            "_absolute": float(modes.distance == 900), "_incremental": float(modes.distance == 910),
+            "_inverse_time": float(modes.feed_mode == 930), "_units_per_minute": float(modes.feed_mode == 940),
+            "_units_per_rev": float(modes.feed_mode == 950), "_spindle_on": float(modes.spindle in {3, 4}),
+            "_spindle_cw": float(modes.spindle == 3), "_mist": float(modes.mist), "_flood": float(modes.flood),
+            "_feed": modes.feed, "_rpm": modes.speed, "_current_tool": float(state.tool),
+            "_selected_tool": float(state.selected), "_call_level": float(self.call_level), "_value": 0.0,
+            "_value_returned": 0.0, "_ccomp": 400.0, "_tool_offset": float(state.length_number != 0),
+        }  # fmt: skip
+        return values.get(name)

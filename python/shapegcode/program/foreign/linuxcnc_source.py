@@ -1,0 +1,114 @@
+"""Files of LinuxCNC programs: their lines, and where the O words of one label stand."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+KEYWORDS = (
+    "sub", "endsub", "call", "return", "if", "elseif", "else", "endif", "while", "endwhile", "do", "repeat",
+    "endrepeat", "break", "continue",
+)  # fmt: skip
+
+_O_LINE = re.compile(
+    r"^[ \t]*(?:N[ \t]*\d+[ \t]*)?O[ \t]*(<[^>\n]*>|\d+|\[[^\n]*?\](?=[ \t]*call))[ \t]*([a-z]*)([^\n]*)",
+    re.MULTILINE | re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class OLine:
+    """An O word: its label, its keyword ("": the head of a program, as FANUC's), and what follows."""
+
+    label: str
+    keyword: str
+    rest: str
+
+
+@dataclass(eq=False)
+class SourceFile:
+    """One file of a program.
+
+    Attributes:
+        name: for messages.
+        text: its lines, each with its line end.
+        index: 0: the main program; n: the n-th of the files that were read besides.
+        starts: offset of each line, and of the text's end.
+        o_lines: by line, from 0.
+    """
+
+    name: str
+    text: str
+    index: int
+    starts: list[int] = field(default_factory=list)
+    o_lines: dict[int, OLine] = field(default_factory=dict)
+    _places: dict[str, list[int]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Find its lines and O words."""
+        self.text = self.text.replace("\r\n", "\n").replace("\r", "\n")
+        if not self.text.endswith("\n"):
+            self.text += "\n"
+        self.starts = [0, *(match.end() for match in re.finditer("\n", self.text))]
+        for match in _O_LINE.finditer(self.text):
+            line = bisect_right(self.starts, match.start(1)) - 1
+            label = "".join(match[1].split()).lower()
+            label = label if label.startswith(("<", "[")) else str(int(label))
+            self.o_lines[line] = OLine(label, match[2].lower(), match[3])
+            self._places.setdefault(label, []).append(line)
+
+    @property
+    def count(self) -> int:
+        """Lines."""
+        return len(self.starts) - 1
+
+    def line(self, index: int) -> str:
+        """A line without its end."""
+        return self.text[self.starts[index] : self.starts[index + 1] - 1]
+
+    def find(self, label: str, keyword: str) -> int | None:
+        """The first line with this O word."""
+        return next((line for line in self._places.get(label, ()) if self.o_lines[line].keyword == keyword), None)
+
+    def after(self, line: int, label: str, keywords: Sequence[str]) -> int | None:
+        """The next line behind `line` with this label and one of these keywords."""
+        places = self._places.get(label, [])
+        behind = places[bisect_right(places, line) :]
+        return next((place for place in behind if self.o_lines[place].keyword in keywords), None)
+
+    def before(self, line: int, label: str, keywords: Sequence[str]) -> int | None:
+        """The last line before `line` likewise."""
+        places = self._places.get(label, [])
+        return next(
+            (p for p in reversed(places[: bisect_left(places, line)]) if self.o_lines[p].keyword in keywords), None
+        )
+
+    def closes_do(self, line: int, label: str) -> bool:
+        """Whether a WHILE is the end of a DO: the last loop word of its label before it is that DO."""
+        opening = self.before(line, label, ("do", "while", "endwhile"))
+        return opening is not None and self.o_lines[opening].keyword == "do"
+
+
+def subroutine_file(label: str, folders: Sequence[Path], read: Callable[[Path], str]) -> tuple[Path, str] | None:
+    """The file that holds a subroutine: `name.ngc` in one of the folders.
+
+    Args:
+        label: of the call, "<name>" or "123".
+        folders: where to look.
+        read: gives a file's text.
+
+    Returns:
+        File and text; None: there is none.
+    """
+    stem = label.strip("<>")
+    if not re.fullmatch(r"[\w.+-]+", stem):
+        return None
+    for folder in folders:
+        for suffix in (".ngc", ".NGC", ".nc"):
+            path = folder / (stem + suffix)
+            if path.is_file():
+                return path, read(path)
+    return None

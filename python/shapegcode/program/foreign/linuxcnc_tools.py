@@ -1,0 +1,118 @@
+"""LinuxCNC's tool table: lengths and diameters, in the units of the machine."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from shapegcode.io.data_file import read_file
+from shapegcode.program.foreign.plain import refusal
+
+_MAX_BYTES = 10_000_000
+_WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
+_ENTRY = re.compile(r"^\s*(\w+)\s*=\s*([^\n]*?)\s*$", re.MULTILINE)
+_SECTION = re.compile(r"^\s*\[(\w+)\]\s*$", re.MULTILINE)
+_UNITS_MM = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
+
+
+@dataclass(frozen=True)
+class ToolRow:
+    """A row of the tool table.
+
+    Attributes:
+        offset_mm: X, Y, Z.
+        diameter_mm: 0: none is given.
+        pocket: where it is.
+    """
+
+    offset_mm: tuple[float, float, float]
+    diameter_mm: float
+    pocket: int = 0
+
+
+@dataclass(frozen=True)
+class ToolTable:
+    """The tools by number, and the file from which they come."""
+
+    tools: dict[int, ToolRow]
+    file: str
+    units: str
+
+    @property
+    def unit_mm(self) -> float:
+        """Length of its unit."""
+        return _UNITS_MM[self.units]
+
+
+def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | None:
+    """The tool table of a program.
+
+    Args:
+        stated: `input.tool_table`: a tool table, or the INI file that names one; empty: `tool.tbl` beside the program.
+        unit: "mm" or "inch", of a table that no INI file names.
+        folder: of the program.
+
+    Returns:
+        The table; None: there is none.
+
+    Raises:
+        ProgramError: a line of it cannot be read.
+        OSError: the stated file cannot be read.
+    """
+    if not stated:
+        beside = folder / "tool.tbl" if folder is not None else None
+        if beside is None or not beside.is_file():
+            return None
+        return read_tool_table(beside, unit)
+    path = Path(stated).expanduser()
+    if path.suffix.lower() != ".ini":
+        return read_tool_table(path, unit)
+    entries = _ini(read_file(path, _MAX_BYTES).decode("utf-8", "replace"))
+    table = entries.get(("EMCIO", "TOOL_TABLE"))
+    if table is None:
+        raise refusal(str(path), 1, "it has no [EMCIO] TOOL_TABLE")
+    linear = entries.get(("TRAJ", "LINEAR_UNITS"), "mm").lower()
+    if linear not in _UNITS_MM:
+        raise refusal(str(path), 1, f"[TRAJ] LINEAR_UNITS = {linear} is neither mm nor inch")
+    return read_tool_table(path.parent / Path(table).expanduser(), "inch" if _UNITS_MM[linear] > 1.0 else "mm")
+
+
+def read_tool_table(path: Path, unit: str) -> ToolTable:
+    """Read a tool table: lines `T1 P1 X0 Y0 Z12.5 D6 ;comment`.
+
+    Args:
+        path: the file.
+        unit: "mm" or "inch": the table's lengths are in the units of the machine.
+
+    Returns:
+        The table, in mm.
+
+    Raises:
+        ProgramError: a line cannot be read.
+        OSError: the file cannot be read.
+    """
+    factor = _UNITS_MM[unit]
+    tools: dict[int, ToolRow] = {}
+    text = read_file(path, _MAX_BYTES).decode("utf-8", "replace")
+    for number, line in enumerate(text.splitlines(), start=1):
+        code = line.split(";")[0].strip()
+        if not code:
+            continue
+        words = {letter.upper(): float(value) for letter, value in _WORD.findall(code)}
+        if "T" not in words or _WORD.sub("", code).strip():
+            raise refusal(str(path), number, f"{code[:40]!r} is no row of a tool table (T1 P1 Z12.5 D6)")
+        x, y, z = (words.get(axis, 0.0) * factor for axis in "XYZ")
+        tools[int(words["T"])] = ToolRow((x, y, z), words.get("D", 0.0) * factor, int(words.get("P", 0.0)))
+    return ToolTable(tools, str(path), unit)
+
+
+def _ini(text: str) -> dict[tuple[str, str], str]:
+    """Entries of an INI file by section and name."""
+    entries: dict[tuple[str, str], str] = {}
+    sections = [*_SECTION.finditer(text)]
+    for section, following in zip(sections, [*sections[1:], None], strict=True):
+        body = text[section.end() : following.start() if following is not None else len(text)]
+        for entry in _ENTRY.finditer(body):
+            entries.setdefault((section[1], entry[1]), entry[2])
+    return entries

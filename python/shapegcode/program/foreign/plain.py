@@ -1,0 +1,181 @@
+"""The plain program that a program in another control's words comes to, and what must be known to read it as such."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from shapegcode._core import ProgramError
+
+MAX_DIGITS = 8
+"""Digits of a word in FANUC's words (alarm 0003)."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something to tell about a line of the source.
+
+    Attributes:
+        line: of the source, from 1.
+        text: one sentence, with both meanings where a word means another thing on FANUC.
+    """
+
+    line: int
+    text: str
+
+
+@dataclass(frozen=True)
+class ForeignSettings:
+    """How the plain program must be read, where the control differs from what the machine file says.
+
+    Attributes:
+        tool_length_mm: by H number; the machine file's own values come first.
+        tool_radius_mm: by D number, likewise.
+        peck_clearance_mm: distance to which a peck of G73 and G83 returns; None: the machine file's.
+        arc_radius_tolerance_mm: largest difference of start and end radius; None: the machine file's.
+        calculator_decimal_point: whether X10 is 10 mm; None: as the machine file says.
+        called_text: writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none.
+    """
+
+    tool_length_mm: Mapping[int, float] = field(default_factory=dict)
+    tool_radius_mm: Mapping[int, float] = field(default_factory=dict)
+    peck_clearance_mm: float | None = None
+    arc_radius_tolerance_mm: float | None = None
+    calculator_decimal_point: bool | None = True
+    called_text: Callable[[str, str], str] | None = None
+
+
+@dataclass(frozen=True)
+class ForeignProgram:
+    """A program in another control's words, as a plain program in FANUC's.
+
+    Its numbers have a point where a unit hangs on it (`X10.`), I J K are distances from the start, dwells are
+    `G04 X` in seconds; it begins and ends with a line `%`. One that calls programs of its own may keep these calls.
+
+    Attributes:
+        dialect: "linuxcnc", "haas", "siemens".
+        reason: why it was read so, in words.
+        text: the plain program.
+        lines: for each line of `text`, from 0, the line of the source, from 1.
+        notes: what to tell.
+        files: names of other files whose lines are in it (subprograms).
+        line_files: for each line of `text` its file: 0 the source, n the n-th of `files`; empty: all of the source.
+        settings: how to read it.
+    """
+
+    dialect: str
+    text: str
+    lines: Sequence[int]
+    reason: str = ""
+    notes: tuple[Note, ...] = ()
+    files: tuple[str, ...] = ()
+    line_files: Sequence[int] = ()
+    settings: ForeignSettings = ForeignSettings()
+
+
+class PlainProgram:
+    """Collects the lines of a plain program, each with the line of the source from which it comes."""
+
+    def __init__(self) -> None:
+        """Begin with the line `%`."""
+        self._parts: list[str] = ["%\n"]
+        self._lines: list[int] = [1]
+        self._files: list[int] = [0]
+        self.notes: dict[str, Note] = {}
+        self.names: list[str] = []
+        self.size = 2  # characters
+
+    def put(self, text: str, line: int, file: int = 0) -> None:
+        """Add one line.
+
+        Args:
+            text: without its line end.
+            line: of the source, from 1.
+            file: 0 the source, n the n-th of `names`.
+        """
+        self._keep_up(line, file)
+        self._parts.append(text + "\n")
+        self.size += len(text) + 1
+        self._lines.append(line)
+        self._files.append(file)
+
+    def put_lines(self, text: str, first_line: int, file: int = 0) -> None:
+        """Add lines of the source as they are.
+
+        Args:
+            text: whole lines, each with its line end.
+            first_line: the line of the source with which they begin.
+            file: as `put` takes it.
+        """
+        self._keep_up(first_line, file)
+        count = text.count("\n")
+        self._parts.append(text)
+        self.size += len(text)
+        self._lines.extend(range(first_line, first_line + count))
+        self._files.extend([file] * count)
+
+    def _keep_up(self, line: int, file: int) -> None:
+        """Blank lines, so that a line has the number that it has in the source, as long as that is possible."""
+        missing = line - 1 - len(self._lines)
+        if file == 0 and missing > 0:
+            self._parts.append("\n" * missing)
+            self.size += missing
+            self._files.extend([0] * missing)
+            self._lines.extend(range(len(self._lines) + 1, line))
+
+    def note(self, line: int, text: str, key: str = "") -> None:
+        """Tell something once.
+
+        Args:
+            line: of the source.
+            text: the sentence.
+            key: of two notes with one key the first counts; empty: the sentence itself.
+        """
+        self.notes.setdefault(key or text, Note(line, text))
+
+    def finish(self, dialect: str, last_line: int, settings: ForeignSettings | None = None) -> ForeignProgram:
+        """Close it with the line `%`.
+
+        Args:
+            dialect: as `ForeignProgram` has it.
+            last_line: of the source.
+            settings: how to read it.
+
+        Returns:
+            The program.
+        """
+        self.put("%", last_line)
+        return ForeignProgram(
+            dialect,
+            "".join(self._parts),
+            self._lines,
+            notes=tuple(sorted(self.notes.values(), key=lambda note: note.line)),
+            files=tuple(self.names),
+            line_files=self._files if self.names else (),
+            settings=settings or ForeignSettings(),
+        )
+
+
+def number_text(value: float) -> str:
+    """A number as a word of the plain program has it: with a point, and no more digits than FANUC's reader takes."""
+    decimals = MAX_DIGITS - len(str(int(abs(value)))) if abs(value) >= 1.0 else MAX_DIGITS
+    if decimals < 0:
+        raise ValueError(f"{value:g} has more than {MAX_DIGITS} digits before its point")
+    text = f"{value:.{decimals}f}".rstrip("0")
+    return "0." if text in {"0.", "-0."} else text
+
+
+def refusal(file: str, line: int, message: str) -> ProgramError:
+    """The error that refuses a line of the source.
+
+    Args:
+        file: its name.
+        line: from 1.
+        message: what is wrong there, and what would help.
+
+    Returns:
+        The error, to be raised; its message starts with ``file:line:column``.
+    """
+    error = ProgramError(f"{file}:{line}:1: {message}")
+    error.__dict__.update(line=line, column=1, alarm=0, file=file)
+    return error

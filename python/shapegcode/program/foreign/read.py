@@ -1,0 +1,101 @@
+"""A program in whatever control's words as a plain program in FANUC's: which dialect it is, and its reader."""
+
+from __future__ import annotations
+
+from codecs import BOM_UTF8
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapegcode.program.foreign.plain import ForeignProgram, refusal
+from shapegcode.program.foreign.recognize import CONTROLS, recognize
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+
+Reader = Callable[..., ForeignProgram]
+
+
+def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | None) -> ForeignProgram | None:
+    """The plain program of a text in another control's words; None: it is in FANUC's.
+
+    The dialect is that of `controller.dialect`; "auto": as words tell that only one control knows, and where none
+    does, that of a control whose planner is LinuxCNC's (`controller.kind`).
+
+    Args:
+        data: the program.
+        machine: on which it is to run.
+        source: its name, for messages.
+        folder: where programs that it calls and tables that it needs are looked for; None: nowhere.
+
+    Returns:
+        The plain program, with the reason why it was read so.
+
+    Raises:
+        ProgramError: it is of another dialect than `controller.dialect` says, mixes dialects, or cannot be read; the
+            message starts with ``source:line:column``.
+    """
+    dialect, reason, line = input_dialect(data, machine, source)
+    if dialect == "fanuc":
+        return None
+    if find_spec(f"shapegcode.program.foreign.{dialect}") is None:
+        raise refusal(source, line, f"{reason}: programs for {CONTROLS[dialect]} are not read")
+    text = data.removeprefix(BOM_UTF8).decode("latin-1")
+    read = _reader(dialect)
+    program = read(text, file=source, machine=machine, folder=folder)
+    return replace(program, reason=reason)
+
+
+def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str, int]:
+    """In whose words a program is.
+
+    Args:
+        data: the program.
+        machine: on which it is to run.
+        source: its name, for messages.
+
+    Returns:
+        The dialect, the reason in words, and the line that tells.
+
+    Raises:
+        ProgramError: it is of another dialect than `controller.dialect` says, or mixes dialects.
+    """
+    stated = machine.controller.dialect
+    # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
+    expected = stated if stated != "auto" else machine.controller.kind
+    signs = recognize(data, of_fanuc=expected in {"linuxcnc", "siemens"})
+    if stated != "auto":
+        for sign in signs:
+            if sign.dialect != stated:
+                raise refusal(
+                    source,
+                    sign.line,
+                    f"this is a program for {CONTROLS[sign.dialect]}: {sign.words} ({sign.meaning}), which "
+                    f"{CONTROLS[stated]} does not know; controller.dialect is {stated}: "
+                    f"--set controller.dialect={sign.dialect} reads it",
+                )
+        return stated, f"controller.dialect = {stated}", 1
+    if len(signs) > 1:
+        first, second = signs[0], signs[1]
+        raise refusal(
+            source,
+            second.line,
+            f"{second.words} is a word of {CONTROLS[second.dialect]} ({second.meaning}), and {first.words} in line "
+            f"{first.line} one of {CONTROLS[first.dialect]} ({first.meaning}): the program mixes them; "
+            "controller.dialect says which control reads it",
+        )
+    if signs:
+        return signs[0].dialect, signs[0].reason, signs[0].line
+    if machine.controller.kind == "linuxcnc":
+        return "linuxcnc", "controller.kind = linuxcnc", 1
+    return "fanuc", "", 1
+
+
+def _reader(dialect: str) -> Reader:
+    """Loaded when a program of its dialect is read: most are FANUC's."""
+    module = import_module(f"shapegcode.program.foreign.{dialect}")
+    reader: Reader = getattr(module, f"read_{dialect}")
+    return reader

@@ -1,0 +1,152 @@
+"""For which control a program is written, told by words that only one of them knows."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+InputDialect = Literal["fanuc", "linuxcnc", "haas", "siemens"]
+
+CONTROLS: dict[str, str] = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "haas": "Haas", "siemens": "a Sinumerik"}
+"""Names of the controls for people."""
+
+LOOKED_AT_BYTES = 65536
+_SHORT_DWELL = re.compile(rb"G0*4[ \t]*P[ \t]*0*([1-9])(?![\d.])")
+_COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
+
+_SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ...] = (
+    (
+        "linuxcnc",
+        (b"SUB", b"CALL", b"IF", b"WHILE", b"DO", b"REPEAT"),
+        re.compile(
+            rb"(?m)^[ \t]*O[ \t]*(?:<[^>\n]+>|\d+|\[[^\]\n]+\])[ \t]*"
+            rb"(?:SUB|ENDSUB|CALL|RETURN|IF|ELSEIF|ELSE|ENDIF|WHILE|ENDWHILE|DO|REPEAT|ENDREPEAT|BREAK|CONTINUE)\b"
+        ),
+        "O word of control flow",
+    ),
+    ("linuxcnc", (b"#<",), re.compile(rb"#<[^>\n]+>"), "named parameter"),
+    ("linuxcnc", (b"G90.1", b"G91.1"), re.compile(rb"G9[01]\.1(?!\d)"), "centres of arcs"),
+    (
+        "linuxcnc",
+        (b"G64", b"G064"),
+        re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"),
+        "tolerance of the path; FANUC's G64 has no P",
+    ),
+    ("linuxcnc", (b"61.1",), re.compile(rb"G0*61\.1(?!\d)"), "exact stop; not known on FANUC"),
+    ("linuxcnc", (b"G59.",), re.compile(rb"G59\.[123](?!\d)"), "work coordinate system 7 to 9"),
+    ("linuxcnc", (b"G38.",), re.compile(rb"G38\.[2-5](?!\d)"), "straight probe"),
+    ("haas", (b"G154",), re.compile(rb"G154[ \t]*P[ \t]*\d+"), "additional work offset"),
+    ("haas", (b"G187",), re.compile(rb"G187(?!\d)[ \t]*(?:[PE][ \t]*[\d.]+)?"), "smoothness"),
+    ("haas", (b"G103",), re.compile(rb"G103[ \t]*(?:P[ \t]*\d+)?(?![\d.])"), "limit of the look-ahead"),
+    ("haas", (b"M97",), re.compile(rb"M97[ \t]*P[ \t]*\d+"), "call of a subprogram by its N number"),
+    ("haas", (b"G150",), re.compile(rb"G150(?!\d)"), "general pocket milling"),
+    ("siemens", (b"CR",), re.compile(rb"(?<![A-Z])CR[ \t]*="), "radius of an arc"),
+    ("siemens", (b"MSG",), re.compile(rb"(?<![A-Z])MSG(?=\s|\()"), "message"),
+    (
+        "siemens",
+        (b"G4F", b"G04F", b"G4 ", b"G04 "),
+        re.compile(rb"G0*4[ \t]*F[ \t]*[\d.]+"),
+        "dwell in seconds; FANUC's F is a feed",
+    ),
+    ("siemens", (b"%_N_",), re.compile(rb"%_N_\w+"), "name of a program"),
+    ("siemens", (b"G700", b"G710"), re.compile(rb"G7[01]0(?![\d.])"), "inch or mm"),
+)
+"""Words that no FANUC control knows: one of the short texts is in a program that has the word."""
+
+_OF_FANUC: tuple[tuple[re.Pattern[bytes], str], ...] = (
+    (re.compile(rb"(?<![A-Z])(?:GOTO|THEN)(?![A-Z])"), "jump of a macro"),
+    (re.compile(rb"(?<![A-Z])WHILE[ \t]*\[[^\n]*\][ \t]*DO[ \t]*\d"), "loop of a macro"),
+    (re.compile(rb"G0*5\.1(?![\d])[ \t]*Q[ \t]*\d"), "look-ahead mode"),
+    (re.compile(rb"G0*8[ \t]*P[ \t]*[01](?!\d)"), "look-ahead mode"),
+    (re.compile(rb"G6[56](?![\d.])[ \t]*P[ \t]*\d+"), "call of a macro"),
+    (re.compile(rb"G54\.1[ \t]*P[ \t]*\d+"), "additional work offset"),
+    (re.compile(rb",[ \t]*[RC][ \t]*[\d.]+"), "corner word"),
+    (re.compile(rb"\A\s*%?\s*[O:]\d{1,8}[ \t]*$", re.MULTILINE), "program number"),
+)
+"""Words that LinuxCNC and a Sinumerik in DIN mode do not know; a Haas may."""
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """What shows for which control a program is written.
+
+    Attributes:
+        dialect: of the control.
+        line: of the first sign, from 1.
+        words: the sign itself.
+        meaning: what it is there.
+    """
+
+    dialect: InputDialect
+    line: int
+    words: str
+    meaning: str
+
+    @property
+    def reason(self) -> str:
+        """In words: "line 12: `O100 WHILE` (O word of control flow): LinuxCNC"."""
+        return f"line {self.line}: `{self.words}` ({self.meaning}): {CONTROLS[self.dialect]}"
+
+
+def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]:
+    """The first sign of every control for which a program may be written.
+
+    Only words that a control alone knows count; the first 64 KiB are looked at, comments left out.
+
+    Args:
+        text: the program.
+        of_fanuc: look for words of FANUC alone, too, where none of another control is found.
+
+    Returns:
+        One for each control, in the order of their lines; empty: nothing tells, it is in FANUC's words.
+    """
+    code = re.sub(rb";[^\n]*", b"", _COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
+    found: dict[InputDialect, tuple[int, Recognition]] = {}
+    for dialect, hints, sign, meaning in _SIGNS:
+        if any(hint in code for hint in hints):
+            _note(found, dialect, code, sign, meaning)
+    if found or of_fanuc:
+        for sign, meaning in _OF_FANUC:
+            _note(found, "fanuc", code, sign, meaning)
+        if "haas" in found:
+            found.pop("fanuc", None)  # macros, additional offsets and corner words are Haas' own too
+    return tuple(sign for _, sign in sorted(found.values(), key=lambda each: each[0]))
+
+
+def doubtful_dwell(text: bytes) -> tuple[int, str] | None:
+    """The first dwell of a program that is next to nothing on FANUC, and usual in LinuxCNC's seconds.
+
+    Args:
+        text: a program in which no word tells for which control it is.
+
+    Returns:
+        Line and sentence; None: there is none.
+    """
+    capitals = text[:LOOKED_AT_BYTES].upper()
+    if b"G4" not in capitals and b"G04" not in capitals:
+        return None
+    code = _COMMENT.sub(b" ", capitals)
+    match = _SHORT_DWELL.search(code)
+    if match is None:
+        return None
+    value = int(match[1])
+    return (
+        code.count(b"\n", 0, match.start()) + 1,
+        f"G04 P{value} is read as {value} ms (FANUC, Haas); on LinuxCNC it is {value} s: controller.dialect says which",
+    )
+
+
+def _note(
+    found: dict[InputDialect, tuple[int, Recognition]],
+    dialect: InputDialect,
+    code: bytes,
+    sign: re.Pattern[bytes],
+    meaning: str,
+) -> None:
+    match = sign.search(code)
+    if match is None or (dialect in found and found[dialect][0] <= match.start()):
+        return
+    words = " ".join(match[0].decode("latin-1").split())
+    line = code.count(b"\n", 0, match.start()) + 1
+    found[dialect] = match.start(), Recognition(dialect, line, words, meaning)
