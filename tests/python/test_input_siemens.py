@@ -226,7 +226,7 @@ GOLDEN = {
     "settable frames": ("G54\nG505\nG500\nG54", "G54/G54.1P5/G54.1P300/G54"),
     "tool and edge (i5cnc.com 126)": (
         'T5 M6\nG0 Z9\nT="MILL" D2\nM6\nG0 Z9\nD0\nG0 Z9',
-        "T5/M06/G43H5/G00Z9./T901/M06/G43H1901/G00Z9./G49/G00Z9.",
+        "T5/M06/G43H5/G00Z9./T901/M06/G43H801/G00Z9./G49/G00Z9.",
     ),
     "fixed points": ("G75 Z1=0\nG0 Z5", "G91/G30Z0./G90/G00Z5."),
     "M functions before and behind the motion": ("M8 X5 M5\nM1=4", "M08/G01X5.F1000./M05/M04"),
@@ -516,3 +516,21 @@ def test_the_page_names_every_word_that_is_left_out() -> None:
     )
     words = " ".join([*table["left_out"], *table["left_out_addresses"]]).split()
     assert [word for word in words if not re.search(rf"\b{word}\b", page)] == []
+
+
+def test_siemens_in_and_siemens_out_keep_names() -> None:
+    """Tools by name, other edges and frames are not FANUC's; written for a Sinumerik again they are what they were."""
+    text = f'{START}T="MILL 10" M6\nG505\nG0 Z9 D2\nX1\nG500\nG0 X2 Y0 Z5\nT7 M6\nG0 Z9\nM30\n'
+    machine = machine_with({**KEYS, "emission.dialect": "siemens", "controller.dialect": "siemens"})
+    program = sg.Program.from_text(text, machine)
+    written = translate(program, machine).text.decode()
+    for words in ('T="MILL 10"', "G505", "D2", "G500", "T7", "D1"):
+        assert re.search(rf"(?m)^{words}$|{words}", written), words
+    assert not re.search(r"T901|G54\.1|H8", written)
+    again = sg.Program.from_text(written, machine)
+    words_of = [
+        [line for line in one.expanded_text.splitlines() if line.startswith((b"G0", b"T", b"G5"))]
+        for one in (again, program)
+    ]
+    assert words_of[0][0] == b"G54"  # the opening of what is written names the frame
+    assert words_of[0][1:] == words_of[1]

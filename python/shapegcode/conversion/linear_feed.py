@@ -156,7 +156,7 @@ def linear_blocks(
     Returns:
         The blocks, in order.
     """
-    fit = _Fit(path, period_s, tolerance_mm, frozenset(joints))
+    fit = _JoinedBlocks(path, period_s, tolerance_mm, frozenset(joints))
     blocks = list(fit.blocks())
     return _at_rest(blocks, fit.points, fit.ends(blocks), period_s, tolerance_mm, modes) if modes else blocks
 
@@ -211,7 +211,7 @@ def largest_difference_mm(path: _core.Path, blocks: Sequence[LinearBlock], perio
     Returns:
         The largest distance.
     """
-    points = _Fit(path, period_s, 0.0, frozenset()).points
+    points = _JoinedBlocks(path, period_s, 0.0, frozenset()).points
     times = np.arange(1.0, len(points)) * period_s
     moved = positions_mm(points[0], blocks, times)
     return float(np.linalg.norm(moved - points[1:], axis=1).max())
@@ -285,7 +285,7 @@ class _Shape:
     aside_mm: Vector
 
 
-class _Fit:
+class _JoinedBlocks:
     """Chooses the blocks one after another, each as long as it may be."""
 
     def __init__(self, path: _core.Path, period_s: float, tolerance_mm: float, joints: frozenset[int]) -> None:

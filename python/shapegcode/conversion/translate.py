@@ -197,6 +197,9 @@ class _Translator:
         self._arcs = {} if self._dialect.arc_radius else dict(_arcs(program))
         self._times: dict[int, str] = {}
         self._firsts, self._lasts = set[int](), set[int]()
+        foreign = self._original.foreign
+        same_control = foreign is not None and foreign.dialect == machine.emission.dialect
+        self._names = foreign.settings.names if foreign is not None and same_control else {}
         self._linear: dict[int, list[str]] = {}
         if machine.emission.feed_form == "linear":
             for blocks, _, _ in shaped:
@@ -344,8 +347,12 @@ class _Translator:
             raise self._error(number, f"G43 without H: the offset in force is not known to {self._dialect.control}")
         if not skip and {"M02", "M30"} & {*codes}:
             self.state.ended_at = number
+        named = self._named(words)
         for letter, value in words:
             code = code_name(letter + value) if letter in "GM" else letter
+            if letter + value in named:
+                out.append(named[letter + value])
+                continue
             if code in before or (code == "G09" and self._dialect.exact_stop is not None):
                 out.append("")
                 continue
@@ -359,6 +366,19 @@ class _Translator:
             text = " ".join(self._comment(text) for text in comments)
             lines = [f"{lines[0]}{' ' * (self._dialect.comment == ';')}{text}", *lines[1:]] if lines else [text]
         return lines
+
+    def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
+        """Words that stand for others of the same control, from which the original was read."""
+        held = dict(words)
+        found = {}
+        if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:
+            found[f"T{held['T']}"] = tool
+            self.state.next_tool = held["T"]
+        for code, letter in (("G54.1", "P"), ("G43", "H")):
+            key = f"{code if letter == 'P' else ''}{letter}{held.get(letter, '')}"
+            if (code[0], code[1:]) in words and key in self._names:
+                found |= {code: self._names[key], f"{letter}{held[letter]}": ""}
+        return found
 
     def _hold(self, number: int, words: Sequence[tuple[str, str]], codes: Sequence[str], lines: Sequence[str]) -> None:
         """Hold what was written against what was read: each coordinate is there, and none besides."""

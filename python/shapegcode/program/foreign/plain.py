@@ -33,12 +33,15 @@ class ForeignSettings:
         tool_radius_mm: by D number, likewise.
         peck_clearance_mm: distance to which a peck of G73 and G83 returns; None: the machine file's.
         arc_radius_tolerance_mm: largest difference of start and end radius; None: the machine file's.
+        names: words of the plain program that stand for others of the source, for who writes for that control again:
+            {"T901": 'T="MILL"'}.
     """
 
     tool_length_mm: Mapping[int, float] = field(default_factory=dict)
     tool_radius_mm: Mapping[int, float] = field(default_factory=dict)
     peck_clearance_mm: float | None = None
     arc_radius_tolerance_mm: float | None = None
+    names: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

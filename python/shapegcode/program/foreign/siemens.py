@@ -14,7 +14,7 @@ from pathlib import Path
 
 from shapegcode._core import ProgramError
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.plain import ForeignProgram, PlainProgram
+from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram
 from shapegcode.program.foreign.siemens_blocks import (
     Block,
     Jump,
@@ -96,7 +96,7 @@ class _Run:
         ended = self._run(main, {})
         self.path.release()
         self.path.put("M30" if ended != "M2" else "M02")
-        return self.out.finish("siemens", self.path.line)
+        return self.out.finish("siemens", self.path.line, ForeignSettings(names=self.path.names))
 
     # ---- names -------------------------------------------------------------------------------------------------------
 

@@ -120,6 +120,7 @@ class SiemensPath:
         self._step: Vector | None = None  # along the end of the last move
         self.line, self.file = 1, 0
         self.moves = 0
+        self.names: dict[str, str] = {}  # words written, and those that they stand for
         self._plane, self._mode, self._feed = 17, 94, ""
         self._corner: _HeldCorner | None = None
         self._held: list[tuple[str, int, int]] = []  # lines of the block before a corner, and behind it

@@ -78,6 +78,7 @@ class BlockWords:
         self._uses_m6 = uses_m6
         self._tool, self._next_tool, self._edge, self._next_edge = 0, 0, -1, -1
         self._tools: dict[str, int] = {}
+        self._offsets: dict[tuple[int, int], int] = {}  # by tool and edge
         self._spindle = math.nan  # 1/min
         self._path_mode = ""
 
@@ -187,6 +188,7 @@ class BlockWords:
         elif re.fullmatch(r"G5[4-7]|G500|G50[5-9]|G5[1-9]\d", name):
             self.path.set_offset(name, _offset_word(name))
             if int(name[1:]) >= 500:
+                self.path.names[_offset_word(name)] = name
                 self.path.note(f"{name} is written as {_offset_word(name)}", name)
         elif name in _tables()[0]:
             self._leave_out(_tables()[0][name])
@@ -353,6 +355,7 @@ class BlockWords:
         if isinstance(value, str):
             if value not in self._tools:
                 self._tools[value] = 901 + len(self._tools)
+                self.path.names[f"T{self._tools[value]}"] = f'T="{value}"'
                 self.path.note(f'T="{value}" is written as T{self._tools[value]}', f"T {value}")
             tool = self._tools[value]
         else:
@@ -388,11 +391,19 @@ class BlockWords:
                 f"D{edge} in G{self.path.modes.plane}: G17 would have to be in force, a length along Z", column
             )
         self._edge = edge
-        number_of = (self._tool or edge) + 1000 * max(0, edge - 1) * (self._tool > 0)
-        self.path.put("G49" if edge == 0 else f"G43H{number_of}")
+        offset = self._offset_number(edge)
+        self.path.put("G49" if edge == 0 else f"G43H{offset}")
         self.path.forget("Z", shifted=True)
-        if edge > 1:
-            self.path.note(f"D{edge} of T{self._tool} is written as H{number_of}", f"D{edge}")
+
+    def _offset_number(self, edge: int) -> int:
+        """The number of the tool for its first edge, one from 801 for others: FANUC's offsets end with 999."""
+        tool = self._tool or edge
+        if edge <= 1 and (tool <= 800 or tool > 900) and tool <= 999:
+            return tool
+        found = self._offsets.setdefault((tool, edge), 801 + len(self._offsets))
+        self.path.names[f"H{found}"] = f"D{edge}"
+        self.path.note(f"D{edge} of T{tool} is written as H{found}", f"H{found}")
+        return found
 
     # ---- blocks of their own -----------------------------------------------------------------------------------------
 
