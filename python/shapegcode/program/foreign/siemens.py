@@ -16,9 +16,9 @@ from shapegcode._core import ProgramError
 from shapegcode.machine import Machine
 from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram
 from shapegcode.program.foreign.siemens_blocks import (
-    Block,
     Jump,
     ProgramLines,
+    SiemensBlock,
     StructureError,
     Word,
     programs_of_source,
@@ -187,7 +187,7 @@ class _Run:
         error.__dict__.update(line=line, column=column, alarm=0, file=program.file)
         return error
 
-    def _is_skipped(self, block: Block) -> bool:
+    def _is_skipped(self, block: SiemensBlock) -> bool:
         if not block.skip:
             return False
         switch = self.machine.input.block_skip
@@ -195,7 +195,7 @@ class _Run:
             raise WordError('/: whether the block runs would have to be known: input.block_skip = "on" or "off"', 1)
         return switch == "on"
 
-    def _words(self, block: Block) -> str:
+    def _words(self, block: SiemensBlock) -> str:
         """A block of words; says which of them ended the program."""
         self.words.comment(block.comment)
         if not block.words:
@@ -240,7 +240,7 @@ class _Run:
         if head is not None and head.saves:
             self.words.restore(modes)
 
-    def _heading(self, program: ProgramLines) -> Block | None:
+    def _heading(self, program: ProgramLines) -> SiemensBlock | None:
         """PROC at the begin of a program."""
         for index, line in enumerate(program.lines):
             if "PROC" in line.upper():
@@ -250,7 +250,7 @@ class _Run:
                 return None
         return None
 
-    def _parameters(self, head: Block, word: Word) -> tuple[dict[str, Variable], dict[str, Word]]:
+    def _parameters(self, head: SiemensBlock, word: Word) -> tuple[dict[str, Variable], dict[str, Word]]:
         given = list(word.given or ())
         if len(given) > len(head.definitions):
             raise word.error(f"{word.name} with {len(given)} values: PROC has {len(head.definitions)} parameters")
@@ -278,7 +278,7 @@ class _Run:
 
     # ---- control flow ------------------------------------------------------------------------------------------------
 
-    def _control(self, flow: _Flow, block: Block, index: int) -> int:
+    def _control(self, flow: _Flow, block: SiemensBlock, index: int) -> int:
         """A statement of control flow; gives the line that follows."""
         program, kind = flow.program, block.kind
         self.words.comment(block.comment)
@@ -320,18 +320,18 @@ class _Run:
         assert condition is not None
         return bool(condition(self))
 
-    def _set_counter(self, block: Block, value: Value) -> None:
+    def _set_counter(self, block: SiemensBlock, value: Value) -> None:
         if not self.knows(block.name):
             raise block.error(f"{block.name} of FOR is no variable of this program: DEF would have to define it before")
         self.assign(Word(block.name, block.column, None, "", block.index), value)
 
-    def _counts_on(self, block: Block) -> bool:
+    def _counts_on(self, block: SiemensBlock) -> bool:
         assert block.condition is not None
         now = number(self.value_of(block.name, tuple(each(self) for each in block.index), block.column), block.column)
         end = number(block.condition(self), block.column)
         return is_equal(now, end) or now < end
 
-    def _define(self, block: Block) -> None:
+    def _define(self, block: SiemensBlock) -> None:
         for each in block.definitions:
             if each.name in self._locals[-1]:
                 continue  # reached again by a jump
@@ -380,7 +380,7 @@ class _Flow:
             f"{jump.command} {jump.target}: no such label or block {where} it, outside of other IF and loops"
         )
 
-    def again(self, block: Block, index: int, count: int) -> int:
+    def again(self, block: SiemensBlock, index: int, count: int) -> int:
         """`REPEAT label P=n`: the lines from the label to this one, n times more."""
         left = self._again.get(index, count)
         if left <= 0:

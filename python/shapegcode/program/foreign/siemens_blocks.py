@@ -13,7 +13,7 @@ from functools import lru_cache
 from shapegcode.program.foreign.siemens_expressions import (
     NAME,
     Expression,
-    Scanner,
+    SiemensScanner,
     WordError,
     arguments,
     expression,
@@ -73,7 +73,7 @@ class Definition:
 
 
 @dataclass(frozen=True)
-class Block:
+class SiemensBlock:
     """A block as it was read; what `kind` says decides which fields count."""
 
     kind: str = "WORDS"
@@ -132,21 +132,21 @@ def split_comment(line: str) -> tuple[str, str]:
 
 
 @lru_cache(maxsize=4096)
-def block_of(line: str) -> Block:
+def block_of(line: str) -> SiemensBlock:
     """Read a line.
 
     Raises:
         WordError: with what would have to stand there.
     """
     code, comment = split_comment(line.rstrip())
-    scan = Scanner(in_capitals(code))
+    scan = SiemensScanner(in_capitals(code))
     head = _HEAD.match(scan.text)
     assert head is not None  # all of it may be left out
     scan.at = head.end()
     label = _LABEL.match(scan.text, _begin(scan))
     if label is not None:
         scan.at = label.end()
-    block = Block(
+    block = SiemensBlock(
         skip=head[1] is not None, number=f"N{int(head[3])}" if head[3] else "", label=label[1] if label else "",
         column=_begin(scan) + 1, comment=comment,
     )  # fmt: skip
@@ -161,12 +161,12 @@ def block_of(line: str) -> Block:
     return found
 
 
-def _begin(scan: Scanner) -> int:
+def _begin(scan: SiemensScanner) -> int:
     scan.skip()
     return scan.at
 
 
-def _statement(scan: Scanner, name: str, block: Block) -> Block | None:
+def _statement(scan: SiemensScanner, name: str, block: SiemensBlock) -> SiemensBlock | None:
     """A statement of control flow or a definition; None: the block is one of words."""
     begin = scan.at
     scan.at += len(name)
@@ -202,7 +202,7 @@ def _statement(scan: Scanner, name: str, block: Block) -> Block | None:
     return None
 
 
-def _jumps(scan: Scanner, condition: Expression | None) -> tuple[Jump, ...]:
+def _jumps(scan: SiemensScanner, condition: Expression | None) -> tuple[Jump, ...]:
     """One jump or several, each behind its condition."""
     found = [_jump(scan, condition)]
     while scan.take(_WORD["IF"]):
@@ -210,7 +210,7 @@ def _jumps(scan: Scanner, condition: Expression | None) -> tuple[Jump, ...]:
     return tuple(found)
 
 
-def _jump(scan: Scanner, condition: Expression | None) -> Jump:
+def _jump(scan: SiemensScanner, condition: Expression | None) -> Jump:
     column = _begin(scan) + 1
     command = scan.take(_JUMP)
     if not command:
@@ -223,7 +223,7 @@ def _jump(scan: Scanner, condition: Expression | None) -> Jump:
     return Jump(condition, command, f"N{int(target)}" if target.isdigit() else target, column)
 
 
-def _case(scan: Scanner, block: Block) -> Block:
+def _case(scan: SiemensScanner, block: SiemensBlock) -> SiemensBlock:
     chosen = expression(scan)
     if not scan.take(_WORD["OF"]):
         raise scan.error(f"{scan.rest or 'the end of the block'} where OF would have to follow")
@@ -233,7 +233,7 @@ def _case(scan: Scanner, block: Block) -> Block:
     return replace(block, kind="CASE", condition=chosen, jumps=tuple(jumps))
 
 
-def _for(scan: Scanner, block: Block) -> Block:
+def _for(scan: SiemensScanner, block: SiemensBlock) -> SiemensBlock:
     name = scan.take(NAME)
     index = indices(scan)
     scan.require("=", "= and the first value of FOR")
@@ -243,7 +243,7 @@ def _for(scan: Scanner, block: Block) -> Block:
     return replace(block, kind="FOR", name=name, index=index, start=start, condition=expression(scan))
 
 
-def _repeat(scan: Scanner, block: Block) -> Block:
+def _repeat(scan: SiemensScanner, block: SiemensBlock) -> SiemensBlock:
     """REPEAT of a loop, or `REPEAT label P=n` of a part of the program."""
     if scan.is_done:
         return replace(block, kind="REPEAT")
@@ -256,7 +256,7 @@ def _repeat(scan: Scanner, block: Block) -> Block:
     return replace(block, kind="AGAIN", name=label, condition=words[0].value if words else None)
 
 
-def _definitions(scan: Scanner) -> tuple[Definition, ...]:
+def _definitions(scan: SiemensScanner) -> tuple[Definition, ...]:
     kind = _type(scan, "DEF")
     found = []
     while True:
@@ -275,7 +275,7 @@ def _definitions(scan: Scanner) -> tuple[Definition, ...]:
             return tuple(found)
 
 
-def _type(scan: Scanner, what: str) -> str:
+def _type(scan: SiemensScanner, what: str) -> str:
     kind = scan.take(_TYPE)
     if kind in ("", "CHAR", "AXIS", "FRAME"):
         raise scan.error(
@@ -286,7 +286,7 @@ def _type(scan: Scanner, what: str) -> str:
     return kind
 
 
-def _procedure(scan: Scanner, block: Block) -> Block:
+def _procedure(scan: SiemensScanner, block: SiemensBlock) -> SiemensBlock:
     name = scan.take(NAME)
     found: list[Definition] = []
     if scan.takes("(") and not scan.takes(")"):
@@ -306,14 +306,14 @@ def _procedure(scan: Scanner, block: Block) -> Block:
     return replace(block, kind="PROC", name=name, definitions=tuple(found), saves=saves)
 
 
-def _words(scan: Scanner) -> tuple[Word, ...]:
+def _words(scan: SiemensScanner) -> tuple[Word, ...]:
     found = []
     while not scan.is_done:
         found.append(_word(scan))
     return tuple(found)
 
 
-def _word(scan: Scanner) -> Word:
+def _word(scan: SiemensScanner) -> Word:
     begin = scan.at
     name = NAME.match(scan.text, begin)
     if name is None:
@@ -351,7 +351,7 @@ def _is_name(name: str) -> bool:
     return len(name) > 1 and (name[1].isalpha() or name[1] == "_")
 
 
-def _assigned(scan: Scanner, name: str, index: tuple[Expression, ...], begin: int) -> Word:
+def _assigned(scan: SiemensScanner, name: str, index: tuple[Expression, ...], begin: int) -> Word:
     # `X10Y=5`: an address with its number, and the next word behind it
     address = _ADDRESS.match(scan.text, begin)
     if address is not None and not index and address.end() < begin + len(name) and not _is_name(name):
@@ -393,7 +393,7 @@ class ProgramLines:
     partners: dict[int, int] = field(default_factory=dict, compare=False)  # of IF, ELSE and loops: the next of them
     starts: dict[int, int] = field(default_factory=dict, compare=False)  # of the end of a loop: its begin
 
-    def block(self, index: int) -> Block:
+    def block(self, index: int) -> SiemensBlock:
         """The block of a line, from 0."""
         return block_of(self.lines[index])
 

@@ -50,7 +50,7 @@ _RELATIVE = 1e-12
 
 
 @dataclass
-class Scanner:
+class SiemensScanner:
     """A line of a program in capitals, read from left to right."""
 
     text: str
@@ -99,12 +99,12 @@ class Scanner:
             raise self.error(f"{self.rest or 'the end of the block'} where {what} would have to follow")
 
 
-def expression(scan: Scanner) -> Expression:
+def expression(scan: SiemensScanner) -> Expression:
     """Read an expression, as far as it reaches."""
     return _level(scan, 0)
 
 
-def _level(scan: Scanner, level: int) -> Expression:
+def _level(scan: SiemensScanner, level: int) -> Expression:
     if level == len(_LEVELS):
         return _unary(scan)
     left = _level(scan, level + 1)
@@ -130,7 +130,7 @@ def _binary(operator: str, left: Expression, right: Expression, column: int) -> 
     return value
 
 
-def _unary(scan: Scanner) -> Expression:
+def _unary(scan: SiemensScanner) -> Expression:
     begin = scan.at
     operator = scan.take(_UNARY)
     if not operator:
@@ -144,7 +144,7 @@ def _unary(scan: Scanner) -> Expression:
     return lambda scope: sign * number(inner(scope), column)
 
 
-def _primary(scan: Scanner) -> Expression:
+def _primary(scan: SiemensScanner) -> Expression:
     scan.skip()
     begin, column = scan.at, scan.at + 1
     if scan.takes("("):
@@ -178,7 +178,7 @@ def _primary(scan: Scanner) -> Expression:
     return lambda scope: scope.value_of(name, tuple(each(scope) for each in index), column)
 
 
-def indices(scan: Scanner) -> tuple[Expression, ...]:
+def indices(scan: SiemensScanner) -> tuple[Expression, ...]:
     """Read `[...]` behind a name, or nothing."""
     if not scan.takes("["):
         return ()
@@ -189,7 +189,7 @@ def indices(scan: Scanner) -> tuple[Expression, ...]:
     return tuple(found)
 
 
-def arguments(scan: Scanner, name: str) -> list[Expression | None]:
+def arguments(scan: SiemensScanner, name: str) -> list[Expression | None]:
     """Read the values in brackets behind a name; None: left out."""
     scan.require("(", f"the opening bracket of {name}(")
     if scan.takes(")"):

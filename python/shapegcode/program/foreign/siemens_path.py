@@ -26,15 +26,15 @@ _TANGENT = math.radians(0.05)  # two blocks that meet at less have no corner
 
 
 @dataclass(frozen=True)
-class Frame:
+class SiemensFrame:
     """The programmable frame: where programmed coordinates lie in those of the work offset."""
 
     linear: Vector = field(default_factory=lambda: np.eye(3))
     offset: Vector = field(default_factory=lambda: np.zeros(3))
 
-    def then(self, other: Frame) -> Frame:
+    def then(self, other: SiemensFrame) -> SiemensFrame:
         """Both, the other one in the coordinates of this one (ATRANS, AROT ...)."""
-        return Frame(self.linear @ other.linear, self.offset + self.linear @ other.offset)
+        return SiemensFrame(self.linear @ other.linear, self.offset + self.linear @ other.offset)
 
     @cached_property
     def is_shift(self) -> bool:
@@ -57,7 +57,7 @@ def _product(matrix: Vector, point: Vector) -> Vector:
 
 
 @dataclass
-class Modes:
+class SiemensModes:
     """What is in force."""
 
     motion: str = ""  # G0, G1, G2, G3, CIP, CT
@@ -69,7 +69,7 @@ class Modes:
     feed: float | None = None  # mm/min, mm/rev or 1/min
     is_linear: bool = False  # FLIN
     offset: str = ""  # G54 ...
-    frame: Frame = field(default_factory=Frame)
+    frame: SiemensFrame = field(default_factory=SiemensFrame)
     rounding_mm: float = 0.0  # RNDM
 
 
@@ -112,7 +112,7 @@ class SiemensPath:
     def __init__(self, machine: Machine, out: PlainProgram) -> None:
         """Begin where nothing is known."""
         self.machine, self.out = machine, out
-        self.modes = Modes()
+        self.modes = SiemensModes()
         self.at = np.full(3, math.nan)  # in the coordinates of the work offset
         self.shifted = [False] * 3  # an offset of the axis changed since it was programmed absolutely
         self.pole = np.zeros(3)
@@ -140,7 +140,7 @@ class SiemensPath:
 
     # ---- frames and offsets ------------------------------------------------------------------------------------------
 
-    def set_frame(self, frame: Frame) -> None:
+    def set_frame(self, frame: SiemensFrame) -> None:
         """Another programmable frame."""
         changed = np.abs(frame.linear - self.modes.frame.linear).max(axis=1) + np.abs(
             frame.offset - self.modes.frame.offset

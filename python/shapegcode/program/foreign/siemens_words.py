@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from shapegcode.program.foreign.plain import number_text
-from shapegcode.program.foreign.siemens_blocks import Block, Word
+from shapegcode.program.foreign.siemens_blocks import SiemensBlock, Word
 from shapegcode.program.foreign.siemens_expressions import Value, WordError, number, whole
-from shapegcode.program.foreign.siemens_path import MM_PER_INCH, Frame, Given, Modes, SiemensPath
+from shapegcode.program.foreign.siemens_path import MM_PER_INCH, Given, SiemensFrame, SiemensModes, SiemensPath
 from shapegcode.program.stamp import plain_comment
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ class BlockWords:
         known = name in _FRAMES or name in _tables()[0] or name in ("CIP", "CT", "FLIN", "SUPA", "RET")
         return not known and re.fullmatch(r"L\d+|[A-Z_][A-Z_][A-Z0-9_]*", name) is not None
 
-    def restore(self, modes: Modes) -> None:
+    def restore(self, modes: SiemensModes) -> None:
         """What was in force before a subprogram with SAVE."""
         now = self.path.modes
         self.path.set_plane(modes.plane)
@@ -105,7 +105,7 @@ class BlockWords:
         self.path.set_frame(modes.frame)
         self.path.modes = modes
 
-    def execute(self, block: Block) -> str:
+    def execute(self, block: SiemensBlock) -> str:
         """One block; says which word ends the program, or nothing."""
         words = block.words
         names = {word.name for word in words if word.value is None or word.name == "M"}
@@ -420,7 +420,7 @@ class BlockWords:
         kind = name.removeprefix("A")
         if (kind == "ROT") != ("RPL" in values) and values and kind != "ROT":
             raise words[0].error(f"RPL= is an angle: ROT or AROT would have to stand before it, not {name}")
-        frame = _frame_of(kind, values, path.modes.plane, words[0].column) if values else Frame()
+        frame = _frame_of(kind, values, path.modes.plane, words[0].column) if values else SiemensFrame()
         is_additive = name.startswith("A") and name != kind
         path.set_frame(path.modes.frame.then(frame) if is_additive else frame)
 
@@ -502,17 +502,17 @@ def _offset_word(name: str) -> str:
     return name if code < 500 else f"G54.1P{code - 500 or 300}"
 
 
-def _frame_of(kind: str, values: dict[str, float], plane: int, column: int) -> Frame:
+def _frame_of(kind: str, values: dict[str, float], plane: int, column: int) -> SiemensFrame:
     """One programmable frame."""
     vector = np.array([values.get(axis, 0.0) for axis in "XYZ"])
     if kind == "TRANS":
-        return Frame(offset=vector)
+        return SiemensFrame(offset=vector)
     if kind == "MIRROR":
-        return Frame(np.diag([-1.0 if axis in values else 1.0 for axis in "XYZ"]))
+        return SiemensFrame(np.diag([-1.0 if axis in values else 1.0 for axis in "XYZ"]))
     if kind == "SCALE":
         if any(value <= 0.0 for value in values.values()):
             raise WordError("SCALE: factors would have to be more than 0", column)
-        return Frame(np.diag([values.get(axis, 1.0) for axis in "XYZ"]))
+        return SiemensFrame(np.diag([values.get(axis, 1.0) for axis in "XYZ"]))
     if len(values) != 1:
         raise WordError("ROT about several axes is not read: RPL= or one axis would have to stand there", column)
     name, angle = next(iter(values.items()))
@@ -521,4 +521,4 @@ def _frame_of(kind: str, values: dict[str, float], plane: int, column: int) -> F
     linear = np.eye(3)
     first, second = (axis + 1) % 3, (axis + 2) % 3
     linear[[first, first, second, second], [first, second, first, second]] = cosine, -sine, sine, cosine
-    return Frame(linear)
+    return SiemensFrame(linear)
