@@ -17,11 +17,12 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget
+from shapegcode.conversion.linear_feed import joints_of, largest_difference_mm, linear_blocks, linear_lines
 from shapegcode.conversion.result import Conversion, DialectNotes
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import CODE, Dialect, code_name, dialect_of, fanuc_meaning
-from shapegcode.program import Program, located_error
+from shapegcode.program import Program, located_error, written_increment_mm
 from shapegcode.program.stamp import plain_comment, text_mark
 
 Converted = TypeVar("Converted", bound=Conversion)
@@ -186,6 +187,7 @@ class _Translator:
         self._shaped = shaped
         self.state = _State(int(machine.power_on.motion[1:]), machine.power_on.units)
         self.cautions: dict[str, str] = {}
+        self._joined_um = 0.0
         self._rapid = min(axis.rapid_mm_per_min for axis in machine.axes.as_tuple())
         core = program.core
         self._has_percent = core.find(b"%", 1 + core.find(b"%")) > 0  # one alone is the last
@@ -195,15 +197,50 @@ class _Translator:
         self._arcs = {} if self._dialect.arc_radius else dict(_arcs(program))
         self._times: dict[int, str] = {}
         self._firsts, self._lasts = set[int](), set[int]()
+        foreign = self._original.foreign
+        same_control = foreign is not None and foreign.dialect == machine.emission.dialect
+        self._names = foreign.settings.names if foreign is not None and same_control else {}
+        self._linear: dict[int, list[str]] = {}
+        if machine.emission.feed_form == "linear":
+            for blocks, _, _ in shaped:
+                self._join(blocks, block_period_s)
         for blocks, _, _ in shaped if self._dialect.time_feed else ():
             times = dict(_block_times(blocks, block_period_s))
             self._times |= times
             self._firsts |= {min(times, default=-1)}
             self._lasts |= {max(times, default=-1)}
 
+    def _join(self, blocks: _core.Path, period_s: float) -> None:
+        """Write the blocks of a shaped cut with a feed that is linear along them, where their lines are mere moves."""
+        text = self._program.expanded_text.decode("latin-1").split(self._program.core.line_end)
+        numbers = [int(number) for number in blocks.segment_lines]
+        lines = {number: text[number - 1].replace(" ", "") for number in numbers}
+        joints = joints_of(lines, numbers)
+        distances = re.findall(r"G9[01](?![\d.])", "".join(text[max(0, numbers[0] - 9) : numbers[0] - 1]))
+        if joints is None or distances[-1:] != ["G90"] or self._program.core.find(b"G20") >= 0:
+            why = "it has steps in G91, inches, or other words in its blocks"
+            self.cautions["constant"] = f"{self._where(numbers[0])}: this cut stays in blocks of constant feed: {why}"
+            return
+        increment_mm = written_increment_mm(self._machine, 21)
+        axes = enumerate(self._machine.axes.as_tuple())
+        modes = [(k, mode.frequency_hz, mode.damping_ratio) for k, axis in axes for mode in axis.modes]
+        joined = linear_blocks(blocks, period_s, increment_mm, joints, modes)
+        off_mm = largest_difference_mm(blocks, joined, period_s)
+        if off_mm > 1.5 * increment_mm:
+            raise RoundTripError(f"line {numbers[0]}: joined blocks are {off_mm * 1e3:.2f} µm off the shaped ones")
+        self._linear |= linear_lines(lines, blocks, joined, round(-math.log10(increment_mm)))
+        self.state.added += len(joined) - len(numbers)
+        self._joined_um = max(self._joined_um, off_mm * 1e3)
+        self.cautions["FLIN"] = (
+            f"blocks with a feed that is linear along their path (FLIN): the command is within {self._joined_um:.2f} "
+            "µm of the blocks of constant feed that were judged, at the ends of their periods; not tried on a control"
+        )
+
     def lines(self, number: int, line: str) -> list[str]:
         """What becomes of a line."""
         state = self.state
+        if number in self._linear:
+            return self._linear[number]
         if state.percents > 1 or (state.ended_at and line.lstrip()[:1] not in ("%", "(", "")):
             return self._left_out(number)
         if (place := _PLACE.fullmatch(line)) is not None:
@@ -234,6 +271,8 @@ class _Translator:
         on, dialect = self._machine.power_on, self._dialect
         notes = [f"DIALECT {dialect.control}", *dialect.header]
         notes += _wrapped("ASSUMED ", [topic.upper() for topic in dialect.assumed])
+        if self._machine.emission.feed_form == "linear":
+            notes.append("FEED LINEAR ALONG BLOCKS FLIN - NOT TRIED ON A CONTROL")
         comments = [self._comment(_header(note)) for note in notes] if self._machine.emission.header else []
         own = {code_name(letter + value) for letter, value in _WORD.findall(first) if letter == "G"}
         codes = [on.units, on.plane, on.distance, on.feed_mode, "G40", on.path_mode, on.work_offset, "G80"]
@@ -308,8 +347,12 @@ class _Translator:
             raise self._error(number, f"G43 without H: the offset in force is not known to {self._dialect.control}")
         if not skip and {"M02", "M30"} & {*codes}:
             self.state.ended_at = number
+        named = self._named(words)
         for letter, value in words:
             code = code_name(letter + value) if letter in "GM" else letter
+            if letter + value in named:
+                out.append(named[letter + value])
+                continue
             if code in before or (code == "G09" and self._dialect.exact_stop is not None):
                 out.append("")
                 continue
@@ -323,6 +366,19 @@ class _Translator:
             text = " ".join(self._comment(text) for text in comments)
             lines = [f"{lines[0]}{' ' * (self._dialect.comment == ';')}{text}", *lines[1:]] if lines else [text]
         return lines
+
+    def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
+        """Words that stand for others of the same control, from which the original was read."""
+        held = dict(words)
+        found = {}
+        if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:
+            found[f"T{held['T']}"] = tool
+            self.state.next_tool = held["T"]
+        for code, letter in (("G54.1", "P"), ("G43", "H")):
+            key = f"{code if letter == 'P' else ''}{letter}{held.get(letter, '')}"
+            if (code[0], code[1:]) in words and key in self._names:
+                found |= {code: self._names[key], f"{letter}{held[letter]}": ""}
+        return found
 
     def _hold(self, number: int, words: Sequence[tuple[str, str]], codes: Sequence[str], lines: Sequence[str]) -> None:
         """Hold what was written against what was read: each coordinate is there, and none besides."""

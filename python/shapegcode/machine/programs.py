@@ -171,6 +171,11 @@ class Emission(TomlTable):
         'of the coordinates in the block too, unless it is one code: { "G28" = "SUPA G0 Z0 D0" }',
         default={},
     )
+    feed_form: Literal["constant", "linear"] = key(
+        'feed of shaped blocks. "constant": each has its own; "linear": along the path of a block from the F before it '
+        'to its own (FLIN), which takes fewer blocks; for dialect = "siemens" alone, and not tried on a control',
+        default="constant",
+    )
     decimals: Annotated[int, Strict(), Field(ge=2, le=6)] | None = key(
         "decimals of positions in mm in shaped blocks, one more in inch; left out: as the dialect wants them, else "
         "those of controller.least_increment_mm",
@@ -290,6 +295,11 @@ class Emission(TomlTable):
         for name, stated in (("words", self.words), ("decimals", self.decimals)):
             if stated and self.dialect == "fanuc":
                 raise ValueError(f"{name} counts only where emission.dialect is another one than fanuc")
+        if self.feed_form == "linear" and self.dialect != "siemens":
+            raise ValueError(
+                f'feed_form = "linear" with dialect = "{self.dialect}": no word for a feed linear along a block is '
+                "known there; a Sinumerik has FLIN"
+            )
         return self
 
     @property

@@ -35,6 +35,8 @@ class ForeignSettings:
         arc_radius_tolerance_mm: largest difference of start and end radius; None: the machine file's.
         calculator_decimal_point: whether X10 is 10 mm; None: as the machine file says.
         called_text: writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none.
+        names: words of the plain program that stand for others of the source, for who writes for that control again:
+            {"T901": 'T="MILL"'}.
     """
 
     tool_length_mm: Mapping[int, float] = field(default_factory=dict)
@@ -43,6 +45,7 @@ class ForeignSettings:
     arc_radius_tolerance_mm: float | None = None
     calculator_decimal_point: bool | None = True
     called_text: Callable[[str, str], str] | None = None
+    names: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
