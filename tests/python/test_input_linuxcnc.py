@@ -86,6 +86,48 @@ def test_what_cannot_be_read(body: str, message: str) -> None:
     assert message in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("G1 X1e3", "E3 and no word in the block that uses it"), ("G1 X5 D3", "D3"), ("G1 X5 H3", "H3"),
+        ("G1 X5\nX6 I3", "I3"), ("G2 X10 I5 K3", "K is no centre of an arc in G17"), ("G1 X5 P3", "P3"),
+        ("G18\nG2 X10 I5 J1", "J is no centre of an arc in G18"), ("G90.1\nG2 X10 I5 J0 K3", "K is no centre"),
+        ("G81 X1 Z-1 R1 P3", "P3"), ("G81 X1 Z-1 R1\nX2 Q3", "Q3"), ("G82 X1 Z-1 R1 P1 K3", "K3"),
+        ("G2 X10 I5 L2", "L2"), ("G92 X1 P2", "P2"), ("G54 P2", "P2"), ("G64 P1 R2", "R2"), ("G49 H1", "H1"),
+        ("G81 X1 Z-1 R1 A5", "A in a drilling"), ("M3 M5", "M3 and M5 in one block"), ("M7 M8", "M7 and M8"),
+        ("T1.5", "no whole number"), ("S-5", "negative"),
+        ("G1 X1(a)2", "a comment stands inside a word"), ("G1 X1(a).5", "a comment stands"), ("G1 Y(a)2", "a comment"),
+        ("#1(a)=5", "a comment stands"), ("#1=[1(a)+1]", "a comment stands"), ("G1 X5 (a) 3", "a comment stands"),
+        ("G1 X5\x0bY3", "is no word"),
+    ],
+)  # fmt: skip
+def test_what_linuxcnc_refuses_is_not_read_otherwise(body: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(sg.ProgramError, match=r"^part\.ngc:\d+:1: ") as error:
+        read(body)
+    assert message in str(error.value)
+    with pytest.raises(RuntimeError, match="rs274 rejects the program"):
+        run_rs274(f"{HEAD}{body}\nM2\n", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        *(f"O1 repeat [{n}]\nG91 G1 X1\nO1 endrepeat\nG90 X9" for n in (0.4, 0.6, 1.5, 2.2, 2.5, 2.7, 3.5, -0.6)),
+        "G1 X1\r5 Y2", "G1 X5 (a)(b) Y3 (c)", "O1 repeat [2] (twice)\nG91 G1 X1\nO1 endrepeat ; end\nG90 X9",
+        "G2 X10 I5\nI5", "M19 R90 P1\nG1 X1", "M50 P1\nG1 X1", "G64 P1 Q2\nG1 X1", "G18\nG2 X10 Z5 I5 K0\nX20 I5",
+    ],
+)  # fmt: skip
+def test_the_same_moves_as_rs274(body: str, tmp_path: Path) -> None:
+    theirs = [*canonical_moves(run_rs274(f"{HEAD}{body}\nM2\n", tmp_path))]
+    assert agree(read(body), theirs) > 0
+
+
+@pytest.mark.parametrize("value", ["[" * 3000 + "1" + "]" * 3000, "[" + "-" * 5000 + "[1]]", "1" * 400])
+def test_values_beyond_all_measure_are_refused(value: str) -> None:
+    with pytest.raises(sg.ProgramError, match=r"^part\.ngc:4:1: .*(nested too deep|too large)"):
+        read(f"G1 X{value}")
+
+
 def test_settings_of_a_line_take_effect_together() -> None:
     assert ends(read("#31 = 1 #32 = 2\n#31 = #32 #32 = #31\nG1 X#31 Y#32"))[-1][:2] == [2.0, 1.0]
 

@@ -167,6 +167,11 @@ class _Run:
                     continue
             except WordError as error:
                 raise self._error(program, index, error.column, str(error)) from None
+            except RecursionError:
+                message = "the values of this block are nested too deep to be worked out"
+                raise self._error(program, index, 1, message) from None
+            except (OverflowError, ValueError):
+                raise self._error(program, index, 1, "a value is too large to be computed") from None
             index += 1
         self._locals.pop()
         return ""
