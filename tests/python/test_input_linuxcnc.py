@@ -270,6 +270,33 @@ def test_a_dwell_that_nothing_tells_is_said_with_both_meanings() -> None:
         )
 
 
+def test_turns_of_an_arc_that_nothing_tells_are_said() -> None:
+    program = sg.Program.from_text("G21\nG0 X0 Y0\nG2 X0 I5 F100 P3\nM30\n", "vx500", source="a.nc")
+    assert program.warnings[0].startswith("a.nc:3: P3 of an arc is not read, as FANUC knows none; on LinuxCNC the arc")
+    for other in ("G2 X0 I5 F100 M98 P3", "G2 X0 I5 F100 P1", "(G2 X0 I5 P3)"):
+        text = f"O1\nG21\nG0 X0 Y0\n{other}\nM30\nO3\nM99\n"
+        assert not any("turns" in each for each in sg.Program.from_text(text, "vx500").warnings)
+
+
+@pytest.mark.parametrize("dialect", ["auto", "fanuc"])
+def test_words_behind_a_semicolon_are_neither_executed_nor_left_out_unsaid(dialect: str) -> None:
+    machine_ = machine_with({"controller.dialect": dialect})
+    head = "G21\nG0 X0. Y0.\nF100.\n"
+    for line in ("G1 X10. ; G1 Y5.", "; Y5.", "G1 X10. (A) ;;Y5."):
+        with pytest.raises(sg.ProgramError, match=r"^a\.nc:4:1: words behind `;`: FANUC begins a block there"):
+            sg.Program.from_text(f"{head}{line}\nM30\n", machine_, source="a.nc")
+    for line in ("G1 X10.;", "G1 X10.; (Y5.)", "G1 X10.;; \r", "(A; Y5.)\nG1 X10.;", "G1 X10.\n%;"):
+        program = sg.Program.from_text(f"{head}{line}\nM30\n", machine_, source="a.nc")
+        assert ends(program)[-1][:2] == [10.0, 0.0]
+    linuxcnc = sg.Program.from_text(f"{head}G1 X10. ; G1 Y5.\nM30\n", machine())
+    assert ends(linuxcnc)[-1][:2] == [10.0, 0.0]
+
+
+def test_what_stands_behind_the_end_says_nothing_of_the_control() -> None:
+    program = sg.Program.from_text("%\nO1\nG21 G0 X0.\nM30\n%\nNOT FOR THE HAAS: G154 P3 M97 P1\n", machine_with())
+    assert program.foreign is None
+
+
 def test_mixed_and_misstated_programs_are_refused() -> None:
     mixed = "G21\n#<depth> = 3\nIF [#1 EQ 2] GOTO 10\nM2\n"
     with pytest.raises(

@@ -518,6 +518,20 @@ def test_values_beyond_all_measure_are_refused(block: str) -> None:
         read(START + block)
 
 
+@pytest.mark.parametrize(
+    "block",
+    ["R1=5\nX=R1", "X=IC(5)", "X=AC(5)", "GOTOF E1\nE1:", "TRANS X5\nX5", "AROT Z90", "R1 = 5 GOTO E1\nE1: Z=R1",
+     "R1=5\nGOTO E1\nE1: Z=R1"],
+)  # fmt: skip
+def test_recognised_by_words_that_only_a_sinumerik_knows(block: str) -> None:
+    try:
+        said = sg.Program.from_text(START + block + "\nM30\n", machine_with(KEYS), source="part.mpf").warnings[0]
+    except sg.ProgramError as error:
+        said = str(error)
+    assert said.startswith("part.mpf:1: read as a program for a Sinumerik: line 4: ") or "GOTO" in said, said
+    assert "mixes" not in said
+
+
 def test_before_the_first_move() -> None:
     with pytest.raises(sg.ProgramError, match="MD20150"):
         read("X5\nM30")

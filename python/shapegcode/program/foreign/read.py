@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.program.foreign.plain import ForeignProgram, refusal
-from shapegcode.program.foreign.recognize import CONTROLS, recognize
+from shapegcode.program.foreign.recognize import CONTROLS, recognize, words_behind_semicolon
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -40,6 +40,13 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
     """
     dialect, reason, line = input_dialect(data, machine, source)
     if dialect == "fanuc":
+        if (line_of_words := words_behind_semicolon(data)) is not None:
+            raise refusal(
+                source,
+                line_of_words,
+                "words behind `;`: FANUC begins a block there, LinuxCNC, a Haas and a Sinumerik have a comment; write "
+                "a line end or ( ), or say whose program it is: --set controller.dialect=linuxcnc, haas or siemens",
+            )
         return None
     if find_spec(f"shapegcode.program.foreign.{dialect}") is None:
         raise refusal(source, line, f"{reason}: programs for {CONTROLS[dialect]} are not read")
