@@ -270,6 +270,31 @@ def test_a_dwell_that_nothing_tells_is_said_with_both_meanings() -> None:
         )
 
 
+def test_a_called_file_is_read_as_strictly_as_the_program(tmp_path: Path) -> None:
+    (tmp_path / "O100.nc").write_text("O100\nG1 X5. ; Y9.\nM99\n")
+    with pytest.raises(sg.ProgramError, match=r"O100\.nc:2:1: words behind `;`"):
+        sg.Program.from_text("O1\nG21 G0 X0. Y0.\nF100.\nM98 P100\nM30\n", machine_with(), folder=tmp_path)
+    (tmp_path / "hole.ngc").write_bytes(b"\xef\xbb\xbfo<hole> sub\r\nG1 X#1\r\no<hole> endsub\r\n")
+    assert ends(read("o<hole> call [5]", tmp_path))[-1][0] == 5.0
+    (tmp_path / "L10.SPF").write_bytes(b"\xef\xbb\xbfG1 X5 F100 ; a\rX9\r\nM17\r\n")
+    siemens = machine_with({"controller.dialect": "siemens"})
+    assert ends(sg.Program.from_text("G0 X0 Y0 Z0\nL10\nM30\n", siemens, folder=tmp_path))[-1] == [5.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "linuxcnc", "haas", "siemens"])
+def test_an_empty_program_ends_in_no_traceback(dialect: str) -> None:
+    for text in ("", "\n", "%\n", "%"):
+        try:
+            assert not moves_of(sg.Program.from_text(text, machine_with({"controller.dialect": dialect})))
+        except sg.ProgramError as error:
+            assert str(error).startswith("<text>:")
+
+
+def test_an_o_word_behind_a_slash_is_refused_by_name() -> None:
+    with pytest.raises(sg.ProgramError, match=r"^part\.ngc:4:1: an O word behind `/`"):
+        read("/O1 repeat [2]\nG91 G1 X1\n/O1 endrepeat")
+
+
 def test_turns_of_an_arc_that_nothing_tells_are_said() -> None:
     program = sg.Program.from_text("G21\nG0 X0 Y0\nG2 X0 I5 F100 P3\nM30\n", "vx500", source="a.nc")
     assert program.warnings[0].startswith("a.nc:3: P3 of an arc is not read, as FANUC knows none; on LinuxCNC the arc")

@@ -78,7 +78,7 @@ def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None =
     """
     notes: dict[str, Note] = {}
     lines, called = _lines(source, file, notes)
-    numbers = [*range(1, len(lines) + 1)]
+    numbers = [*range(1, max(len(lines), 1) + 1)]
     if called:
         lines, numbers = _with_subprograms(lines, called, file)
     settings = ForeignSettings(calculator_decimal_point=None, called_text=called_haas_text)

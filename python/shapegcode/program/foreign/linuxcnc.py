@@ -554,4 +554,4 @@ def _last_number(text: str, letter: str, otherwise: float | None) -> float | Non
 def _file_text(path: Path, most: int) -> str:
     from shapegcode.io.data_file import read_file
 
-    return read_file(path, most).decode("utf-8", "replace")
+    return read_file(path, most).decode("utf-8-sig", "replace")

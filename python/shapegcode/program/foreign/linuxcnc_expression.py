@@ -314,6 +314,8 @@ def read_block(line: str) -> Block:
     """
     code, comments = without_comments(line)
     skips = code.startswith("/")
+    if code.startswith("/o"):
+        raise ValueError("an O word behind `/`: it is not read; take the `/` away, or the line")
     scanner = Scanner(code[1:] if skips else code)
     words: list[tuple[str, float | Value]] = []
     settings: list[Setting] = []

@@ -430,6 +430,6 @@ class _Store:
         for known in (f"{name}.SPF", f"{name}.MPF", f"_N_{name}_SPF", f"_N_{name}_MPF"):
             if known in self._files:
                 path = self._files[known]
-                found = programs_of_source(path.read_text(encoding="utf-8", errors="replace"), str(path))
+                found = programs_of_source(path.read_bytes().decode("utf-8-sig", "replace"), str(path))
                 return replace(found[0], name=name)
         return None
