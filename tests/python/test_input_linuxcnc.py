@@ -317,6 +317,12 @@ def test_words_behind_a_semicolon_are_neither_executed_nor_left_out_unsaid(diale
     assert ends(linuxcnc)[-1][:2] == [10.0, 0.0]
 
 
+def test_a_program_for_a_mitsubishi_is_not_taken_for_one_of_linuxcnc() -> None:
+    """G61.1 is its high-accuracy control, P of G04 its milliseconds."""
+    with pytest.raises(sg.ProgramError, match=r"^<text>:3:1: unknown G code G61\.1"):
+        sg.Program.from_text("G21\nG0 X0. Y0.\nG61.1\nG1 X10. F100.\nG4 P500\nM30\n", machine_with())
+
+
 def test_what_stands_behind_the_end_says_nothing_of_the_control() -> None:
     program = sg.Program.from_text("%\nO1\nG21 G0 X0.\nM30\n%\nNOT FOR THE HAAS: G154 P3 M97 P1\n", machine_with())
     assert program.foreign is None

@@ -38,7 +38,6 @@ _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ..
         re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"),
         "tolerance of the path; FANUC's G64 has no P",
     ),
-    ("linuxcnc", (b"61.1",), re.compile(rb"G0*61\.1(?!\d)"), "exact stop; not known on FANUC"),
     ("linuxcnc", (b"G59.",), re.compile(rb"G59\.[123](?!\d)"), "work coordinate system 7 to 9"),
     ("linuxcnc", (b"G38.",), re.compile(rb"G38\.[2-5](?!\d)"), "straight probe"),
     ("haas", (b"G154",), re.compile(rb"G154[ \t]*P[ \t]*\d+"), "additional work offset"),
