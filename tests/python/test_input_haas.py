@@ -157,7 +157,11 @@ def test_macros_are_fanucs() -> None:
         ("G76 X1. Z-1. R1.", "fine boring"), ("G77 X1. Z-1. R1.", "back boring"), ("G87 X1. Z-1.", "manual retract"),
         ("G88 X1. Z-1.", "manual retract"), ("G93", "inverse time"), ("G96 S100", "constant surface speed"),
         ("G68 X0. Y0. R10.", "no text was found"), ("G51 P2.", "no text was found"), ("G141 X1.", "no text was found"),
-        ("G83 Z-1. R1. I1. J.1 K.2 F10.", "changes the pecks"), ("M96 P10 Q8", "where an input is not set"),
+        ("G83 Z-1. R1. I1. J.1 K.2 F10.", "changes the pecks"), ("G83 Z-1. R1. Q.5 I-.5", "changes the pecks"),
+        ("G83 Z-1. R1. Q.5 K#5", "changes the pecks"), ("G84 Z-1. R1. J[2] F10.", "changes the pecks"),
+        ("G82 Z-1. R1. P#1", "the dwell of G82 by a variable"), ("G89 Z-1. R1. P[#1]", "the dwell of G89"),
+        ("M97 L2 P100", "M97 takes an N number right behind it"), ("M97 P#1", "M97 takes an N number"),
+        ("M96 P10 Q8", "where an input is not set"),
     ],
 )  # fmt: skip
 def test_refused(word: str, meaning: str) -> None:
@@ -165,6 +169,27 @@ def test_refused(word: str, meaning: str) -> None:
     with pytest.raises(sg.ProgramError, match=r"^part\.nc:3:1: ") as error:
         read(word)
     assert meaning in str(error.value)
+
+
+@pytest.mark.parametrize("word", ["K2", "I.5", "P#1"])
+def test_words_of_a_cycle_hold_for_the_holes_behind_it(word: str) -> None:
+    with pytest.raises(sg.ProgramError, match=r"^part\.nc:4:1: .*(changes the pecks|by a variable)"):
+        read(f"G83 X1. Z-1. R1. Q.5 F10.\nX2. {word}\nG80")
+    assert moves_of(read(f"G83 X1. Z-1. R1. Q.5 F10.\nX2. ({word}) ; {word}\nG80\nG02 X4. I1. F10."))
+
+
+def test_the_p_of_m19_is_no_dwell() -> None:
+    assert plain("M19 P90.") == ["M19 P90."]
+
+
+@pytest.mark.parametrize("call", ["M98 P10001", "P10001 M98", "M98 P#1", "M98 P[#1]", "M098P10001", "M98 L1 P10001"])
+def test_a_number_of_five_digits_is_a_program(call: str, tmp_path: Path) -> None:
+    """Not FANUC's O1, called once."""
+    (tmp_path / "O10001.nc").write_text("O10001\nG01 X7. F100.\nM99\n")
+    (tmp_path / "O0001.nc").write_text("O0001\nG01 X9. F100.\nM99\n")
+    machine = machine_with({"controller.dialect": "haas"})
+    program = sg.Program.from_text(f"{HEAD}#1=10001\n{call}\nM30\n", machine, folder=tmp_path, source="part.nc")
+    assert [segment.end_mm[0] for segment, _ in moves_of(program)] == [7.0]
 
 
 @pytest.mark.parametrize("sign", ["G154 P3", "G187 P2", "G103 P1", "M97 P1", "G150 P1"])

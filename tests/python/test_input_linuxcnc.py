@@ -86,6 +86,48 @@ def test_what_cannot_be_read(body: str, message: str) -> None:
     assert message in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("G1 X1e3", "E3 and no word in the block that uses it"), ("G1 X5 D3", "D3"), ("G1 X5 H3", "H3"),
+        ("G1 X5\nX6 I3", "I3"), ("G2 X10 I5 K3", "K is no centre of an arc in G17"), ("G1 X5 P3", "P3"),
+        ("G18\nG2 X10 I5 J1", "J is no centre of an arc in G18"), ("G90.1\nG2 X10 I5 J0 K3", "K is no centre"),
+        ("G81 X1 Z-1 R1 P3", "P3"), ("G81 X1 Z-1 R1\nX2 Q3", "Q3"), ("G82 X1 Z-1 R1 P1 K3", "K3"),
+        ("G2 X10 I5 L2", "L2"), ("G92 X1 P2", "P2"), ("G54 P2", "P2"), ("G64 P1 R2", "R2"), ("G49 H1", "H1"),
+        ("G81 X1 Z-1 R1 A5", "A in a drilling"), ("M3 M5", "M3 and M5 in one block"), ("M7 M8", "M7 and M8"),
+        ("T1.5", "no whole number"), ("S-5", "negative"),
+        ("G1 X1(a)2", "a comment stands inside a word"), ("G1 X1(a).5", "a comment stands"), ("G1 Y(a)2", "a comment"),
+        ("#1(a)=5", "a comment stands"), ("#1=[1(a)+1]", "a comment stands"), ("G1 X5 (a) 3", "a comment stands"),
+        ("G1 X5\x0bY3", "is no word"),
+    ],
+)  # fmt: skip
+def test_what_linuxcnc_refuses_is_not_read_otherwise(body: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(sg.ProgramError, match=r"^part\.ngc:\d+:1: ") as error:
+        read(body)
+    assert message in str(error.value)
+    with pytest.raises(RuntimeError, match="rs274 rejects the program"):
+        run_rs274(f"{HEAD}{body}\nM2\n", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        *(f"O1 repeat [{n}]\nG91 G1 X1\nO1 endrepeat\nG90 X9" for n in (0.4, 0.6, 1.5, 2.2, 2.5, 2.7, 3.5, -0.6)),
+        "G1 X1\r5 Y2", "G1 X5 (a)(b) Y3 (c)", "O1 repeat [2] (twice)\nG91 G1 X1\nO1 endrepeat ; end\nG90 X9",
+        "G2 X10 I5\nI5", "M19 R90 P1\nG1 X1", "M50 P1\nG1 X1", "G64 P1 Q2\nG1 X1", "G18\nG2 X10 Z5 I5 K0\nX20 I5",
+    ],
+)  # fmt: skip
+def test_the_same_moves_as_rs274(body: str, tmp_path: Path) -> None:
+    theirs = [*canonical_moves(run_rs274(f"{HEAD}{body}\nM2\n", tmp_path))]
+    assert agree(read(body), theirs) > 0
+
+
+@pytest.mark.parametrize("value", ["[" * 3000 + "1" + "]" * 3000, "[" + "-" * 5000 + "[1]]", "1" * 400])
+def test_values_beyond_all_measure_are_refused(value: str) -> None:
+    with pytest.raises(sg.ProgramError, match=r"^part\.ngc:4:1: .*(nested too deep|too large)"):
+        read(f"G1 X{value}")
+
+
 def test_settings_of_a_line_take_effect_together() -> None:
     assert ends(read("#31 = 1 #32 = 2\n#31 = #32 #32 = #31\nG1 X#31 Y#32"))[-1][:2] == [2.0, 1.0]
 
@@ -226,6 +268,64 @@ def test_a_dwell_that_nothing_tells_is_said_with_both_meanings() -> None:
         assert not any(
             "LinuxCNC" in each for each in sg.Program.from_text(f"G21\nG0 X0\n{text}\nM30\n", machine_).warnings
         )
+
+
+def test_a_called_file_is_read_as_strictly_as_the_program(tmp_path: Path) -> None:
+    (tmp_path / "O100.nc").write_text("O100\nG1 X5. ; Y9.\nM99\n")
+    with pytest.raises(sg.ProgramError, match=r"O100\.nc:2:1: words behind `;`"):
+        sg.Program.from_text("O1\nG21 G0 X0. Y0.\nF100.\nM98 P100\nM30\n", machine_with(), folder=tmp_path)
+    (tmp_path / "hole.ngc").write_bytes(b"\xef\xbb\xbfo<hole> sub\r\nG1 X#1\r\no<hole> endsub\r\n")
+    assert ends(read("o<hole> call [5]", tmp_path))[-1][0] == 5.0
+    (tmp_path / "L10.SPF").write_bytes(b"\xef\xbb\xbfG1 X5 F100 ; a\rX9\r\nM17\r\n")
+    siemens = machine_with({"controller.dialect": "siemens"})
+    assert ends(sg.Program.from_text("G0 X0 Y0 Z0\nL10\nM30\n", siemens, folder=tmp_path))[-1] == [5.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "linuxcnc", "haas", "siemens"])
+def test_an_empty_program_ends_in_no_traceback(dialect: str) -> None:
+    for text in ("", "\n", "%\n", "%"):
+        try:
+            assert not moves_of(sg.Program.from_text(text, machine_with({"controller.dialect": dialect})))
+        except sg.ProgramError as error:
+            assert str(error).startswith("<text>:")
+
+
+def test_an_o_word_behind_a_slash_is_refused_by_name() -> None:
+    with pytest.raises(sg.ProgramError, match=r"^part\.ngc:4:1: an O word behind `/`"):
+        read("/O1 repeat [2]\nG91 G1 X1\n/O1 endrepeat")
+
+
+def test_turns_of_an_arc_that_nothing_tells_are_said() -> None:
+    program = sg.Program.from_text("G21\nG0 X0 Y0\nG2 X0 I5 F100 P3\nM30\n", "vx500", source="a.nc")
+    assert program.warnings[0].startswith("a.nc:3: P3 of an arc is not read, as FANUC knows none; on LinuxCNC the arc")
+    for other in ("G2 X0 I5 F100 M98 P3", "G2 X0 I5 F100 P1", "(G2 X0 I5 P3)"):
+        text = f"O1\nG21\nG0 X0 Y0\n{other}\nM30\nO3\nM99\n"
+        assert not any("turns" in each for each in sg.Program.from_text(text, "vx500").warnings)
+
+
+@pytest.mark.parametrize("dialect", ["auto", "fanuc"])
+def test_words_behind_a_semicolon_are_neither_executed_nor_left_out_unsaid(dialect: str) -> None:
+    machine_ = machine_with({"controller.dialect": dialect})
+    head = "G21\nG0 X0. Y0.\nF100.\n"
+    for line in ("G1 X10. ; G1 Y5.", "; Y5.", "G1 X10. (A) ;;Y5."):
+        with pytest.raises(sg.ProgramError, match=r"^a\.nc:4:1: words behind `;`: FANUC begins a block there"):
+            sg.Program.from_text(f"{head}{line}\nM30\n", machine_, source="a.nc")
+    for line in ("G1 X10.;", "G1 X10.; (Y5.)", "G1 X10.;; \r", "(A; Y5.)\nG1 X10.;", "G1 X10.\n%;"):
+        program = sg.Program.from_text(f"{head}{line}\nM30\n", machine_, source="a.nc")
+        assert ends(program)[-1][:2] == [10.0, 0.0]
+    linuxcnc = sg.Program.from_text(f"{head}G1 X10. ; G1 Y5.\nM30\n", machine())
+    assert ends(linuxcnc)[-1][:2] == [10.0, 0.0]
+
+
+def test_a_program_for_a_mitsubishi_is_not_taken_for_one_of_linuxcnc() -> None:
+    """G61.1 is its high-accuracy control, P of G04 its milliseconds."""
+    with pytest.raises(sg.ProgramError, match=r"^<text>:3:1: unknown G code G61\.1"):
+        sg.Program.from_text("G21\nG0 X0. Y0.\nG61.1\nG1 X10. F100.\nG4 P500\nM30\n", machine_with())
+
+
+def test_what_stands_behind_the_end_says_nothing_of_the_control() -> None:
+    program = sg.Program.from_text("%\nO1\nG21 G0 X0.\nM30\n%\nNOT FOR THE HAAS: G154 P3 M97 P1\n", machine_with())
+    assert program.foreign is None
 
 
 def test_mixed_and_misstated_programs_are_refused() -> None:

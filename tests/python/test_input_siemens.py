@@ -485,6 +485,53 @@ def test_refused(text: str) -> None:
     assert all(part in message for part in parts), message
 
 
+@pytest.mark.parametrize(
+    ("block", "column", "part"),
+    [
+        ("G1 X1 X2", 7, "X twice"), ("G1 X=5 X6", 8, "X twice"), ("G1 X5 F100 F200", 12, "F twice"),
+        ("G2 X10 I5 I6", 11, "I twice"), ("G2 X10 CR=5 CR=6", 13, "CR twice"), ("S100 S200", 6, "S twice"),
+        ("TRANS X1 X2", 10, "X twice"), ("G111 X1 X2 Y1", 9, "X twice"), ("G2 X10 CR=5 I5", 1, "CR= and I"),
+        ("G2 X10 AR=180 CR=5", 15, "AR= and CR="), ("G1 X10 RND=2 CHF=1", 14, "RND= and CHF="),
+    ],
+)  # fmt: skip
+def test_an_address_twice_is_refused(block: str, column: int, part: str) -> None:
+    with pytest.raises(sg.ProgramError, match=rf"^part\.mpf:4:{column}: {part}.* in one block: one of them would"):
+        read(START + block)
+
+
+def test_what_stands_in_a_comment_is_not_executed() -> None:
+    """A block ends with a line feed: neither with a byte of a letter in UTF-8 nor with a form feed."""
+    for comment in ("\u00c5 G1 X99", "a\x0cX99", "\x85X99", "a\x1cX99", "a\rX99"):
+        text = (START + f"G1 X5 ; {comment}\nY2\nM30\n").encode()
+        program = sg.Program.from_text(text, machine_with({"controller.dialect": "siemens", **KEYS}), source="part.mpf")
+        assert [np.round(segment.end_mm, 6).tolist() for segment, _ in moves_of(program)] == [[5, 0, 0], [5, 2, 0]]
+        assert program.place(program.regions[0].path.segment_lines[-1]) == "part.mpf:5"
+
+
+@pytest.mark.parametrize(
+    "block",
+    ["R1=" + "(" * 3000 + "1" + ")" * 3000, "R1=1" + "+1" * 5000, "G1 X1EX400", "R1=1EX300*1EX300\nG1 X=R1",
+     "G1 X" + "9" * 5000, "M=1EX400", "G4 F1EX30"],
+)  # fmt: skip
+def test_values_beyond_all_measure_are_refused(block: str) -> None:
+    with pytest.raises(sg.ProgramError, match=r"^part\.mpf:[45]:\d+: .*(nested too deep|too large)"):
+        read(START + block)
+
+
+@pytest.mark.parametrize(
+    "block",
+    ["R1=5\nX=R1", "X=IC(5)", "X=AC(5)", "GOTOF E1\nE1:", "TRANS X5\nX5", "AROT Z90", "R1 = 5 GOTO E1\nE1: Z=R1",
+     "R1=5\nGOTO E1\nE1: Z=R1"],
+)  # fmt: skip
+def test_recognised_by_words_that_only_a_sinumerik_knows(block: str) -> None:
+    try:
+        said = sg.Program.from_text(START + block + "\nM30\n", machine_with(KEYS), source="part.mpf").warnings[0]
+    except sg.ProgramError as error:
+        said = str(error)
+    assert said.startswith("part.mpf:1: read as a program for a Sinumerik: line 4: ") or "GOTO" in said, said
+    assert "mixes" not in said
+
+
 def test_before_the_first_move() -> None:
     with pytest.raises(sg.ProgramError, match="MD20150"):
         read("X5\nM30")

@@ -15,7 +15,7 @@ from shapegcode._core import ProgramError
 from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.foreign.plain import ForeignProgram
 from shapegcode.program.foreign.read import foreign_program
-from shapegcode.program.foreign.recognize import CONTROLS, LOOKED_AT_BYTES, doubtful_dwell
+from shapegcode.program.foreign.recognize import CONTROLS, LOOKED_AT_BYTES, doubtful_word
 from shapegcode.program.reading import Reading, given_text, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
@@ -314,7 +314,7 @@ class Program:
         return (
             None
             if stated or self.reading.emitted or self.foreign is not None
-            else doubtful_dwell(self.text_slice(0, LOOKED_AT_BYTES))
+            else doubtful_word(self.text_slice(0, LOOKED_AT_BYTES))
         )
 
     @property

@@ -16,6 +16,7 @@ from shapegcode import _core
 from shapegcode.io.atomic import named_errors
 from shapegcode.io.data_file import open_file
 from shapegcode.program.computer import require_memory
+from shapegcode.program.foreign.read import refuse_words_behind_semicolon
 from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:
@@ -73,6 +74,8 @@ class Reading:
             load = program_loader(folders, self.machine.controller.max_program_bytes)
             if foreign is not None and foreign.called_text is not None:
                 load = partial(_in_fanuc_words, load, foreign.called_text)
+            elif foreign is None and not self.emitted:
+                load = partial(_without_doubt, load)
             options.load_program = partial(_called, self.called, load)
         return options
 
@@ -105,6 +108,14 @@ def _in_fanuc_words(
     """A program of another file that one in another control's words calls."""
     found = load(number)
     return None if found is None else (found[0], write(found[1].decode("latin-1"), found[0]).encode("latin-1"))
+
+
+def _without_doubt(load: Callable[[int], tuple[str, bytes] | None], number: int) -> tuple[str, bytes] | None:
+    """A program of another file that one in FANUC's words calls."""
+    found = load(number)
+    if found is not None:
+        refuse_words_behind_semicolon(found[1], found[0])
+    return found
 
 
 def _settings_of_reading(machine: Machine) -> dict[str, object]:

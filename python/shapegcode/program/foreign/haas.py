@@ -29,13 +29,14 @@ _REFUSED: Mapping[str, str] = {
     "back boring)", "88": "boring with a manual retract", "93": "inverse time, of which no text says how F counts in "
     "arcs", "96": "constant surface speed", "150": "general pocket milling",
 }  # fmt: skip
+_CYCLES = frozenset(("73", "74", "81", "82", "83", "84", "85", "86", "89"))
 _CALL_BASE = 90_000_000  # O numbers of the subprograms that M97 calls, by their N number
 _EXTRA_OFFSETS = range(110, 130)
 
 _NOT_THE_SAME = re.compile(
     r"[;GMFP](?:(?<=;)|(?<=G)[ \t]*(?:0*4(?![\d.])"
     r"|(?!(?:0*[0-3]|17|18|19|2[018]|4[0-39]|5[3-9]|6[14]|8[0-2]|9[0-2]|9[89])(?![\d.]))[\d.]+)"
-    r"|(?<=M)[ \t]*9[678](?!\d)|(?<=F)[ \t]*[-+]?\d+(?![\d.])|(?<=P)[ \t]*\d*\.\d*)"
+    r"|(?<=M)[ \t]*0*9[678](?!\d)|(?<=F)[ \t]*[-+]?\d+(?![\d.])|(?<=P)[ \t]*\d*\.\d*)"
 )
 """One look at a whole program in capitals: where nothing of this stands, it is FANUC's to the letter."""
 
@@ -47,8 +48,13 @@ _INTEGER_F = re.compile(r"F[ \t]*([-+]?\d+)(?![\d.])", re.IGNORECASE)
 _LEFT_OUT = re.compile(r"G[ \t]*(103|187)(?![\d.])((?:[ \t]*[PE][ \t]*[\d.]+)*)", re.IGNORECASE)
 _OFFSET = re.compile(r"G[ \t]*154[ \t]*P[ \t]*(\d+)", re.IGNORECASE)
 _OLD_OFFSET = re.compile(r"G[ \t]*(1[12]\d)(?![\d.])", re.IGNORECASE)
-_M97 = re.compile(r"M[ \t]*97[ \t]*P[ \t]*(\d+)((?:[ \t]*L[ \t]*\d+)?)", re.IGNORECASE)
-_M98 = re.compile(r"M[ \t]*98[ \t]*P[ \t]*(\d{5,})(?![ \t]*\d)(?![ \t]*L)", re.IGNORECASE)
+_M97 = re.compile(r"M[ \t]*0*97[ \t]*P[ \t]*(\d+)((?:[ \t]*L[ \t]*\d+)?)", re.IGNORECASE)
+_M98 = re.compile(r"M[ \t]*0*98(?!\d)", re.IGNORECASE)
+_PROGRAM = re.compile(r"P[ \t]*(?:\d{5,}(?![ \t]*\d)|#\d+|\[[^\]]*\])", re.IGNORECASE)
+_UNREAD_M97 = re.compile(r"M[ \t]*0*97(?!\d)", re.IGNORECASE)
+_CYCLE = re.compile(r"G[ \t]*0*(?:7[34]|8[1-9])(?![\d.])")
+_PECKS = re.compile(r"[IJK][ \t]*[-+.\d#\[]", re.IGNORECASE)
+_VARIABLE_P = re.compile(r"P[ \t]*[#\[]", re.IGNORECASE)
 _N = re.compile(r"[ \t]*/?[ \t]*N[ \t]*0*(\d+)", re.IGNORECASE)
 _O = re.compile(r"[ \t]*[O:][ \t]*\d", re.IGNORECASE)
 _M99 = re.compile(r"M[ \t]*99(?!\d)", re.IGNORECASE)
@@ -72,7 +78,7 @@ def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None =
     """
     notes: dict[str, Note] = {}
     lines, called = _lines(source, file, notes)
-    numbers = [*range(1, len(lines) + 1)]
+    numbers = [*range(1, max(len(lines), 1) + 1)]
     if called:
         lines, numbers = _with_subprograms(lines, called, file)
     settings = ForeignSettings(calculator_decimal_point=None, called_text=called_haas_text)
@@ -104,7 +110,10 @@ def _lines(source: str, file: str, notes: dict[str, Note]) -> tuple[list[str], d
     """The lines in FANUC's words, and the N numbers that M97 calls, each with the line of its first call."""
     lines = _LINE.findall(source)
     code = _COMMENT.sub(lambda comment: " " * len(comment[0]), source) if "(" in source else source
-    found = [match.start() for match in _NOT_THE_SAME.finditer(code.upper())]
+    capitals = code.upper()
+    if _CYCLE.search(capitals) is not None:
+        _refuse_in_cycles(capitals, file)
+    found = [match.start() for match in _NOT_THE_SAME.finditer(capitals)]
     called: dict[int, int] = {}
     if not found:
         return lines, called
@@ -122,6 +131,33 @@ def _lines(source: str, file: str, notes: dict[str, Note]) -> tuple[list[str], d
         for call in _M97.finditer(line):
             called.setdefault(int(call[1]), index + 1)
     return lines, called
+
+
+def _refuse_in_cycles(code: str, file: str) -> None:
+    """Words of drilling cycles, which hold for the holes behind them too, that mean another thing on FANUC."""
+    cycle = ""
+    for number, whole_line in enumerate(_LINE.findall(code), start=1):
+        line = whole_line.partition(";")[0]
+        if _MACRO.match(line):
+            continue
+        codes = [_code(match[1]) for match in _G.finditer(line)]
+        for name in codes:
+            if name in {"0", "1", "2", "3", "80"} or name in _CYCLES:
+                cycle = name if name in _CYCLES else ""
+        if not cycle or {"10", "65"} & {*codes}:
+            continue
+        if cycle in {"73", "74", "83", "84"} and (word := _PECKS.search(line)):
+            raise refusal(
+                file,
+                number,
+                f"{word[0][0]} in a drilling cycle changes the pecks or the retract of a Haas, and K counts the holes "
+                "on FANUC: it is not read",
+            )
+        if _VARIABLE_P.search(line) and re.search(r"M[ \t]*0*9[789](?!\d)", line) is None:
+            raise refusal(
+                file, number, f"the dwell of G{cycle} by a variable is seconds or milliseconds, as the point of its "
+                "value says"
+            )  # fmt: skip
 
 
 def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
@@ -144,7 +180,11 @@ def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
     words = _OFFSET.sub(r"G54.1P\1", words)
     words = _OLD_OFFSET.sub(lambda match: _old_offset(match[1], match[0]), words)
     words = _M97.sub(lambda match: f"M98P{_CALL_BASE + int(match[1])}{match[2].strip() or 'L1'}", words)
-    words = _M98.sub(r"M98P\1L1", words)  # five digits are a program's number, not FANUC's repetitions and four digits
+    if (unread := _UNREAD_M97.search(words)) is not None:
+        raise ValueError(f"{unread[0]} takes an N number right behind it (M97 P1000): it is not read otherwise")
+    if _M98.search(words) is not None and re.search(r"L[ \t]*[\d#\[]", words, re.IGNORECASE) is None:
+        # Five digits are a program's number, not FANUC's repetitions and four digits.
+        words = _PROGRAM.sub(lambda match: f"{match[0]}L1", words)
     words = _with_dwell(words, codes, note)
     if "52" in codes or "92" in codes:
         note("setting 33", "G52 and G92 as setting 33 = FANUC or HAAS has them; YASNAC's G92 sets G52")
@@ -172,11 +212,6 @@ def _refuse(codes: list[str], code: str) -> None:
         )
     if re.search(r"M[ \t]*96(?!\d)", code, re.IGNORECASE):
         raise ValueError("M96 jumps where an input is not set, which only the machine knows: it is not read")
-    if {"73", "74", "83", "84"} & {*codes} and (word := re.search(r"[IJK][ \t]*[\d.]", code, re.IGNORECASE)):
-        raise ValueError(
-            f"{word[0][0].upper()} in a drilling cycle changes the pecks or the retract of a Haas, and K counts the "
-            "holes on FANUC: it is not read"
-        )
     if "10" in codes and (word := re.search(r"L[ \t]*(1[23])(?!\d)", code, re.IGNORECASE)):
         raise ValueError(
             f"G10 L{word[1]}: a diameter or a radius, as setting 40 of a Haas says; FANUC's is a radius: write the "
@@ -197,7 +232,7 @@ def _old_offset(number: str, otherwise: str) -> str:
 
 def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) -> str:
     """P of a dwell: seconds with a point, milliseconds without."""
-    others = {"10", "54.1", "65", "154"} & {*codes} or re.search(r"M[ \t]*9[789](?!\d)", words, re.IGNORECASE)
+    others = {"10", "54.1", "65", "154"} & {*codes} or re.search(r"M[ \t]*0*(?:19|9[789])(?!\d)", words, re.IGNORECASE)
     match = _P.search(words)
     if match is None or (others and "4" not in codes):
         return words

@@ -24,7 +24,7 @@ from shapegcode.program.foreign.linuxcnc_expression import (
 )
 from shapegcode.program.foreign.linuxcnc_parameters import ParameterTable
 from shapegcode.program.foreign.linuxcnc_source import KEYWORDS, OLine, SourceFile, subroutine_file
-from shapegcode.program.foreign.linuxcnc_state import MM_PER_INCH, Modes, State
+from shapegcode.program.foreign.linuxcnc_state import MM_PER_INCH, Modes, State, normal_axis
 from shapegcode.program.foreign.linuxcnc_tools import find_tool_table
 from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram, refusal
 
@@ -122,6 +122,9 @@ class _Interpreter:
                 self._require_room()
         except ValueError as error:
             raise refusal(self._file.name, here + 1, f"{error}{self._call_stack()}") from None
+        except RecursionError:
+            message = "the values of this line are nested too deep to be worked out"
+            raise refusal(self._file.name, here + 1, message + self._call_stack()) from None
         if not self._runner.ended and not self._framed():
             raise refusal(
                 self._main.name,
@@ -173,8 +176,11 @@ class _Interpreter:
         if match is None:
             return False
         text = match[0]
+        across = "ijk"[normal_axis(modes.plane)]
+        if across in text or across.upper() in text:
+            return False  # the slow way says what is wrong
         if modes.feed <= 0.0 and _LAST_WORD["F"].search(text) is None:
-            return False  # the slow way says what is missing
+            return False
         self._runner.line, self._runner.file = self._next + 1, self._file.index
         self._runner.sync()
         if self._runner.written_motion != modes.motion and _BEGINS_WITH_G.match(text) is None:
@@ -415,7 +421,7 @@ class _Interpreter:
         pass
 
     def _on_repeat(self, index: int, line: OLine) -> None:
-        count = int(self._condition(line))
+        count = round(self._condition(line))  # 2.7 is 3, 2.5 is 2: as rs274 2.9 repeats
         if count <= 0:
             self._next = self._behind(index, line, "endrepeat") + 1
             return
@@ -548,4 +554,4 @@ def _last_number(text: str, letter: str, otherwise: float | None) -> float | Non
 def _file_text(path: Path, most: int) -> str:
     from shapegcode.io.data_file import read_file
 
-    return read_file(path, most).decode("utf-8", "replace")
+    return read_file(path, most).decode("utf-8-sig", "replace")

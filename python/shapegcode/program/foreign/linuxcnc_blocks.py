@@ -8,38 +8,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+from shapegcode.program.foreign.linuxcnc_codes import (
+    SYSTEMS,
+    by_group_of,
+    refuse_codes,
+    refuse_unused,
+    sorted_words,
+)
 from shapegcode.program.foreign.linuxcnc_cycles import drill
 from shapegcode.program.foreign.linuxcnc_offsets import Offsets
 from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, plane_axes, system_words
 from shapegcode.program.foreign.plain import PlainProgram, number_text
-
-_MOTION = frozenset({0, 10, 20, 30, 800}) | CYCLES
-_ONE_SHOT = frozenset({40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923})
-_GROUPS: dict[int, str] = {
-    **dict.fromkeys(_MOTION, "motion"),
-    **dict.fromkeys(_ONE_SHOT - {40, 530}, "one-shot"),
-    40: "dwell", 530: "machine", 170: "plane", 180: "plane", 190: "plane", 900: "distance", 910: "distance",
-    901: "centres", 911: "centres", 930: "feed", 940: "feed", 950: "feed", 200: "units", 210: "units",
-    400: "compensation", 430: "length", 431: "length", 490: "length", 610: "path", 611: "path", 640: "path",
-    980: "retract", 990: "retract", 960: "spindle", 970: "spindle", 80: "lathe",
-    **dict.fromkeys((540, 550, 560, 570, 580, 590, 591, 592, 593), "system"),
-}  # fmt: skip
-_SYSTEMS = {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}
-
-REFUSED: dict[int, str] = {
-    50: "a cubic spline", 51: "a quadratic spline", 52: "a NURBS block", 53: "the end of a NURBS block",
-    60: "a NURBS block", 61: "a NURBS block", 62: "a NURBS block",
-    70: "diameter mode of a lathe", 171: "the UV plane", 181: "the WU plane", 191: "the VW plane",
-    330: "motion that the spindle's encoder leads", 331: "rigid tapping, led by the spindle's encoder",
-    **dict.fromkeys((382, 383, 384, 385), "a probing move: where it ends, only the machine knows"),
-    **dict.fromkeys((410, 411, 420, 421), "cutter compensation, which rounds outer corners with arcs where FANUC's "
-                    "lengthens the lines: write the path of the tool's centre"),
-    432: "a second tool length offset beside the first", 700: "a turning cycle", 710: "a turning cycle",
-    711: "a turning cycle", 712: "a turning cycle", 720: "a turning cycle", 721: "a turning cycle",
-    722: "a turning cycle", 760: "a threading cycle (FANUC's G76 is fine boring)", 870: "back boring, which LinuxCNC "
-    "moves otherwise than FANUC", 880: "boring that waits for the operator",
-}  # fmt: skip
-"""G codes that are not read, in tenths, and what they are."""
 
 _BEFORE_MOTION = (6, 19, 3, 4, 5, 7, 8, 9, 48, 49)
 _STOPS = (0, 1, 2, 30, 60)
@@ -47,7 +26,6 @@ _KEPT_OUTPUTS = {
     50: "feed override", 51: "spindle override", 52: "adaptive feed", 53: "feed hold switch", 62: "digital output",
     63: "digital output", 64: "digital output", 65: "digital output", 67: "analog output", 68: "analog output",
 }  # fmt: skip
-_REFUSED_M = {66: "wait for an input: its result, #5399, only the machine knows"}
 _FULL_TURN = 1e-9  # rad
 
 
@@ -85,9 +63,10 @@ class BlockRunner:
         Raises:
             ValueError: it cannot be read, or is refused.
         """
-        codes, functions, values = _sorted(words)
-        self._refuse(codes, functions, values)
-        by_group = _by_group(codes)
+        codes, functions, values = sorted_words(words)
+        refuse_codes(codes, functions, values)
+        by_group = by_group_of(codes)
+        refuse_unused(self.state.modes, by_group, functions, values)
         for text in filter(None, map(_plain_comment, comments)):
             self.put(f"({text})")
         if not words:
@@ -119,20 +98,6 @@ class BlockRunner:
 
     # ---- what comes before the move --------------------------------------------------------------------------
 
-    def _refuse(self, codes: Sequence[int], functions: Sequence[int], values: Mapping[str, float]) -> None:
-        for code in codes:
-            if code in REFUSED:
-                raise ValueError(f"{code_text(code)} is {REFUSED[code]}: it is not read")
-            if code not in _GROUPS:
-                raise ValueError(f"{code_text(code)} is no G code of LinuxCNC")
-        for function in functions:
-            if function in _REFUSED_M:
-                raise ValueError(f"M{function} is a {_REFUSED_M[function]}: it is not read")
-        if letter := next((letter for letter in "uvw" if letter in values), None):
-            raise ValueError(f"{letter.upper()} is an axis beside X, Y, Z, and another thing on FANUC: it is not read")
-        if "$" in values and values["$"] != 0.0:
-            raise ValueError("$ selects another spindle: it is not read")
-
     def _feed(self, values: Mapping[str, float], *, changed: bool) -> None:
         modes = self.state.modes
         if changed:
@@ -148,8 +113,8 @@ class BlockRunner:
         if "s" in values:
             modes.speed = values["s"]
         if "t" in values:
-            state.selected = int(values["t"])
-        line = [f"T{int(values['t'])}"] if "t" in values else []
+            state.selected = round(values["t"])
+        line = [f"T{round(values['t'])}"] if "t" in values else []
         if 6 in functions:
             state.tool = state.selected
             modes.spindle = 5
@@ -205,7 +170,7 @@ class BlockRunner:
             self.sync()
             self.offsets.length(by_group["length"], values)
         if "system" in by_group:
-            state.select_system(_SYSTEMS[by_group["system"]])
+            state.select_system(SYSTEMS[by_group["system"]])
             self.put(system_words(state.modes.system))
         if "path" in by_group:
             pending.append(self._path_mode(by_group["path"], values))
@@ -485,40 +450,6 @@ class BlockRunner:
                 if on:
                     self.put(code)
         state.modes = kept
-
-
-def code_text(code: int) -> str:
-    """A G code of tenths."""
-    return f"G{code // 10}" if code % 10 == 0 else f"G{code // 10}.{code % 10}"
-
-
-def _sorted(words: Sequence[tuple[str, float]]) -> tuple[list[int], list[int], dict[str, float]]:
-    """G codes in tenths, M codes, and the other words."""
-    codes: list[int] = []
-    functions: list[int] = []
-    values: dict[str, float] = {}
-    for letter, value in words:
-        if letter == "g":
-            if abs(value * 10.0 - round(value * 10.0)) > 1e-3 or value < 0.0:
-                raise ValueError(f"G{value:g} is no G code of LinuxCNC")
-            codes.append(round(value * 10.0))
-        elif letter == "m":
-            if abs(value - round(value)) > 1e-4 or value < 0.0:
-                raise ValueError(f"M{value:g} is no M code of LinuxCNC")
-            functions.append(round(value))
-        elif letter != "n":
-            values[letter] = value
-    return codes, functions, values
-
-
-def _by_group(codes: Sequence[int]) -> dict[str, int]:
-    found: dict[str, int] = {}
-    for code in codes:
-        group = _GROUPS[code]
-        if group in found:
-            raise ValueError(f"{code_text(found[group])} and {code_text(code)} in one block")
-        found[group] = code
-    return found
 
 
 def _words(values: Mapping[str, float], letters: str) -> str:

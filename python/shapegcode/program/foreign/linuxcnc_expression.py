@@ -127,6 +127,8 @@ _NAME = re.compile(r"#<([^>]*)>")
 _OPERATOR = re.compile(r"\*\*|\*|/|\+|-|mod|eq|ne|lt|gt|le|ge|and|or|xor")
 _FUNCTION = re.compile(r"(abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan)(?=\[)")
 _COMMENT = re.compile(r"\(([^()]*)\)|;(.*)")
+_BLANKS = {ord(blank): None for blank in " \t\r"}  # what LinuxCNC leaves out; other ones it refuses
+_IN_A_WORD = re.compile(r"[a-z#=+*\[-]\0|\0[\d.=+*\]]")
 _LETTERS = frozenset("abcdefghijklmnpqrstuvwxyz@^$")
 
 
@@ -263,10 +265,8 @@ def evaluate(value: float | Value, parameters: Parameters) -> float:
     Raises:
         ValueError: it has none.
     """
-    if isinstance(value, float):
-        return value
     try:
-        result = value(parameters)
+        result = value if isinstance(value, float) else value(parameters)
     except OverflowError:
         raise ValueError("a value is too large to be computed") from None
     if not math.isfinite(result):
@@ -284,17 +284,20 @@ def without_comments(line: str) -> tuple[str, tuple[str, ...]]:
         The line and the texts of its comments.
     """
     if "(" not in line and ";" not in line:
-        return "".join(line.split()).lower(), ()
+        return line.translate(_BLANKS).lower(), ()
     comments: list[str] = []
 
     def found(match: re.Match[str]) -> str:
         comments.append((match[1] if match[1] is not None else match[2]).strip())
-        return ""
+        return "\0"
 
     code = _COMMENT.sub(found, line)
-    if "(" in code or ")" in code:
+    if "(" in code or ")" in code or "\0" in line:
         raise ValueError("a comment does not close, or stands inside another one")
-    return "".join(code.split()).lower(), tuple(comments)
+    code = re.sub("\0+", "\0", code.translate(_BLANKS).lower())
+    if _IN_A_WORD.search(code) is not None:
+        raise ValueError("a comment stands inside a word: `X1(a)2` is not X12")
+    return code.replace("\0", ""), tuple(comments)
 
 
 def read_block(line: str) -> Block:
@@ -311,6 +314,8 @@ def read_block(line: str) -> Block:
     """
     code, comments = without_comments(line)
     skips = code.startswith("/")
+    if code.startswith("/o"):
+        raise ValueError("an O word behind `/`: it is not read; take the `/` away, or the line")
     scanner = Scanner(code[1:] if skips else code)
     words: list[tuple[str, float | Value]] = []
     settings: list[Setting] = []

@@ -49,7 +49,7 @@ class SourceFile:
 
     def __post_init__(self) -> None:
         """Find its lines and O words."""
-        self.text = self.text.replace("\r\n", "\n").replace("\r", "\n")
+        self.text = self.text.replace("\r\n", "\n").replace("\r", " ")  # alone it is a blank to LinuxCNC
         if not self.text.endswith("\n"):
             self.text += "\n"
         self.starts = [0, *(match.end() for match in re.finditer("\n", self.text))]

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.program.foreign.plain import ForeignProgram, refusal
-from shapegcode.program.foreign.recognize import CONTROLS, recognize
+from shapegcode.program.foreign.recognize import CONTROLS, recognize, words_behind_semicolon
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -40,6 +40,7 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
     """
     dialect, reason, line = input_dialect(data, machine, source)
     if dialect == "fanuc":
+        refuse_words_behind_semicolon(data, source)
         return None
     if find_spec(f"shapegcode.program.foreign.{dialect}") is None:
         raise refusal(source, line, f"{reason}: programs for {CONTROLS[dialect]} are not read")
@@ -47,6 +48,26 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
     read = _reader(dialect)
     program = read(text, file=source, machine=machine, folder=folder)
     return replace(program, reason=reason)
+
+
+def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
+    """A semicolon ends a block for FANUC, and begins a comment for other controls.
+
+    Args:
+        data: a program in FANUC's words.
+        source: its name, for messages.
+
+    Raises:
+        ProgramError: words stand behind one.
+    """
+    line = words_behind_semicolon(data)
+    if line is not None:
+        raise refusal(
+            source,
+            line,
+            "words behind `;`: FANUC begins a block there, LinuxCNC, a Haas and a Sinumerik have a comment; write a "
+            "line end or ( ), or say whose program it is: --set controller.dialect=linuxcnc, haas or siemens",
+        )
 
 
 def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str, int]:

@@ -13,6 +13,11 @@ CONTROLS: dict[str, str] = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "haas": "H
 
 LOOKED_AT_BYTES = 65536
 _SHORT_DWELL = re.compile(rb"G0*4[ \t]*P[ \t]*0*([1-9])(?![\d.])")
+_BEHIND_SEMICOLON = re.compile(rb"\([^)\n]*+\)?+|(;)[; \t\r]*+[^;%( \t\r\n]")
+_TURNS = re.compile(
+    rb"G0*[23](?![\d.])[ \t]*+(?:[FIJKRXYZ][ \t]*+[-+\d.]++[ \t]*+)++P[ \t]*0*([2-9]|[1-9]\d+)(?![\d.])"
+)
+_PERCENT = re.compile(rb"(?m)^[ \t]*%[ \t\r]*$")
 _COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
 
 _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ...] = (
@@ -33,7 +38,6 @@ _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ..
         re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"),
         "tolerance of the path; FANUC's G64 has no P",
     ),
-    ("linuxcnc", (b"61.1",), re.compile(rb"G0*61\.1(?!\d)"), "exact stop; not known on FANUC"),
     ("linuxcnc", (b"G59.",), re.compile(rb"G59\.[123](?!\d)"), "work coordinate system 7 to 9"),
     ("linuxcnc", (b"G38.",), re.compile(rb"G38\.[2-5](?!\d)"), "straight probe"),
     ("haas", (b"G154",), re.compile(rb"G154[ \t]*P[ \t]*\d+"), "additional work offset"),
@@ -50,12 +54,17 @@ _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ..
         "dwell in seconds; FANUC's F is a feed",
     ),
     ("siemens", (b"%_N_",), re.compile(rb"%_N_\w+"), "name of a program"),
+    ("siemens", (b"=",), re.compile(rb"(?<![A-Z])R\d+[ \t]*="), "R parameter"),
+    ("siemens", (b"AC", b"IC"), re.compile(rb"=[ \t]*[AI]C(?![A-Z])"), "absolute or incremental word"),
+    ("siemens", (b"GOTOF", b"GOTOB"), re.compile(rb"GOTO[FB](?![A-Z])"), "jump to a label"),
+    ("siemens", (b"CYCLE",), re.compile(rb"(?<![A-Z_])CYCLE\d+"), "cycle"),
+    ("siemens", (b"TRANS", b"AROT"), re.compile(rb"(?<![A-Z_])(?:A?TRANS|AROT)(?![A-Z_])"), "frame"),
     ("siemens", (b"G700", b"G710"), re.compile(rb"G7[01]0(?![\d.])"), "inch or mm"),
 )
 """Words that no FANUC control knows: one of the short texts is in a program that has the word."""
 
 _OF_FANUC: tuple[tuple[re.Pattern[bytes], str], ...] = (
-    (re.compile(rb"(?<![A-Z])(?:GOTO|THEN)(?![A-Z])"), "jump of a macro"),
+    (re.compile(rb"(?<![A-Z])(?:GOTO(?=[ \t]*[\d#\[])|THEN(?![A-Z]))"), "jump of a macro"),
     (re.compile(rb"(?<![A-Z])WHILE[ \t]*\[[^\n]*\][ \t]*DO[ \t]*\d"), "loop of a macro"),
     (re.compile(rb"G0*5\.1(?![\d])[ \t]*Q[ \t]*\d"), "look-ahead mode"),
     (re.compile(rb"G0*8[ \t]*P[ \t]*[01](?!\d)"), "look-ahead mode"),
@@ -102,6 +111,7 @@ def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]
         One for each control, in the order of their lines; empty: nothing tells, it is in FANUC's words.
     """
     code = re.sub(rb";[^\n]*", b"", _COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
+    code = code[: _end(code)]
     found: dict[InputDialect, tuple[int, Recognition]] = {}
     for dialect, hints, sign, meaning in _SIGNS:
         if any(hint in code for hint in hints):
@@ -114,8 +124,10 @@ def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]
     return tuple(sign for _, sign in sorted(found.values(), key=lambda each: each[0]))
 
 
-def doubtful_dwell(text: bytes) -> tuple[int, str] | None:
-    """The first dwell of a program that is next to nothing on FANUC, and usual in LinuxCNC's seconds.
+def doubtful_word(text: bytes) -> tuple[int, str] | None:
+    """The first dwell or arc of a program that is allowed on FANUC, and usual with another meaning on LinuxCNC.
+
+    A dwell of P1 to P9 is next to nothing in milliseconds, P of an arc are turns there.
 
     Args:
         text: a program in which no word tells for which control it is.
@@ -124,17 +136,42 @@ def doubtful_dwell(text: bytes) -> tuple[int, str] | None:
         Line and sentence; None: there is none.
     """
     capitals = text[:LOOKED_AT_BYTES].upper()
-    if b"G4" not in capitals and b"G04" not in capitals:
+    if b"P" not in capitals:
         return None
     code = _COMMENT.sub(b" ", capitals)
-    match = _SHORT_DWELL.search(code)
-    if match is None:
+    found = [match for match in (_SHORT_DWELL.search(code), _TURNS.search(code)) if match is not None]
+    if not found:
         return None
+    match = min(found, key=lambda each: each.start())
     value = int(match[1])
-    return (
-        code.count(b"\n", 0, match.start()) + 1,
-        f"G04 P{value} is read as {value} ms (FANUC, Haas); on LinuxCNC it is {value} s: controller.dialect says which",
+    dwells = match.re is _SHORT_DWELL
+    sentence = (
+        f"G04 P{value} is read as {value} ms (FANUC, Haas); on LinuxCNC it is {value} s"
+        if dwells
+        else f"P{value} of an arc is not read, as FANUC knows none; on LinuxCNC the arc has {value} turns"
     )
+    return code.count(b"\n", 0, match.start()) + 1, f"{sentence}: controller.dialect says which"
+
+
+def words_behind_semicolon(text: bytes) -> int | None:
+    """The first line with words behind a semicolon, which is a comment for other controls and a block for FANUC.
+
+    Args:
+        text: a program.
+
+    Returns:
+        The line, from 1; None: there is none.
+    """
+    if b";" not in text:
+        return None
+    match = next((each for each in _BEHIND_SEMICOLON.finditer(text) if each[1]), None)
+    return None if match is None else text.count(b"\n", 0, match.start()) + 1
+
+
+def _end(code: bytes) -> int:
+    """Where a program ends: no control reads what stands behind its second line `%`."""
+    ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
+    return ends[1] if len(ends) > 1 else len(code)
 
 
 def _note(

@@ -167,6 +167,11 @@ class _Run:
                     continue
             except WordError as error:
                 raise self._error(program, index, error.column, str(error)) from None
+            except RecursionError:
+                message = "the values of this block are nested too deep to be worked out"
+                raise self._error(program, index, 1, message) from None
+            except (OverflowError, ValueError):
+                raise self._error(program, index, 1, "a value is too large to be computed") from None
             index += 1
         self._locals.pop()
         return ""
@@ -425,6 +430,6 @@ class _Store:
         for known in (f"{name}.SPF", f"{name}.MPF", f"_N_{name}_SPF", f"_N_{name}_MPF"):
             if known in self._files:
                 path = self._files[known]
-                found = programs_of_source(path.read_text(encoding="utf-8", errors="replace"), str(path))
+                found = programs_of_source(path.read_bytes().decode("utf-8-sig", "replace"), str(path))
                 return replace(found[0], name=name)
         return None

@@ -454,7 +454,8 @@ _MAY_BE_STRUCTURE = re.compile(r"(?i)IF|ELSE|WHILE|FOR|LOOP|REPEAT|UNTIL")
 
 def programs_of_source(source: str, file: str) -> list[ProgramLines]:
     """The programs of a text: one, or several with heads `%_N_NAME_SPF`."""
-    lines = source.splitlines()
+    # A block ends with LF alone: str.splitlines would end a comment at a form feed or at a byte of an "Å", too.
+    lines = source.replace("\r\n", "\n").replace("\r", " ").removesuffix("\n").split("\n")
     heads = [(index, head) for index, line in enumerate(lines) if (head := _heading(line)) is not None]
     stem = re.sub(r"(?i)^_N_|_(MPF|SPF)$|\.[A-Z0-9]+$", "", re.split(r"[/\\]", file)[-1]).upper()
     if not heads:

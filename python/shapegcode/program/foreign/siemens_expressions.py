@@ -213,6 +213,8 @@ def number(value: Value, column: int) -> float | int:
     """A value as a number; a string is none."""
     if isinstance(value, str):
         raise WordError(f'"{value}" where a number would have to stand', column)
+    if not math.isfinite(value):
+        raise WordError("a value is too large to be computed", column)
     return int(value) if isinstance(value, bool) else value
 
 

@@ -29,6 +29,7 @@ _CENTRES = {"I": 0, "J": 1, "K": 2}
 _MIDDLES = {"I1": 0, "J1": 1, "K1": 2}
 _ROTARY = {"A", "B", "C", "U", "V", "W"}
 _FRAMES = {"TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR", "AMIRROR"}
+_ONE_OF = (("CR", "AR"), ("RND", "CHF", "CHR"))  # words that exclude each other
 _BEHIND = {0, 1, 2, 5, 9, 30}  # M functions behind the motion of their block
 _ENDS = {"M2": "M2", "M30": "M30", "M17": "M17"}
 
@@ -109,6 +110,7 @@ class BlockWords:
         """One block; says which word ends the program, or nothing."""
         words = block.words
         names = {word.name for word in words if word.value is None or word.name == "M"}
+        self._refuse_twice(words)
         if words[0].name in _FRAMES:
             self._frame(words)
             return ""
@@ -143,6 +145,21 @@ class BlockWords:
         if "RET" in names:
             return "M17"
         return self._ended(functions)
+
+    def _refuse_twice(self, words: tuple[Word, ...]) -> None:
+        """An address twice (alarm 12010), and the words that exclude each other."""
+        seen: set[str] = set()
+        for word in words:
+            if word.value is None or word.name == "M" or self._run.knows(word.name):
+                continue
+            same = next((group for group in _ONE_OF if word.name in group), (word.name,))
+            for other in same:
+                if other in seen:
+                    what = f"{other} twice" if other == word.name else f"{other}= and {word.name}="
+                    raise word.error(f"{what} in one block: one of them would have to be left out")
+            seen.add(word.name)
+        if "CR" in seen and (other := next((name for name in ("I", "J", "K") if name in seen), "")):
+            raise words[0].error(f"CR= and {other} in one block: one of them would have to be left out")
 
     def _ended(self, functions: list[Word]) -> str:
         codes = {f"M{self._whole(word)}" for word in functions if word.name == "M"}
