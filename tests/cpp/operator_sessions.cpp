@@ -9,7 +9,7 @@ int main(int argc, char** argv) {
     return argc > place ? std::strtoul(argv[place], nullptr, 10) : otherwise;
   };
   const unsigned long first = number(1, 0);
-  const unsigned long count = number(2, 300);
+  const unsigned long count = number(2, 16);
   const unsigned long periods = number(3, 1000);
   unsigned long broken = 0;
   for (unsigned long seed = first; seed < first + count; ++seed) {

@@ -23,6 +23,8 @@ constexpr double joining_share = 1e-4;
 constexpr double same_share = 1e-9;
 // A motion is as good as at rest whose square of the speed is less than this, of what rest becomes on the interval.
 constexpr double slow_share = 0.01;
+// Where keeping sets was of no use, because nearly all of them depend on the end, so many plans are made without.
+constexpr int plans_anew = 16;
 // Behind a valley, over which the time is compared, and shares of the square of its highest speed that are tried.
 constexpr int passing_stations = 64;
 constexpr std::array<double, 5> passings{1.0, 0.85, 0.7, 0.55, 0.4};
@@ -47,6 +49,14 @@ void PathPlan::make(const PathStart& start, const AlongPath& state, std::uint64_
   begin_ = {state.speed * state.speed, state.acceleration};
   make_stations();
   make_sets(true);
+  std::size_t kept = 0;
+  std::size_t remade = 0;
+  for (std::size_t k = 0; k + 1 < count_; ++k) {
+    kept += courses_[k].is_kept ? 1 : 0;
+    remade += courses_[k].is_kept && courses_[k].is_remade ? 1 : 0;
+  }
+  const bool is_worth = 2 * remade <= kept;
+  anew_ = anew_ > 0 ? anew_ - 1 : (is_worth ? 0 : plans_anew);
   for (int round = 0; round < rounds; ++round) {
     expect();
     if (!lay_tangents()) break;
@@ -75,7 +85,7 @@ void PathPlan::keep(const Station& station, std::size_t before, std::size_t befo
 }
 
 void PathPlan::make_stations() {
-  const std::size_t before_end = count_ > 0 ? end() : 0;
+  const std::size_t before_end = count_ > 0 && anew_ == 0 ? end() : 0;
   std::size_t passed = before_end;  // of the stations before
   count_ = 0;
   Station station;

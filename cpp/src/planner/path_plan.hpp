@@ -26,7 +26,10 @@ class PathPlan {
   void make(const PathStart& start, const AlongPath& state, std::uint64_t end, const FeedRatios& ratios);
 
   /// Nothing of the plan before holds for what comes.
-  void forget() noexcept { count_ = 0; }
+  void forget() noexcept {
+    count_ = 0;
+    anew_ = 0;
+  }
 
   /// Whether it ends before the end of what is known.
   [[nodiscard]] bool is_cut() const noexcept { return is_cut_; }
@@ -87,6 +90,7 @@ class PathPlan {
   double max_across_;
   bool grows_;
   bool is_cut_ = false;
+  int anew_ = 0;  // plans that keep nothing
   std::size_t count_ = 0;
   std::vector<Station> stations_;
   std::vector<ControllableSet> sets_, slow_sets_;
