@@ -28,6 +28,13 @@ __all__ = [
 ]
 
 
+def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:
+    """A ProgramError whose message starts with ``source:line:column``."""
+    error = ProgramError(f"{source}:{line}:{column}: {message}")
+    error.__dict__.update(line=line, column=column, alarm=alarm, file=source)
+    return error
+
+
 @dataclass(frozen=True)
 class Problem:
     """One thing wrong in a file of settings.

@@ -200,6 +200,9 @@ def test_tool_table(unit: str, mm: float, tmp_path: Path) -> None:
     (tmp_path / "other.tbl").write_text("T1 P1 Z3\n")
     keys = {"input.tool_table": str(tmp_path / "mill.ini"), "input.machine_unit": "mm"}
     assert ends(read("G43 H1\nG1 X1", tmp_path, **keys))[-1][2] == pytest.approx(5.0 - 3.0 * mm)
+    # As `setup` reads it: comments behind values, any case.
+    (tmp_path / "mill.ini").write_text(f"[emcio]\ntool_table = other.tbl  # mine\n[TRAJ]\nLINEAR_UNITS={unit} ; so\n")
+    assert ends(read("G43 H1\nG1 X1", tmp_path, **keys))[-1][2] == pytest.approx(5.0 - 3.0 * mm)
     with pytest.raises(sg.ProgramError, match=r"part\.ngc:4:1: G43 H7: .*other\.tbl has no tool 7"):
         read("G43 H7", tmp_path, **keys)
     (tmp_path / "other.tbl").write_text("T1 P1 Z3\nZ4\n")

@@ -89,7 +89,7 @@ class Jog {
 /// An offset of each axis with limits of its own, which are not the path's any more; backlash is part of it.
 class ExternalOffset {
  public:
-  /// `gain`: of the filters behind.
+  /// `filters`: behind it, which keep some of the limits for themselves.
   ExternalOffset(const ControllerSettings& settings, const SetPointFilters& filters);
   [[nodiscard]] bool is_none() const noexcept { return axes_.empty(); }
   bool set(std::size_t axis, double value) noexcept;

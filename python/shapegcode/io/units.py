@@ -8,6 +8,8 @@ from typing import Literal
 
 Measured = Literal["time", "force", "torque", "acceleration", "velocity", "displacement"]
 
+#: Inch in mm (exact by definition).
+MM_PER_INCH = 25.4
 #: Standard acceleration of gravity, m/s² (exact by definition).
 _G_M_S2 = 9.80665
 #: Pound-force in N (exact by definition).

@@ -17,6 +17,7 @@ from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 
 from shapegcode.errors import MachineError, Problem
+from shapegcode.io.units import MM_PER_INCH
 
 _TABLE_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _G10 = re.compile(r"(?:N\s*\d+\s*)?(?:G9[01]\s*)?G10\b|(?:N\s*\d+\s*)?(?:G9[01]\s*)?G10(?=[A-Z])", re.ASCII)
@@ -155,7 +156,6 @@ def _computed(node: ast.expr) -> float:
 
 LONGEST_MS = 10_000.0
 _MAX_VALUE = 1e7
-MM_PER_INCH = 25.4
 
 
 class DumpValues:

@@ -5,8 +5,8 @@ Sources of the meanings stand in docs/reference/parameters.md, with those that n
 
 from __future__ import annotations
 
+from shapegcode.io.units import MM_PER_INCH
 from shapegcode.machine.fanuc_draft import Draft
-from shapegcode.machine.fanuc_dump import MM_PER_INCH
 
 _SERIAL = {0: 103, 1: 113, 2: 123, 3: 133}
 """Channel of 0020 -> parameter of its transfer speed; other channels are cards, networks, data servers."""

@@ -12,7 +12,6 @@ What it leaves out has LinuxCNC's own default.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,13 +19,11 @@ from typing import Any
 
 from shapegcode.errors import MachineError, Problem
 from shapegcode.io.data_file import read_file
+from shapegcode.io.ini import UNITS_MM, ini_entries
 from shapegcode.machine.machine import Machine
 from shapegcode.settings.keys import toml
 
 _MAX_BYTES = 1 << 20
-_SECTION = re.compile(r"\[\s*([^\]]+?)\s*\]")
-_ENTRY = re.compile(r"([A-Za-z0-9_]+)\s*=\s*(.*?)\s*(?:[;#].*)?")
-_UNITS_MM = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
 _PLANNER = {
     "ARC_BLEND_RAMP_FREQ": ("ramp_frequency_hz", float), "ARC_BLEND_KINK_RATIO": ("kink_ratio", float),
     "ARC_BLEND_OPTIMIZATION_DEPTH": ("optimization_depth", int),
@@ -49,19 +46,12 @@ class IniMachine:
 
 
 class _Ini:
-    """Entries of an INI file with their lines; the first of a name counts, as in LinuxCNC."""
+    """Entries of an INI file with their lines, and what is wrong with them."""
 
     def __init__(self, file: str, text: str) -> None:
         self.file = file
-        self.entries: dict[tuple[str, str], tuple[str, int]] = {}
+        self.entries = ini_entries(text)
         self.problems: list[Problem] = []
-        section = ""
-        for number, raw in enumerate(text.splitlines(), start=1):
-            line = raw.strip()
-            if found := _SECTION.match(line):
-                section = found[1].upper()
-            elif line and line[0] not in "#;" and (entry := _ENTRY.fullmatch(line)):
-                self.entries.setdefault((section, entry[1].upper()), (entry[2], number))
 
     def number(self, section: str, name: str, *, least: float = 0.0) -> float | None:
         """A number above a limit; None where there is none, and where it is none, which is then a problem."""
@@ -102,7 +92,7 @@ def read_ini(file: str | Path, *, name: str | None = None) -> IniMachine:
     if not any(section == "TRAJ" for section, _ in ini.entries):
         raise MachineError(str(file), (Problem("", "", "no INI file of LinuxCNC: it has no section [TRAJ]"),))
     unit_text, line = ini.entries.get(("TRAJ", "LINEAR_UNITS"), ("mm", 0))
-    unit_mm = _UNITS_MM.get(unit_text.lower())
+    unit_mm = UNITS_MM.get(unit_text.lower())
     if unit_mm is None:
         ini.problems.append(Problem("[TRAJ] LINEAR_UNITS", toml(unit_text), "must be mm or inch", line))
     axes, remarks = _axes(ini, unit_mm or 1.0)

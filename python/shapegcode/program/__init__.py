@@ -1,13 +1,13 @@
 """A CNC program as the controller reads it, and cutter compensation in it."""
 
+from shapegcode.errors import located_error
+from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.program import (
-    MM_PER_INCH,
     Program,
     between_increments,
     end_off_grid_mm,
     given_program,
     least_increment_mm,
-    located_error,
     written_increment_mm,
 )
 from shapegcode.program.reading import program_loader, reader_options

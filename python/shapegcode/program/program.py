@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
-from shapegcode._core import ProgramError
+from shapegcode.errors import ProgramError, located_error
+from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.foreign.plain import ForeignProgram
 from shapegcode.program.foreign.read import foreign_program
@@ -23,7 +24,6 @@ from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-MM_PER_INCH = 25.4
 _KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
 _ARC_OFF_RADIUS = "off its radius"
 
@@ -477,13 +477,6 @@ def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
     """Axes at rest through a whole region at a position that no word can give: no word of them may be written."""
     off_mm = end_off_grid_mm(region, increment_mm)
     return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
-
-
-def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:
-    """A ProgramError whose message starts with ``source:line:column``."""
-    error = ProgramError(f"{source}:{line}:{column}: {message}")
-    error.__dict__.update(line=line, column=column, alarm=alarm, file=source)
-    return error
 
 
 def _other_arc_centre(data: bytes, options: _core.ReaderOptions, message: str) -> str:

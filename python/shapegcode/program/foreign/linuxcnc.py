@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
+from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.foreign.linuxcnc_blocks import BlockRunner
 from shapegcode.program.foreign.linuxcnc_cycles import PECK_CLEARANCE_MM
 from shapegcode.program.foreign.linuxcnc_expression import (
@@ -24,7 +25,7 @@ from shapegcode.program.foreign.linuxcnc_expression import (
 )
 from shapegcode.program.foreign.linuxcnc_parameters import ParameterTable
 from shapegcode.program.foreign.linuxcnc_source import KEYWORDS, OLine, SourceFile, subroutine_file
-from shapegcode.program.foreign.linuxcnc_state import MM_PER_INCH, Modes, State, normal_axis
+from shapegcode.program.foreign.linuxcnc_state import Modes, State, normal_axis
 from shapegcode.program.foreign.linuxcnc_tools import find_tool_table
 from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram, refusal
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.foreign.linuxcnc_tools import ToolTable
 
-MM_PER_INCH = 25.4
 AXES = "xyz"
 CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
 """Drilling cycles that are read, in tenths of their G numbers."""

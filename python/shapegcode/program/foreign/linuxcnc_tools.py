@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shapegcode.io.data_file import read_file
+from shapegcode.io.ini import UNITS_MM, ini_entries
 from shapegcode.program.foreign.plain import refusal
 
 _MAX_BYTES = 10_000_000
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
-_ENTRY = re.compile(r"^\s*(\w+)\s*=\s*([^\n]*?)\s*$", re.MULTILINE)
-_SECTION = re.compile(r"^\s*\[(\w+)\]\s*$", re.MULTILINE)
-_UNITS_MM = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,7 @@ class ToolTable:
     @property
     def unit_mm(self) -> float:
         """Length of its unit."""
-        return _UNITS_MM[self.units]
+        return UNITS_MM[self.units]
 
 
 def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | None:
@@ -68,14 +66,15 @@ def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | 
     path = Path(stated).expanduser()
     if path.suffix.lower() != ".ini":
         return read_tool_table(path, unit)
-    entries = _ini(read_file(path, _MAX_BYTES).decode("utf-8", "replace"))
-    table = entries.get(("EMCIO", "TOOL_TABLE"))
-    if table is None:
+    entries = ini_entries(read_file(path, _MAX_BYTES).decode("utf-8", "replace"))
+    table, _ = entries.get(("EMCIO", "TOOL_TABLE"), ("", 0))
+    if not table:
         raise refusal(str(path), 1, "it has no [EMCIO] TOOL_TABLE")
-    linear = entries.get(("TRAJ", "LINEAR_UNITS"), "mm").lower()
-    if linear not in _UNITS_MM:
-        raise refusal(str(path), 1, f"[TRAJ] LINEAR_UNITS = {linear} is neither mm nor inch")
-    return read_tool_table(path.parent / Path(table).expanduser(), "inch" if _UNITS_MM[linear] > 1.0 else "mm")
+    linear, line = entries.get(("TRAJ", "LINEAR_UNITS"), ("mm", 1))
+    unit_mm = UNITS_MM.get(linear.lower())
+    if unit_mm is None:
+        raise refusal(str(path), line, f"[TRAJ] LINEAR_UNITS = {linear.lower()} is neither mm nor inch")
+    return read_tool_table(path.parent / Path(table).expanduser(), "inch" if unit_mm > 1.0 else "mm")
 
 
 def read_tool_table(path: Path, unit: str) -> ToolTable:
@@ -92,7 +91,7 @@ def read_tool_table(path: Path, unit: str) -> ToolTable:
         ProgramError: a line cannot be read.
         OSError: the file cannot be read.
     """
-    factor = _UNITS_MM[unit]
+    factor = UNITS_MM[unit]
     tools: dict[int, ToolRow] = {}
     text = read_file(path, _MAX_BYTES).decode("utf-8", "replace")
     for number, line in enumerate(text.splitlines(), start=1):
@@ -105,14 +104,3 @@ def read_tool_table(path: Path, unit: str) -> ToolTable:
         x, y, z = (words.get(axis, 0.0) * factor for axis in "XYZ")
         tools[int(words["T"])] = ToolRow((x, y, z), words.get("D", 0.0) * factor, int(words.get("P", 0.0)))
     return ToolTable(tools, str(path), unit)
-
-
-def _ini(text: str) -> dict[tuple[str, str], str]:
-    """Entries of an INI file by section and name."""
-    entries: dict[tuple[str, str], str] = {}
-    sections = [*_SECTION.finditer(text)]
-    for section, following in zip(sections, [*sections[1:], None], strict=True):
-        body = text[section.end() : following.start() if following is not None else len(text)]
-        for entry in _ENTRY.finditer(body):
-            entries.setdefault((section[1], entry[1]), entry[2])
-    return entries

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from shapegcode._core import ProgramError
+from shapegcode.errors import ProgramError, located_error
 
 MAX_DIGITS = 8
 """Digits of a word in FANUC's words (alarm 0003)."""
@@ -179,6 +179,4 @@ def refusal(file: str, line: int, message: str) -> ProgramError:
     Returns:
         The error, to be raised; its message starts with ``file:line:column``.
     """
-    error = ProgramError(f"{file}:{line}:1: {message}")
-    error.__dict__.update(line=line, column=1, alarm=0, file=file)
-    return error
+    return located_error(file, line, 1, message)

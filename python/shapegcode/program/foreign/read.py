@@ -6,7 +6,6 @@ from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,12 +37,10 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
         ProgramError: it is of another dialect than `controller.dialect` says, mixes dialects, or cannot be read; the
             message starts with ``source:line:column``.
     """
-    dialect, reason, line = input_dialect(data, machine, source)
+    dialect, reason = input_dialect(data, machine, source)
     if dialect == "fanuc":
         refuse_words_behind_semicolon(data, source)
         return None
-    if find_spec(f"shapegcode.program.foreign.{dialect}") is None:
-        raise refusal(source, line, f"{reason}: programs for {CONTROLS[dialect]} are not read")
     text = data.removeprefix(BOM_UTF8).decode("latin-1")
     read = _reader(dialect)
     program = read(text, file=source, machine=machine, folder=folder)
@@ -70,7 +67,7 @@ def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
         )
 
 
-def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str, int]:
+def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]:
     """In whose words a program is.
 
     Args:
@@ -79,7 +76,7 @@ def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str,
         source: its name, for messages.
 
     Returns:
-        The dialect, the reason in words, and the line that tells.
+        The dialect, and the reason in words.
 
     Raises:
         ProgramError: it is of another dialect than `controller.dialect` says, or mixes dialects.
@@ -98,7 +95,7 @@ def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str,
                     f"{CONTROLS[stated]} does not know; controller.dialect is {stated}: "
                     f"--set controller.dialect={sign.dialect} reads it",
                 )
-        return stated, f"controller.dialect = {stated}", 1
+        return stated, f"controller.dialect = {stated}"
     if len(signs) > 1:
         first, second = signs[0], signs[1]
         raise refusal(
@@ -109,10 +106,10 @@ def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str,
             "controller.dialect says which control reads it",
         )
     if signs:
-        return signs[0].dialect, signs[0].reason, signs[0].line
+        return signs[0].dialect, signs[0].reason
     if machine.controller.kind == "linuxcnc":
-        return "linuxcnc", "controller.kind = linuxcnc", 1
-    return "fanuc", "", 1
+        return "linuxcnc", "controller.kind = linuxcnc"
+    return "fanuc", ""
 
 
 def _reader(dialect: str) -> Reader:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from shapegcode._core import ProgramError
+from shapegcode.errors import ProgramError, located_error
 from shapegcode.machine import Machine
 from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram
 from shapegcode.program.foreign.siemens_blocks import (
@@ -188,9 +188,7 @@ class _Run:
     def _error(self, program: ProgramLines, index: int, column: int, message: str) -> ProgramError:
         line = program.first + index
         called = f"; called from {', '.join(reversed(self._calls))}" if self._calls else ""
-        error = ProgramError(f"{program.file}:{line}:{column}: {message}{called}")
-        error.__dict__.update(line=line, column=column, alarm=0, file=program.file)
-        return error
+        return located_error(program.file, line, column, message + called)
 
     def _is_skipped(self, block: SiemensBlock) -> bool:
         if not block.skip:

@@ -12,6 +12,7 @@ from functools import lru_cache
 
 from shapegcode.program.foreign.siemens_expressions import (
     NAME,
+    AtColumn,
     Expression,
     SiemensScanner,
     WordError,
@@ -22,7 +23,7 @@ from shapegcode.program.foreign.siemens_expressions import (
 
 
 @dataclass(frozen=True)
-class Word:
+class Word(AtColumn):
     """One word of a block.
 
     Attributes:
@@ -41,23 +42,15 @@ class Word:
     index: tuple[Expression, ...] = ()
     given: tuple[Expression | None, ...] | None = None
 
-    def error(self, message: str) -> WordError:
-        """An error of this word."""
-        return WordError(message, self.column)
-
 
 @dataclass(frozen=True)
-class Jump:
+class Jump(AtColumn):
     """A jump, and under which condition."""
 
     condition: Expression | None
     command: str  # GOTO, GOTOF, GOTOB, GOTOC
     target: str  # label, or N and the number of a block
     column: int
-
-    def error(self, message: str) -> WordError:
-        """An error of this jump."""
-        return WordError(message, self.column)
 
 
 @dataclass(frozen=True)
@@ -73,7 +66,7 @@ class Definition:
 
 
 @dataclass(frozen=True)
-class SiemensBlock:
+class SiemensBlock(AtColumn):
     """A block as it was read; what `kind` says decides which fields count."""
 
     kind: str = "WORDS"
@@ -90,10 +83,6 @@ class SiemensBlock:
     definitions: tuple[Definition, ...] = ()
     saves: bool = False  # PROC ... SAVE
     comment: str = ""
-
-    def error(self, message: str) -> WordError:
-        """An error of the block as a whole."""
-        return WordError(message, self.column)
 
 
 _HEAD = re.compile(r"\s*(/\d?)?\s*(?:(N|:)\s*(\d+))?")

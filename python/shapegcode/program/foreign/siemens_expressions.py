@@ -24,6 +24,16 @@ class WordError(ValueError):
         self.column = column
 
 
+class AtColumn:
+    """Something that stands at a column of its line."""
+
+    column: int
+
+    def error(self, message: str) -> WordError:
+        """An error of it."""
+        return WordError(message, self.column)
+
+
 class Scope(Protocol):
     """Where an expression finds the values of names."""
 

@@ -16,9 +16,7 @@ from shapegcode.machine import Machine
 from shapegcode.program.foreign import siemens_arcs as arcs
 from shapegcode.program.foreign.plain import PlainProgram, number_text
 from shapegcode.program.foreign.siemens_arcs import PLANES, Element, Vector
-from shapegcode.program.foreign.siemens_expressions import WordError
-
-MM_PER_INCH = 25.4
+from shapegcode.program.foreign.siemens_expressions import AtColumn, WordError
 
 _FLIN_ERROR_MM = 0.0005  # of blocks of constant feed in the place of one whose feed is linear
 _MAX_SWEEP = 1.5 * math.pi  # of one arc of the plain program: its rounded ends tell it from a small one
@@ -74,7 +72,7 @@ class SiemensModes:
 
 
 @dataclass
-class Given:
+class Given(AtColumn):
     """Words of one block that say where to go; lengths in mm."""
 
     axes: dict[int, tuple[float, str, int]] = field(default_factory=dict)  # value, AC or IC, column
@@ -89,10 +87,6 @@ class Given:
     has_feed: bool = False
     exact: bool = False  # G9
     column: int = 1
-
-    def error(self, message: str) -> WordError:
-        """An error of the block as a whole."""
-        return WordError(message, self.column)
 
 
 @dataclass(frozen=True)

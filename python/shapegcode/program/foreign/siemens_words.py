@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.foreign.plain import number_text
 from shapegcode.program.foreign.siemens_blocks import SiemensBlock, Word
 from shapegcode.program.foreign.siemens_expressions import Value, WordError, number, whole
-from shapegcode.program.foreign.siemens_path import MM_PER_INCH, Given, SiemensFrame, SiemensModes, SiemensPath
+from shapegcode.program.foreign.siemens_path import Given, SiemensFrame, SiemensModes, SiemensPath
 from shapegcode.program.stamp import plain_comment
 
 if TYPE_CHECKING:
