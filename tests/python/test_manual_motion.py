@@ -140,6 +140,8 @@ def test_what_a_jog_answers() -> None:
     assert made.jog(2, 40.0) == sg.JogResult.beyond_travel
     assert made.jog_by(2, -10.0, 40.0) == ACCEPTED
     assert made.run()[-1][2] == -5.0
+    made.resume()
+    assert made.jog(2, 40.0) == made.jog_by(2, 1.0, 40.0) == sg.JogResult.path_moves
 
 
 def test_soft_limits_refuse_at_the_push_and_hold_when_they_move() -> None:

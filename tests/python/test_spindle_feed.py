@@ -242,10 +242,25 @@ def test_an_angle_that_is_missing_changes_nothing() -> None:
     angle = np.arange(1, 3001) * 0.01
     angle[800] = math.nan
     angle[900] = 1e308
+    angle[1000] += 1e6
+    angle[1100:1103] -= 100.0
     rows = [made.step(1500, angle[:1500]), made.step(1), made.step(1499, angle[1501:])]
     assert made.state.activity == sg.Activity.idle
     np.testing.assert_array_equal(rows[-1][-1], [0.0, 0.0, -40.0])
     assert largest_share(np.concatenate(rows)) <= 1.001
+
+
+@pytest.mark.parametrize("jump", [1e6, -1e6, 30.0])
+def test_a_spindle_that_is_somewhere_else_is_believed_and_the_thread_is_lost(jump: float) -> None:
+    made = control()
+    made.push_line([0, 0, -40], 2.0, rules=SYNCHRONOUS, stop_at_end=True)
+    angle = np.arange(1, 2001) * 0.01
+    angle[1000:] += jump
+    rows = made.step(2000, angle)
+    assert made.state.activity == sg.Activity.aborted
+    assert -40.0 < rows[-1, 2] < 0.0
+    assert largest_share(rows) <= 1.001
+    assert made.state.spindle_speed == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize("feed_of", [sg.FeedOf.all_axes, sg.FeedOf.dominant, sg.FeedOf.path, sg.FeedOf.time])

@@ -44,6 +44,8 @@ class Jog {
 
   JogResult jog(std::size_t axis, double speed) noexcept;
   JogResult jog_by(std::size_t axis, double distance, double speed) noexcept;
+  /// Nothing is taken until the next step says so again.
+  void close() noexcept { is_open_.store(false, std::memory_order_relaxed); }
 
   // Of the thread that steps.
 

@@ -226,6 +226,10 @@ class MotionController::Implementation {
     hold_.store(false, std::memory_order_relaxed);
     const std::uint64_t waits = waits_before_.load(std::memory_order_relaxed);
     if (waits > released_.load(std::memory_order_relaxed)) released_.store(waits, std::memory_order_relaxed);
+    // What is asked for from now on would be dropped by the step that leads back.
+    if (abort_.load(std::memory_order_relaxed) || flush_.load(std::memory_order_relaxed) != Flush::none) return;
+    jog_.close();
+    retrace_.close();
   }
   void abort() noexcept {
     abort_.store(true, std::memory_order_relaxed);

@@ -22,6 +22,8 @@ class Retrace {
 
   /// From any thread: so many mm back from where the path rests.
   JogResult ask(double distance_mm) noexcept;
+  /// Nothing is taken until the next step says so again.
+  void close() noexcept { is_open_.store(false, std::memory_order_relaxed); }
 
   // Of the thread that steps.
 

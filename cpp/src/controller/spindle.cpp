@@ -18,6 +18,9 @@ constexpr double speed_room = 1.15;
 constexpr double most_revolutions = 1e9;
 // Slower than that it stands, revolutions per s.
 constexpr double stands = 0.01;
+// An angle that would take a faster spindle is none, revolutions per s; so many in a row are where the spindle is.
+constexpr double impossible_speed = 5000.0;
+constexpr int believed_after = 4;
 
 SpindleState after(const SpindleState& state, double time_s) noexcept {
   return {state.angle + time_s * (state.speed + 0.5 * time_s * state.acceleration),
@@ -43,7 +46,12 @@ void Spindle::measure(double revolutions) noexcept {
     is_measured_ = true;
     observed_ = smooth_ = {revolutions, 0.0, 0.0};
   }
-  correct(revolutions - after(observed_, period_s_).angle);
+  const double missing = revolutions - after(observed_, period_s_).angle;
+  const bool is_possible = std::abs(missing) < impossible_speed * period_s_;
+  impossible_ = is_possible ? 0 : impossible_ + 1;
+  if (impossible_ < believed_after) return correct(is_possible ? missing : 0.0);
+  impossible_ = 0;
+  observed_ = smooth_ = {revolutions, 0.0, 0.0};
 }
 
 void Spindle::miss() noexcept {
@@ -109,8 +117,11 @@ void SpindleFeed::wait(const Spindle& spindle, bool may_begin) noexcept {
 bool SpindleFeed::asks_too_much(const SpindleState& now, const SpindleState& before) const noexcept {
   const double pitch = std::abs(pitch_mm_);
   const double jerk = (now.acceleration - before.acceleration) / period_s_;
-  return pitch * std::abs(now.speed) > along_limits_.speed ||
-         pitch * std::abs(now.acceleration) > (1.0 - catching_share) * along_limits_.acceleration ||
+  // Of one that is somewhere else at once as well.
+  const double speed = std::max(std::abs(now.speed), std::abs(now.angle - before.angle) / period_s_);
+  const double acceleration = std::max(std::abs(now.acceleration), std::abs(now.speed - before.speed) / period_s_);
+  return pitch * speed > along_limits_.speed ||
+         pitch * acceleration > (1.0 - catching_share) * along_limits_.acceleration ||
          pitch * std::abs(jerk) > (1.0 - catching_share) * along_limits_.jerk;
 }
 

@@ -42,6 +42,7 @@ class Spindle {
   SpindleState observed_, smooth_;
   std::atomic<double> speed_{0.0};
   bool is_measured_ = false;
+  int impossible_ = 0;  // angles in a row
 };
 
 /// Along a straight segment: so much of it for each revolution. It waits for a whole revolution, catches up, is bound
