@@ -14,6 +14,7 @@
 
 #include "limited_settings.hpp"
 #include "random_motion.hpp"
+#include "sanitized.hpp"
 #include "shapegcode/controller.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/planner.hpp"
@@ -59,7 +60,7 @@ TEST_CASE("a path that is pushed at once is run as a whole path is planned: a sh
   int short_ones = 0;
   int same_ones = 0;
   for (const bool smooth : {false, true}) {
-    for (unsigned seed = 0; seed < 60; ++seed) {
+    for (unsigned seed = 0; seed < trials(60); ++seed) {
       CAPTURE(seed);
       CAPTURE(smooth);
       std::mt19937 random(seed);
@@ -93,7 +94,7 @@ TEST_CASE("a path that is pushed at once is run as a whole path is planned: a sh
 }
 
 TEST_CASE("limits are kept at every set-point, whatever the operator does") {
-  for (unsigned seed = 0; seed < 40; ++seed) {
+  for (unsigned seed = 0; seed < trials(40); ++seed) {
     CAPTURE(seed);
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform(0.0, 1.0);
@@ -134,7 +135,7 @@ TEST_CASE("after a hold anywhere the mode is at rest") {
   constexpr double damping = 0.05;
   const double frequency_hz = 50.0 / std::sqrt(1.0 - damping * damping);
   const double decay = std::exp(-damping * std::numbers::pi / std::sqrt(1.0 - damping * damping));
-  for (unsigned seed = 0; seed < 40; ++seed) {
+  for (unsigned seed = 0; seed < trials(40); ++seed) {
     CAPTURE(seed);
     std::mt19937 random(seed);
     const std::vector<Segment> segments = random_segments(random, 20, 150.0, true);

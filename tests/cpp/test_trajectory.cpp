@@ -10,6 +10,7 @@
 #include <doctest/doctest.h>
 
 #include "random_motion.hpp"
+#include "sanitized.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/planner.hpp"
 
@@ -70,7 +71,7 @@ TEST_CASE("a single move takes no more than two periods more than the shortest t
 }
 
 TEST_CASE("limits and tolerance are kept on random paths, and stops are stops") {
-  for (unsigned seed = 0; seed < 80; ++seed) {
+  for (unsigned seed = 0; seed < trials(80); ++seed) {
     CAPTURE(seed);
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform(0.0, 1.0);
