@@ -385,9 +385,12 @@ def test_time_check_and_convert_to_linuxcnc(tmp_path: Path) -> None:
 
 def test_what_is_not_shaped_is_written_in_the_words_that_are_asked_for() -> None:
     text = "G21 G90 G64 P0.01\nG0 X0 Y0 Z0\nG4 P0.5\nG0 X10\nM2\n"
-    assert b"G04X0.5" in sg.convert(text, machine_with()).text
-    own = sg.convert(text, machine_with({"emission.dialect": "linuxcnc"})).text
-    assert b"G04P0.5" in own.replace(b" ", b"").replace(b"G4P", b"G04P")
+    done = sg.convert(text, machine_with())
+    assert b"G04X0.5" in done.text
+    assert "its motion is unchanged, written in FANUC's words" in done.answer
+    own = sg.convert(text, machine_with({"emission.dialect": "linuxcnc"}))
+    assert b"G04P0.5" in own.text.replace(b" ", b"").replace(b"G4P", b"G04P")
+    assert "its motion is unchanged\nwritten in the words of LinuxCNC" in own.answer
 
 
 def test_restart_points_name_the_lines_of_the_source() -> None:

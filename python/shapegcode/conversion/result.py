@@ -203,10 +203,17 @@ class Conversion(ProgramFigures, Result):
             lines.append(self.dialect.sentence)
         return "\n".join(lines)
 
+    @property
+    def _unchanged(self) -> str:
+        if self.dialect is not None:
+            return "its motion is unchanged"
+        in_other_words = self.simulated is not None and self.simulated.original.foreign is not None
+        return "its motion is unchanged, written in FANUC's words" if in_other_words else "the program is unchanged"
+
     def _headline(self) -> str:
         verdict = self.recommendation + ("" if self.is_written_as_output else ", OUT OF TOLERANCE")
         if not self.cuts:
-            return f"{verdict}: there is nothing to shape; the program is unchanged"
+            return f"{verdict}: there is nothing to shape; {self._unchanged}"
         vibration = self.residual_vibration_um
         axis = max("xyz", key=lambda each: vibration.original[each])
         target = getattr(self.contour_error_um, self.limits.contour_target)
@@ -216,7 +223,7 @@ class Conversion(ProgramFigures, Result):
             )
             return (
                 f"{verdict}: {why}; residual vibration {axis.upper()} {vibration.original[axis]:.1f} µm, contour "
-                f"{target.original.max:.1f} µm; the program is unchanged"
+                f"{target.original.max:.1f} µm; {self._unchanged}"
             )
         change = change_percent(self.cycle_time_s.original, self.cycle_time_s.emitted)
         worst_stay = target.original.max - target.emitted.max < _LEAST_SHOWN_UM and (
