@@ -105,7 +105,7 @@ test-all-python: package dev
 	tests/tools/fetch_rs274.sh
 	tests/tools/fetch_peers.sh
 	tests/tools/fetch_axe.sh
-	$(PYTEST) -m slow
+	$(PYTEST) -m slow $(PYTEST_FLAGS)
 
 # LinuxCNC is installed for it, with a user that may run it where this is root, and the component into its modules.
 # `test-all` also unloads the component a thousand times under load.
@@ -262,7 +262,7 @@ release: test-packages .venv/.runtime
 sanitize: test-packages
 	cmake --preset $@
 	cmake --build --preset $@
-	ctest --preset $@
+	ctest --preset $@ $(CTEST_FLAGS)
 
 # The controller with a thread for each of its parts, and LinuxCNC's component as it is unloaded, under ThreadSanitizer.
 threads: test-packages .venv/.runtime
