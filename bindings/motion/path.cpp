@@ -110,7 +110,9 @@ void register_path(py::module_& module) {
       .def_readonly("normal", &Segment::normal, "Axis across the plane of an arc: 0 X, 1 Y, 2 Z.")
       .def(
           "point_at", [](const Segment& self, double s) { return point_at(self, s); }, py::arg("s_mm"),
-          "Position at a distance from the start, shape (3,), mm.");
+          "Position at a distance from the start, shape (3,), mm.")
+      .def("chords_within", &chords_within, py::arg("tolerance_mm"),
+           "How many equal chords of an arc lie within a tolerance of it; 1 for a line.");
 
   py::class_<Path, std::shared_ptr<Path>>(module, "Path", "A connected run of segments.")
       .def(py::init<std::vector<Segment>>(), py::arg("segments"),

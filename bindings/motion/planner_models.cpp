@@ -22,6 +22,8 @@ void register_planner_models(py::module_& module) {
       .def(py::init<>())
       .def_readwrite("kind", &PlannerRules::kind, "Whose rules.")
       .def_readwrite("arc_resolution_mm", &PlannerRules::arc_resolution_mm, "klipper: length of the chords of an arc.")
+      .def_readwrite("chord_tolerance_mm", &PlannerRules::chord_tolerance_mm,
+                     "klipper, grbl: arcs are emitted as chords within it; 0: as arcs.")
       .def_readwrite("square_corner_velocity_mm_per_s", &PlannerRules::square_corner_velocity_mm_per_s,
                      "klipper: speed at a corner of 90 degrees.")
       .def_readwrite("minimum_cruise_ratio", &PlannerRules::minimum_cruise_ratio,

@@ -97,6 +97,8 @@ void define_model(py::module_& module) {
       .def(py::init<>())
       .def_readwrite("planner", &FanucModel::planner,
                      "Another kind than fanuc: look-ahead by its rules, shaped blocks too.")
+      .def_readwrite("chord_tolerance_mm", &FanucModel::chord_tolerance_mm,
+                     "Arcs of shaped programs are emitted as chords within it, mm; 0: as arcs.")
       .def_readwrite("period_s", &FanucModel::period_s, "Interpolation period, s.")
       .def_readwrite("block_end", &FanucModel::block_end, "When a block's successor starts.")
       .def_readwrite("motion", &FanucModel::motion, "Where a cutting move is accelerated.")

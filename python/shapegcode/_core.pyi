@@ -539,6 +539,10 @@ class Segment:
         """
         A straight move.
         """
+    def chords_within(self, tolerance_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        How many equal chords of an arc lie within a tolerance of it; 1 for a line.
+        """
     def point_at(self, s_mm: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Position at a distance from the start, shape (3,), mm.
@@ -1020,6 +1024,14 @@ class PlannerRules:
         """
     @blend_tolerance_mm.setter
     def blend_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def chord_tolerance_mm(self) -> float:
+        """
+        klipper, grbl: arcs are emitted as chords within it; 0: as arcs.
+        """
+    @chord_tolerance_mm.setter
+    def chord_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def junction_deviation_mm(self) -> float:
@@ -5387,6 +5399,14 @@ class FanucModel:
         """
     @block_end.setter
     def block_end(self, arg0: BlockEnd) -> None:
+        ...
+    @property
+    def chord_tolerance_mm(self) -> float:
+        """
+        Arcs of shaped programs are emitted as chords within it, mm; 0: as arcs.
+        """
+    @chord_tolerance_mm.setter
+    def chord_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def exponential_rest(self) -> float:

@@ -11,6 +11,7 @@
 #include "shapegcode/error.hpp"
 #include "shapegcode/path.hpp"
 
+using shapegcode::chords_within;
 using shapegcode::curvature;
 using shapegcode::Error;
 using shapegcode::make_arc;
@@ -203,4 +204,16 @@ TEST_CASE("segment: the nearest point against a search of the whole segment") {
       CHECK((p - point_at(segment, found.s_mm)).norm() == doctest::Approx(found.distance_mm).epsilon(1e-9));
     }
   }
+}
+
+TEST_CASE("segment: chords of an arc within a tolerance, and one less is not") {
+  const Segment arc = make_arc({20, 0, 0}, {0, 20, 0}, {0, 0, 0}, 0.5 * pi, 2, 10.0);
+  const auto off_mm = [](double chords) { return 20.0 * (1.0 - std::cos(0.25 * pi / chords)); };
+  for (const double tolerance_mm : {0.0005, 0.01, 1.0}) {
+    const double chords = chords_within(arc, tolerance_mm);
+    CHECK(off_mm(chords) <= tolerance_mm);
+    CHECK(off_mm(chords - 1.0) > tolerance_mm);
+  }
+  CHECK(chords_within(arc, 50.0) == 1.0);
+  CHECK(chords_within(make_line({0, 0, 0}, {9, 0, 0}, 10.0), 0.001) == 1.0);
 }

@@ -28,17 +28,14 @@ from numpy.typing import NDArray
 
 import shapegcode as sg
 from dialect_readers import ReadMove, plan_klipper, read_klipper
-from judge import Mode, residual_um, response
+from judge import Mode, residual_um
+from planner_references import ARC_MM, klipper_text, table_off_path_um
 from shapegcode.conversion.translate import translate
 from shapegcode.machine.programs import ANY_PRICE
 
 Array = NDArray[np.float64]
 Setting = Literal["two lines", "as delivered", "host"]
 DATA = linuxcnc_run.ROOT / "tests" / "benchmarks" / "data" / "recorded_planners.npz"
-CHORD_MM = 0.25
-"""`controller.klipper.arc_resolution_mm`: about what arcs become in the words of Klipper, chords within 0.5 µm."""
-ABOUT_MM = 3.0
-"""Of travel on either side, within which the nearest place of the path is looked for."""
 UNIT_MM = 1e-7
 """Of the integers in the file."""
 PATHS = {
@@ -104,9 +101,7 @@ def machine_of(setup: Setup) -> sg.Machine:
     rates = {f"axes.{axis}.max_feed_mm_per_min": 30_000.0 for axis in "xyz"}
     keys = {**ANY_PRICE, **axes, **rates, "emission.dialect": setup.control, "controller.kind": setup.control}
     keys["controller.dialect"] = "fanuc"  # of PATHS; without it a machine of LinuxCNC's kind reads G04P500 as 500 s
-    if setup.control == "klipper":
-        keys["controller.klipper"] = {"arc_resolution_mm": CHORD_MM}
-    else:
+    if setup.control == "linuxcnc":
         lines = {"ramp_frequency_hz": 10_000.0, "kink_ratio": 0.7} if setup.setting == "two lines" else {}
         keys["controller.linuxcnc"] = {"rapid_follows": False, **lines}
     return sg.Machine.load("vx500").with_values({**keys, **dict(setup.more)})
@@ -124,7 +119,11 @@ def converted(setup: Setup) -> tuple[sg.Program, sg.Conversion]:
 def text_of(setup: Setup, *, shaped: bool) -> bytes:
     """The program in the words of its control."""
     program, conversion = converted(setup)
-    return conversion.text if shaped else translate(program, conversion.simulated.machine).text
+    if shaped:
+        return conversion.text
+    if setup.control == "klipper":
+        return klipper_text(program.regions[0].path).encode()
+    return translate(program, conversion.simulated.machine).text
 
 
 def recorded(setup: Setup, *, shaped: bool, override: float = 1.0) -> Array:
@@ -132,7 +131,7 @@ def recorded(setup: Setup, *, shaped: bool, override: float = 1.0) -> Array:
     text = text_of(setup, shaped=shaped)
     if setup.control == "klipper":
         with TemporaryDirectory(prefix="klipper-") as folder:
-            cut = last_cut(read_klipper(text.decode(), Path(folder)))
+            cut = last_cut(read_klipper(text.decode(), Path(folder), arc_mm=None if shaped else ARC_MM))
             return plan_klipper(cut, setup.acceleration, Path(folder))[0]
     ini = recordings.ini_of(setup.acceleration, as_delivered=setup.setting == "as delivered")
     return recordings.record(user(), text, ini, override=override)
@@ -144,44 +143,13 @@ def last_cut(moves: Sequence[ReadMove]) -> list[ReadMove]:
     return list(moves[dwells[-2] + 1 : dwells[-1]])
 
 
-def travel(points: Array) -> Array:
-    """Length from the first point to each."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-
-
-def distance_to_polyline(points: Array, at: Array, line: Array, along: Array) -> float:
-    """Largest distance of points from the stretch of a polyline about them: a path may cross itself elsewhere.
-
-    Args:
-        points: shape (n, 3), mm.
-        at: travel at which each stands, mm.
-        line: vertices, shape (m, 3), mm.
-        along: travel at each vertex, mm.
-    """
-    step = np.diff(line, axis=0)
-    length = (step**2).sum(axis=1)
-    farthest = 0.0
-    for point, place in zip(points, at, strict=True):
-        low = max(0, int(np.searchsorted(along, place - ABOUT_MM)) - 1)
-        stretch = slice(low, min(len(step), int(np.searchsorted(along, place + ABOUT_MM)) + 1))
-        begin, turn, square = line[:-1][stretch], step[stretch], np.maximum(length[stretch], 1e-18)
-        share = np.clip(((point - begin) * turn).sum(axis=1) / square, 0.0, 1.0)
-        farthest = max(farthest, float(((begin + share[:, None] * turn - point) ** 2).sum(axis=1).min()))
-    return farthest**0.5
-
-
 def figures(cut: Array, path: Array) -> Figures:
     """By the tests' own plant."""
-    _, command, table = response(cut, MODES, PERIOD_S, rest_s=0.2)
-    along_path, along = travel(path), travel(command)[::5]
-    along *= along_path[-1] / along[-1]
-    table = table[::5]
-    contour_um = 1e3 * distance_to_polyline(table, along, path, along_path)
-    back_um = 1e3 * distance_to_polyline(path, along_path, table, along)
+    contour_um, both_ways_um = table_off_path_um(cut, path, MODES)
     x, y, _ = residual_um(cut, MODES, PERIOD_S, still_mm=1e-7)
     moved = np.flatnonzero(np.any(np.diff(cut, axis=0) != 0.0, axis=1))
     time_s = (moved[-1] - moved[0]) * PERIOD_S
-    return Figures((float(x), float(y)), float(time_s), contour_um, max(contour_um, back_um))
+    return Figures((float(x), float(y)), float(time_s), contour_um, both_ways_um)
 
 
 def said_of(conversion: sg.Conversion, *, shaped: bool) -> Figures:

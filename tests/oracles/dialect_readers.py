@@ -125,11 +125,11 @@ def read_siemens(text: str, _folder: Path) -> list[ReadMove]:
     return found
 
 
-def in_klipper(script: str, asked: str) -> str:
+def in_klipper(script: str, asked: str, *arguments: str) -> str:
     """What a script answers in Klipper's environment."""
     fetch = [ROOT / "tests" / "tools" / "fetch_peers.sh"]
     python = subprocess.run(fetch, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()[-1]
-    command = [python, Path(__file__).with_name(script)]
+    command = [python, Path(__file__).with_name(script), *arguments]
     return subprocess.run(command, input=asked, stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
@@ -145,8 +145,9 @@ def plan_klipper(moves: list[ReadMove], acceleration: float, folder: Path) -> tu
     return np.load(folder / "points.npy"), time_s
 
 
-def read_klipper(text: str, _folder: Path) -> list[ReadMove]:
-    answer = json.loads(in_klipper("klipper_moves.py", text))
+def read_klipper(text: str, _folder: Path, arc_mm: float | None = None) -> list[ReadMove]:
+    """The moves of a program; `arc_mm`: resolution of [gcode_arcs], None: there is no such section."""
+    answer = json.loads(in_klipper("klipper_moves.py", text, *([] if arc_mm is None else [str(arc_mm)])))
     assert answer["unknown"] == []
     at, found = np.zeros(3), []
     for move in answer["moves"]:

@@ -2,6 +2,7 @@
 
 It runs in the environment of tests/tools/fetch_peers.sh and imports nothing of this package. Klipper's own dispatcher,
 `GCodeMove` and `cmd_G4` read; what they would move is written down. A command that Klipper does not know is an error.
+With an argument there is a section [gcode_arcs] with this resolution in mm.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from klippy import gcode, toolhead
-from klippy.extras import gcode_move
+from klippy.extras import gcode_arcs, gcode_move
 
 
 class Printer:
@@ -46,6 +47,9 @@ class Printer:
     def lookup_object(self, name: str, default: Any = None) -> Any:
         return self.objects.get(name, default)
 
+    def load_object(self, _config: Any, name: str) -> Any:
+        return self.objects[name]
+
     def get_position(self) -> list[float]:
         return list(self.position)
 
@@ -57,10 +61,25 @@ class Printer:
         self.moves.append({"dwell_s": time_s})
 
 
+class Section:
+    """[gcode_arcs] of a configuration."""
+
+    def __init__(self, printer: Printer, resolution_mm: float) -> None:
+        self.printer, self.resolution_mm = printer, resolution_mm
+
+    def get_printer(self) -> Printer:
+        return self.printer
+
+    def getfloat(self, _name: str, _default: float, **_limits: float) -> float:
+        return self.resolution_mm
+
+
 def main() -> None:
     printer = Printer()
     dispatch = printer.objects["gcode"] = gcode.GCodeDispatch(printer)
-    gcode_move.GCodeMove(printer)
+    printer.objects["gcode_move"] = gcode_move.GCodeMove(printer)
+    for resolution_mm in map(float, sys.argv[1:]):
+        gcode_arcs.ArcSupport(Section(printer, resolution_mm))
     dispatch.register_command("G4", lambda command: toolhead.ToolHead.cmd_G4(printer, command))
     dispatch.register_command("M400", lambda _command: None)
     said: list[str] = []

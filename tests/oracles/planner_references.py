@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,10 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dialect_readers import ReadMove, in_klipper, read_linuxcnc
+from judge import response
+from judge.plant import AxisModes
 from shapegcode import _core
 
 Vector = NDArray[np.float64]
 PERIOD_S = 0.001
+ARC_MM = 1.0
+"""Klipper's default of `resolution` in `[gcode_arcs]`."""
+_ABOUT_MM = 3.0  # of travel on either side, within which the nearest place of the path is looked for
 
 
 def klipper_points(path: _core.Path, limits: dict[str, float], folder: Path) -> tuple[Vector, float]:
@@ -139,3 +145,61 @@ def distance_in_time(one: Vector, other: Vector, most_shift: int = 6) -> float:
         a, b = (np.vstack([each, np.repeat(each[-1:], count - len(each), axis=0)]) for each in (a, b))
         found.append(float(np.linalg.norm(a - b, axis=1).max()))
     return min(found)
+
+
+def klipper_text(path: _core.Path) -> str:
+    """A path in Klipper's words with its arcs as G2 and G3, between two dwells."""
+    start = " ".join(f"{axis}{value:.6f}" for axis, value in zip("XYZ", path[0].start_mm, strict=True))
+    lines = ["G90", f"G0 {start} F24000", "G4 P500"]
+    for each in path:
+        words = [f"{axis}{value:.6f}" for axis, value in zip("XYZ", each.end_mm, strict=True)]
+        code = "G1"
+        if each.kind == _core.SegmentKind.arc:
+            assert each.normal == 2
+            code = "G3" if each.sweep_rad > 0.0 else "G2"
+            words += [f"{axis}{each.centre_mm[k] - each.start_mm[k]:.6f}" for k, axis in enumerate("IJ")]
+        lines.append(f"{code} {' '.join(words)} F{each.feed_mm_per_s * 60.0:g}")
+    return "\n".join([*lines, "G4 P500", ""])
+
+
+def table_off_path_um(cut: Vector, path: Vector, modes: Sequence[AxisModes]) -> tuple[float, float]:
+    """Largest distance of the table from the path, and the larger of it and that of the path from where the table was.
+
+    Args:
+        cut: set-points at 1 ms, shape (n, 3), mm.
+        path: points of the programmed path, shape (m, 3), mm.
+        modes: of each axis, behind the set-points.
+    """
+    _, command, table = response(cut, modes, PERIOD_S, rest_s=0.2)
+    along_path, along = _travel(path), _travel(command)[::5]
+    along *= along_path[-1] / along[-1]
+    table = table[::5]
+    there = distance_to_polyline(table, along, path, along_path)
+    back = distance_to_polyline(path, along_path, table, along)
+    return 1e3 * there, 1e3 * max(there, back)
+
+
+def _travel(points: Vector) -> Vector:
+    """Length from the first point to each."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def distance_to_polyline(points: Vector, at: Vector, line: Vector, along: Vector) -> float:
+    """Largest distance of points from the stretch of a polyline about them: a path may cross itself elsewhere.
+
+    Args:
+        points: shape (n, 3), mm.
+        at: travel at which each stands, mm.
+        line: vertices, shape (m, 3), mm.
+        along: travel at each vertex, mm.
+    """
+    step = np.diff(line, axis=0)
+    length = (step**2).sum(axis=1)
+    farthest = 0.0
+    for point, place in zip(points, at, strict=True):
+        low = max(0, int(np.searchsorted(along, place - _ABOUT_MM)) - 1)
+        stretch = slice(low, min(len(step), int(np.searchsorted(along, place + _ABOUT_MM)) + 1))
+        begin, turn, square = line[:-1][stretch], step[stretch], np.maximum(length[stretch], 1e-18)
+        share = np.clip(((point - begin) * turn).sum(axis=1) / square, 0.0, 1.0)
+        farthest = max(farthest, float(((begin + share[:, None] * turn - point) ** 2).sum(axis=1).min()))
+    return farthest**0.5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from pathlib import Path
 from typing import Any
 
@@ -367,6 +368,22 @@ def test_lines_keep_their_numbers_where_nothing_is_repeated() -> None:
     program = sg.Program.from_text(f"%\n{body}%\n", "vx500")
     assert [program.core.origin(line)[0] for line in range(1, program.core.line_count + 1)] == [*range(1, 14)]
     assert b"X3\n" in program.expanded_text and b"Y5.1234568" in program.expanded_text
+
+
+def test_n_words_stay_where_a_search_finds_one_block() -> None:
+    """N40 stands twice, FANUC has no N0 and no N100000, a loop would repeat N50; pages of both controls."""
+    body = (
+        "N7 G1 X[5+6]\nN40 X[5+7]\nN40 X[5+8]\nN0 X[5+9]\nN100000 X[5+10]\nO1 repeat [2]\nN50 G91 G1 X[1+1]\n"
+        "O1 endrepeat\nN1 00 G90 G0 X3\nN00060 (TEXT) G2 X10 I3.5\nN99999 G4 P[1/2]"
+    )
+    program = read(body)
+    text = program.expanded_text.decode()
+    found = re.findall(r"N(\d+)(.*)\n", text)
+    assert [number for number, _ in found] == ["7", "50", "60", "99999"]
+    blocks = dict(found)
+    assert "X11." in blocks["7"] and "X2." in blocks["50"] and "X10." in blocks["60"] and blocks["99999"] == "G04X0.5"
+    without = re.sub(r"(?m)^N[\d ]+", "", body)
+    assert ends(program) == ends(read(without)) and dwells(program) == dwells(read(without))
 
 
 def test_time_check_and_convert_to_linuxcnc(tmp_path: Path) -> None:

@@ -58,9 +58,10 @@ def paths_of(name: str, machine: sg.Machine, scale: float = 1.0) -> list[_core.P
     ]  # fmt: skip
 
 
-def planned(path: _core.Path, machine: sg.Machine) -> tuple[np.ndarray, float]:
-    """Set-points and time by the model."""
+def planned(path: _core.Path, machine: sg.Machine, *, emitted: bool = False) -> tuple[np.ndarray, float]:
+    """Set-points and time by the model, arcs as in an original or as they are emitted."""
     model = fanuc_model(machine)
+    model = _core.for_shaped_blocks(model) if emitted else model
     followed, profile = _core.controlled_motion(path, model.limits, model.planner)
     return np.asarray(_core.interpolate(followed, profile, PERIOD_S)), profile.duration_s
 
@@ -133,6 +134,22 @@ def test_short_blocks_slow_grbl() -> None:
     _, profile = _core.controlled_motion(path, model.limits, model.planner)
     fastest = np.asarray(profile.phases)[:, 3].max()
     assert fastest == pytest.approx(math.sqrt(2.0 * 500.0 * 0.1 * 14.5), rel=0.02)  # between 14 and 15 blocks
+
+
+def test_chords_lie_within_their_tolerance_and_one_less_does_not() -> None:
+    rng = np.random.default_rng(7)
+    for radius, sweep, tolerance in zip(
+        10.0 ** rng.uniform(-1, 3, 200), rng.uniform(-6.28, 6.28, 200), 10.0 ** rng.uniform(-4, -2, 200), strict=True
+    ):
+        start, end = [radius, 0, 0], [radius * math.cos(sweep), radius * math.sin(sweep), 5.0]
+        count = _core.Segment.arc(start, end, [0, 0, 0], sweep, 10.0).chords_within(tolerance)
+
+        def off_mm(chords: float, radius: float = radius, sweep: float = sweep) -> float:
+            return radius - radius * math.cos(0.5 * sweep / chords)
+
+        assert count == int(count) and off_mm(count) <= tolerance * (1.0 + 1e-6)
+        assert count == 1 or off_mm(count - 1) > tolerance
+    assert _core.Segment.line([0, 0, 0], [9, 0, 0], 10.0).chords_within(1e-3) == 1
 
 
 LINUXCNC = Path(__file__).parents[1] / "golden" / "linuxcnc"
@@ -214,7 +231,7 @@ def test_a_conversion_is_judged_by_the_planner(kind: str) -> None:
     assert not any(name.startswith(("nominal, c", "look-ahead", "underrun")) for name in names)
     # What the report says of the shaped cut is what the planner makes of its blocks.
     blocks = conversion.placed[0].blocks(conversion.emitted)
-    points, _ = planned(blocks, machine)
+    points, _ = planned(blocks, machine, emitted=True)
     points = smoothed(points) if kind == "linuxcnc" else points
     residual = residual_um(points, [[Mode(46.0, 0.02)], [Mode(131.0, 0.02)], []], PERIOD_S)
     assert cases[0].residual_um.x == pytest.approx(residual[0], abs=0.02)

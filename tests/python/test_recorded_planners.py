@@ -14,11 +14,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import shapegcode as sg
 from acceptance import machine_with
-from dialect_readers import read_klipper
+from dialect_readers import ReadMove, plan_klipper, read_klipper
 from judge import Mode, residual_um
-from planner_references import PERIOD_S, distance_in_time, path_of_text, smoothed
+from planner_references import (
+    ARC_MM,
+    PERIOD_S,
+    distance_in_time,
+    klipper_text,
+    path_of_text,
+    smoothed,
+    table_off_path_um,
+)
 from shapegcode import _core
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.model.machine_model import fanuc_model
 
 Array = NDArray[np.float64]
@@ -47,13 +57,17 @@ def modelled(path: _core.Path, kind: str, acceleration: float, settings: dict[st
     return smoothed(points) if kind == "linuxcnc" else points
 
 
-def klipper_path(text: str, folder: Path) -> _core.Path:
+def klipper_cut(text: str, folder: Path, arc_mm: float | None = None) -> list[ReadMove]:
     """The moves between the last two dwells, as Klipper's own host reads them."""
-    moves = read_klipper(text, folder)
+    moves = read_klipper(text, folder, arc_mm)
     first, last = [k for k, move in enumerate(moves) if move.dwell_s][-2:]
-    return _core.Path(
-        [_core.Segment.line(each.start, each.end, each.feed_mm_per_min / 60.0) for each in moves[first + 1 : last]]
-    )
+    return moves[first + 1 : last]
+
+
+def klipper_path(text: str, folder: Path) -> _core.Path:
+    """The same as a path."""
+    moves = klipper_cut(text, folder)
+    return _core.Path([_core.Segment.line(each.start, each.end, each.feed_mm_per_min / 60.0) for each in moves])
 
 
 def block_ends_s(points: Array, path: _core.Path) -> Array:
@@ -78,7 +92,9 @@ def test_the_papers_path(run: str, tmp_path: Path) -> None:
     with np.load(DATA) as file:
         recorded = np.cumsum(file[run], axis=0, dtype=np.int64) * UNIT_MM
         text = file[f"{run}-program"].tobytes().decode()
-    if control == "klipper":
+    if control == "klipper" and "original" in run:
+        path, settings = path_of_text(f"{text}M2\n", tmp_path), {}  # arcs, cut by [gcode_arcs] and by the model
+    elif control == "klipper":
         path, settings = klipper_path(text, tmp_path), {}
     else:
         path = path_of_text(text, tmp_path)
@@ -88,6 +104,53 @@ def test_the_papers_path(run: str, tmp_path: Path) -> None:
     assert np.all(np.abs(by_model - was) <= 0.1 * was + 0.3)
     assert late_s <= PERIOD_S
     assert distance_in_time(recorded, points) < 1e-4
+
+
+ARCS = {
+    "paper": "G01X20.F12000.\nG03X40.Y20.R20.\nG01Y40.\n",
+    "small arcs": "G01X5.F3000.\nG02X7.Y-2.R2.\nG03X9.Y-4.R2.\nG01Y-10.\n",
+    "S": "G01X15.F9000.\nG02X25.Y-10.R10.\nG03X45.Y-30.R20.\nG01X45.Y-45.\n",
+    "slot": "G01X20.F6000.\nG03X20.Y10.R5.\nG01X0.\nG03X0.Y0.R5.\nG01X20.\n",
+    "large arc": "G01X20.F15000.\nG03X80.Y60.R60.\nG01Y80.\n",
+}
+MORE = [pytest.param(name, marks=pytest.mark.slow) for name in list(ARCS)[2:]]
+WITHIN = {"tolerance.contour_um": 1e4, "tolerance.residual_floor_um": 1e4}  # of every cut, so that none is shaped
+
+
+@pytest.mark.parametrize("acceleration", [5_000.0, 10_000.0])
+@pytest.mark.parametrize("unchanged", [False, True], ids=["shaped", "unchanged"])
+@pytest.mark.parametrize("name", ["paper", "small arcs", *MORE])
+def test_a_verdict_on_arcs_is_that_of_klippers_host(
+    name: str, unchanged: bool, acceleration: float, tmp_path: Path
+) -> None:
+    """What is emitted, and the original with G2 and G3 by [gcode_arcs], both at Klipper's defaults."""
+    axes = {f"axes.{axis}.max_acceleration_mm_s2": acceleration for axis in "xyz"}
+    rates = {f"axes.{axis}.max_feed_mm_per_min": 30_000.0 for axis in "xyz"}
+    control = {"controller.kind": "klipper", "controller.dialect": "fanuc", "emission.dialect": "klipper"}
+    machine = machine_with({**ANY_PRICE, **axes, **rates, **control, **(WITHIN if unchanged else {})})
+    text = f"G21G90\nG00X0.Y0.Z0.\nG04P500\n{ARCS[name]}G04P500\nM30\n"
+    program = sg.Program.from_text(text, machine)
+    conversion = sg.convert(program, machine, shape_all=not unchanged)
+    assert len(conversion.placed) == (0 if unchanged else 1)
+    path = program.regions[0].path
+    emitted, original = klipper_cut(conversion.text.decode(), tmp_path), klipper_text(path)
+    for side, cut in (("emitted", emitted), ("original", klipper_cut(original, tmp_path, ARC_MM))):
+        points, time_s = plan_klipper(cut, acceleration, tmp_path)
+        was = residual_um(points, MODES, PERIOD_S, still_mm=1e-7)[:2]
+        residual = getattr(conversion.residual_vibration_um, side)
+        assert np.all(np.abs(np.array([residual.x, residual.y]) - was) <= 0.1 * was + 0.3)
+        _, table_um = table_off_path_um(points, np.asarray(path.polyline(0.002)), MODES)
+        said_um = getattr(conversion.contour_error_um.response, side).max
+        assert said_um == pytest.approx(table_um, rel=0.1, abs=0.3)
+        assert getattr(conversion.cutting_time_s, side) == pytest.approx(time_s, abs=2.5 * PERIOD_S)
+    # Whoever simulates or times the emitted program has the same chords.
+    if not unchanged:
+        run = sg.simulate(conversion.emitted, machine).regions[0]
+        assert run.residual_vibration_um.x == pytest.approx(conversion.residual_vibration_um.emitted.x, abs=1e-6)
+        assert run.time_s == pytest.approx(conversion.cutting_time_s.emitted, abs=1e-9)
+        timed = sg.cycle_time(conversion.emitted, machine, full=True)
+        assert timed.cycle_time_s == pytest.approx(conversion.cycle_time_s.emitted, abs=1e-9)
+        assert timed.full_interpolation_s == pytest.approx(timed.cycle_time_s, abs=2.5 * PERIOD_S)
 
 
 #: Where two segments overlap in LinuxCNC the model has one after the other. What holds there: difference of the

@@ -149,7 +149,9 @@ struct SpindleTime {
 /// Everything that decides how long a program takes on a control, and what its acceleration does to the path: FANUC's,
 /// or another one whose planner is modelled. Plain values; the numbers in the comments are FANUC parameters.
 struct FanucModel {
-  PlannerRules planner;     ///< another kind than `fanuc`: look-ahead by its rules, shaped blocks too
+  PlannerRules planner;  ///< another kind than `fanuc`: look-ahead by its rules, shaped blocks too
+  /// Arcs of shaped programs are emitted as chords within it, and so the planner has them; 0: as arcs.
+  double chord_tolerance_mm = 0.0;
   double period_s = 0.001;  ///< interpolation period T_I
   BlockEnd block_end = BlockEnd::ceil;
 
@@ -192,8 +194,8 @@ struct FanucModel {
   Vector3 unknown_move_s = Vector3::Zero();  ///< of a rapid whose start or end the program does not give
 };
 
-/// The same controller while shaped blocks run: block by block at their feed, without look-ahead; itself where that
-/// cannot be switched off (another planner than FANUC's).
+/// The same controller while shaped blocks run: block by block at their feed, without look-ahead. Where that cannot be
+/// switched off (another planner than FANUC's), as it is, with arcs as they are emitted.
 [[nodiscard]] FanucModel for_shaped_blocks(const FanucModel& model);
 
 /// Whether cutting moves are planned along the path before they are interpolated.

@@ -56,6 +56,9 @@ struct Segment {
 /// Unit tangent at distance `s_mm`; zero vector for a segment without length.
 [[nodiscard]] Vector3 tangent_at(const Segment& segment, double s_mm) noexcept;
 
+/// How many equal chords of an arc lie within a tolerance of it; 1 for a line.
+[[nodiscard]] double chords_within(const Segment& segment, double tolerance_mm) noexcept;
+
 /// Curvature 1/mm: 0 for a line, R/(R^2+p^2) for a helix with pitch p mm/rad.
 [[nodiscard]] double curvature(const Segment& segment) noexcept;
 

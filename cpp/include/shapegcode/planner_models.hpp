@@ -21,7 +21,9 @@ enum class ControllerKind : std::uint8_t {
 /// are those of MotionLimits; jerk and the rules of a FANUC control do not act.
 struct PlannerRules {
   ControllerKind kind = ControllerKind::fanuc;
-  double arc_resolution_mm = 1.0;                ///< klipper: length of the chords of an arc ([gcode_arcs] resolution)
+  double arc_resolution_mm = 1.0;  ///< klipper: length of the chords of an arc ([gcode_arcs] resolution)
+  /// klipper, grbl: arcs are emitted as equal chords within it; 0: as arcs, which the control cuts by its own rule
+  double chord_tolerance_mm = 0.0;
   double square_corner_velocity_mm_per_s = 5.0;  ///< klipper: speed at a corner of 90 degrees
   double minimum_cruise_ratio = 0.5;             ///< klipper: max_accel_to_decel is max_accel times what it leaves of 1
   double arc_tolerance_mm = 0.002;               ///< grbl: chords of an arc lie within it ($12)

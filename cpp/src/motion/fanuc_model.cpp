@@ -41,6 +41,7 @@ void require_ascending(const char* name, const std::vector<SpindleTime>& table) 
 
 FanucModel for_shaped_blocks(const FanucModel& model) {
   FanucModel shaped = model;
+  shaped.planner.chord_tolerance_mm = model.chord_tolerance_mm;
   if (model.planner.kind != ControllerKind::fanuc) return shaped;
   shaped.motion = MotionKind::after_interpolation;
   shaped.filter_shape = model.shaped_filter_shape;
@@ -52,6 +53,8 @@ FanucModel for_shaped_blocks(const FanucModel& model) {
 
 void check(const FanucModel& model) {
   check(model.planner);
+  require(model.chord_tolerance_mm >= 0.0 && model.chord_tolerance_mm <= 10.0, "tolerance of emitted chords",
+          model.chord_tolerance_mm, "mm", "0 to 10 mm");
   require(model.period_s >= 1e-5 && model.period_s <= 1.0, "interpolation period", model.period_s, "s", "1e-5 to 1 s");
   require_ramp("acceleration time constant", model.time_constant_s);
   require_ramp("bell time", model.bell_time_s);

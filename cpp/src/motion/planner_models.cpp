@@ -32,6 +32,7 @@ void add_chords(const Segment& segment, double count, PathBuilder& builder) {
 }
 
 double chord_count(const Segment& arc, const PlannerRules& rules) noexcept {
+  if (rules.chord_tolerance_mm > 0.0) return chords_within(arc, rules.chord_tolerance_mm);
   if (rules.kind == ControllerKind::klipper) return std::max(1.0, std::floor(arc.length_mm / rules.arc_resolution_mm));
   // A chord of a circle of radius r is off by the tolerance e at a half angle whose sine is sqrt(e (2 r - e)) / r.
   const double radius = arc.start_radius_mm;
@@ -262,6 +263,7 @@ SpeedProfile profile_of(const std::vector<Piece>& pieces, double length_mm) {
 
 void check(const PlannerRules& rules) {
   require_within(rules.arc_resolution_mm, 1e-3, 100.0, "arc resolution", "mm");
+  require_within(rules.chord_tolerance_mm, 0.0, 10.0, "tolerance of chords", "mm");
   require_within(rules.arc_tolerance_mm, 1e-5, 10.0, "arc tolerance", "mm");
   require_within(rules.square_corner_velocity_mm_per_s, 0.0, 1000.0, "square corner velocity", "mm/s");
   require(rules.minimum_cruise_ratio >= 0.0 && rules.minimum_cruise_ratio < 1.0, "minimum cruise ratio",

@@ -149,6 +149,13 @@ Vector3 tangent_at(const Segment& segment, double s_mm) noexcept {
   return ArcFrame(segment.normal).direction(angle, radius * segment.sweep_rad, radial_step, climb).normalized();
 }
 
+double chords_within(const Segment& segment, double tolerance_mm) noexcept {
+  if (segment.kind != SegmentKind::arc) return 1.0;
+  const double radius = std::max(segment.start_radius_mm, segment.end_radius_mm);
+  const double half_rad = std::acos(std::max(0.0, 1.0 - tolerance_mm / radius));
+  return std::max(1.0, std::ceil(std::abs(segment.sweep_rad) / (2.0 * half_rad)));
+}
+
 double curvature(const Segment& segment) noexcept {
   if (segment.kind != SegmentKind::arc) {
     return 0.0;

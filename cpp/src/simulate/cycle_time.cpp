@@ -22,6 +22,7 @@ class Clock {
         model_(model),
         per_block_(per_block),
         limits_(detail::overridden_limits(model)),
+        rules_(detail::planner_rules(program, model)),
         function_times_(program, model),
         ordinary_(model),
         shaped_(for_shaped_blocks(model)),
@@ -182,7 +183,7 @@ class Clock {
         parts.cutting_s += segment.length_mm / detail::checked_feed(segment, run_model.model);
       }
     }
-    const ControlledMotion motion = controlled_motion(std::make_shared<const Path>(path), limits_, model_.planner);
+    const ControlledMotion motion = controlled_motion(std::make_shared<const Path>(path), limits_, rules_);
     const SpeedProfile& profile = *motion.profile;
     const detail::PlannedEnd end = detail::planned_end(profile, run_model.filters, run_model.model);
     parts.cutting_s = std::min(parts.cutting_s, end.duration_s);  // rounding only
@@ -225,6 +226,7 @@ class Clock {
   const FanucModel& model_;
   bool per_block_;
   MotionLimits limits_;
+  PlannerRules rules_;
   detail::FunctionTimes function_times_;
   RunModel ordinary_;
   RunModel shaped_;

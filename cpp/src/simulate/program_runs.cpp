@@ -107,6 +107,15 @@ bool runs_shaped(const Region& region, const FanucModel& model) noexcept {
 
 bool runs_shaped_outside(const FanucModel& model) noexcept { return model.shaped_regions == ShapedRegions::all; }
 
+PlannerRules planner_rules(const Program& program, const FanucModel& model) noexcept {
+  const auto shaped = [&](const auto& region) { return runs_shaped(*region, model); };
+  const bool emitted =
+      runs_shaped_outside(model) || std::any_of(program.regions.begin(), program.regions.end(), shaped);
+  PlannerRules rules = model.planner;
+  if (emitted) rules.chord_tolerance_mm = model.chord_tolerance_mm;
+  return rules;
+}
+
 double checked_feed(const Segment& segment, const FanucModel& model) {
   if (segment.length_mm > 0.0 && !(segment.feed_mm_per_s > 0.0)) {
     throw Error(ErrorKind::argument, "block without a feed greater than zero", segment.line);

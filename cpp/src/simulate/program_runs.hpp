@@ -31,6 +31,9 @@ inline constexpr int tool_change_code = 6;
 [[nodiscard]] bool runs_shaped(const Region& region, const FanucModel& model) noexcept;
 [[nodiscard]] bool runs_shaped_outside(const FanucModel& model) noexcept;
 
+/// Rules by which a program is planned: the arcs of one with shaped cuts are those that were emitted.
+[[nodiscard]] PlannerRules planner_rules(const Program& program, const FanucModel& model) noexcept;
+
 /// Controlled feed of a block; throws Error(argument) where a move has none.
 [[nodiscard]] double checked_feed(const Segment& segment, const FanucModel& model);
 

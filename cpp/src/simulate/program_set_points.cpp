@@ -42,6 +42,7 @@ ProgramSetPoints::ProgramSetPoints(const Program& program, const FanucModel& mod
     : program_(program),
       model_(checked(model)),
       shaped_model_(for_shaped_blocks(model)),
+      rules_(planner_rules(program, model)),
       waits_(waits),
       filters_(acceleration_filters(model)),
       shaped_filters_(acceleration_filters(shaped_model_)),
@@ -212,7 +213,7 @@ void ProgramSetPoints::open_cut(const std::shared_ptr<const Path>& programmed, b
   cut.is_region = is_region;
   cut.filters = shaped ? &shaped_filters_ : &filters_;
   if (is_planned(model)) {
-    ControlledMotion planned = controlled_motion(programmed, overridden_limits(model), model.planner);
+    ControlledMotion planned = controlled_motion(programmed, overridden_limits(model), rules_);
     cut.path = planned.path;
     cut.smoothed = planned.profile->jerk_time_s() > 1.5 * model.period_s || !cut.filters->empty();
     cut.motion.emplace<Interpolator>(planned.path, std::move(planned.profile), model.period_s);

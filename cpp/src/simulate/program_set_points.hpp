@@ -98,6 +98,7 @@ class ProgramSetPoints {
   const Program& program_;
   const FanucModel& model_;
   FanucModel shaped_model_;
+  PlannerRules rules_;
   Waits waits_;
   FilterChain filters_;
   FilterChain shaped_filters_;

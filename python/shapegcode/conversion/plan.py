@@ -172,7 +172,7 @@ class ConversionPlan:
         regions = self.program.regions
         placed = [Placed(region, region.first_line, region.last_line) for region in regions]
         nominal = Judge(self.model, [case for case in self.judge.cases if case.nominal])
-        for judge in (nominal, self.judge):  # the first is without a further simulation
+        for judge in (nominal, self.judge):  # the first needs few simulations
             figures = [
                 simulate_unchanged(judge, self.model, region, region, original.result())
                 for region, original in zip(regions, self.originals, strict=True)

@@ -27,7 +27,7 @@ from shapegcode.program.stamp import plain_comment, text_mark
 
 Converted = TypeVar("Converted", bound=Conversion)
 
-_CHORD_MM = 0.0005  # largest distance of an arc from its chords
+_SAME_MM = 0.0005  # largest difference of a coordinate that was written from the one that was read
 _BLEND_MM = 0.001  # LinuxCNC's G64 P
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _WORD = re.compile(rf"([A-Z])\s*({_NUMBER})")
@@ -194,7 +194,7 @@ class _Translator:
         dwells = (each for each in core.steps if each[0] == _core.StepKind.move)
         others = core.other_moves
         self._dwells = {line: others[index][1] for _, index, line in dwells if others[index][1] > 0.0}
-        self._arcs = {} if self._dialect.arc_radius else dict(_arcs(program))
+        self._arcs = dict(_arcs(program)) if self._dialect.chord_tolerance_mm else {}
         self._times: dict[int, str] = {}
         self._firsts, self._lasts = set[int](), set[int]()
         foreign = self._original.foreign
@@ -387,7 +387,7 @@ class _Translator:
             return
         want = {letter: float(self._length(letter, value, self._dialect)) for letter, value in words if letter in "XYZ"}
         have = {letter: float(value) for line in lines for letter, value in _COORDINATE.findall(line)}
-        lost = [letter for letter, value in want.items() if not abs(have.get(letter, math.nan) - value) <= _CHORD_MM]
+        lost = [letter for letter, value in want.items() if not abs(have.get(letter, math.nan) - value) <= _SAME_MM]
         if lost or have.keys() - want.keys() - {*("XYZ" if self._is_arc() else "")}:
             raise RoundTripError(f"line {number}: {words} became {lines} for {self._dialect.control}")
 
@@ -553,8 +553,7 @@ class _Translator:
         arc, named = self._arcs.get(number), dict(words)
         if arc is None:
             raise self._error(number, "an arc whose start is not known cannot be written as chords")
-        half = math.acos(max(0.0, 1.0 - _CHORD_MM / arc.radius_mm))
-        count = max(1, math.ceil(abs(arc.sweep_rad) / (2.0 * half)))
+        count = int(arc.chords_within(self._dialect.chord_tolerance_mm))  # as the verdict simulates it
         self.state.added += count - 1
         points = np.array([arc.point_at(arc.length_mm * part / count) for part in range(count + 1)])
         decimals = self._dialect.decimals or 3

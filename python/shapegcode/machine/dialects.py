@@ -39,7 +39,8 @@ class Dialect:
         comment: "(" for comments in brackets, ";" for those that reach to the end of the line.
         opening: lines before the first block.
         dwell: of one; `{s}` seconds, `{ms}` milliseconds.
-        arc_radius: address of the radius of an arc; empty: arcs are written as chords.
+        arc_radius: address of the radius of an arc; empty: there is none, as arcs are written as chords.
+        chord_tolerance_mm: largest distance of an arc from the chords that are written for it; 0: arcs stay arcs.
         time_feed: shaped blocks carry their time in seconds, with G93.
         one_code: a line holds one code, and each move its own G.
         short_codes: codes have no leading zeros.
@@ -64,6 +65,7 @@ class Dialect:
     opening: tuple[str, ...] = ()
     dwell: str = "G04P{ms}"
     arc_radius: str = "R"
+    chord_tolerance_mm: float = 0.0
     time_feed: bool = False
     one_code: bool = False
     short_codes: bool = False

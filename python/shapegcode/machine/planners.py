@@ -65,7 +65,10 @@ class KlipperPlanner(TomlTable):
         assumed=True,
     )
     arc_resolution_mm: Annotated[Positive, Field(ge=0.001, le=100)] = key(
-        "[gcode_arcs] resolution: length of the lines that an arc becomes", default=1.0, assumed=True
+        "[gcode_arcs] resolution: length of the lines that an arc of the original becomes; in what is emitted with "
+        'emission.dialect = "klipper" arcs are chords already, and are simulated as these',
+        default=1.0,
+        assumed=True,
     )
 
 

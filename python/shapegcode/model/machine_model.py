@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.machine.dialects import dialect_of
 from shapegcode.machine.planners import GrblPlanner, KlipperPlanner, LinuxcncPlanner
 from shapegcode.model.modes import (
     NO_OFFSET,
@@ -35,6 +36,8 @@ def fanuc_model(
     controller = machine.controller
     model = _core.FanucModel()
     model.planner = planner_rules(machine)
+    dialect = dialect_of(machine.emission.dialect)
+    model.chord_tolerance_mm = 0.0 if dialect is None else dialect.chord_tolerance_mm
     model.period_s = controller.interpolation_period_s
     model.block_end = getattr(_core.BlockEnd, controller.block_end)
     model.motion = getattr(_core.MotionKind, controller.motion)
@@ -354,14 +357,24 @@ class MachineModel:
         only: str | None = None,
         record_samples: int = 0,
         offset: Offset = NO_OFFSET,
+        emitted: bool = False,
     ) -> _core.SimulationFigures:
-        """A cut as the controller executes an ordinary program."""
+        """A cut as the controller executes an ordinary program; `emitted`: with arcs as they are emitted."""
         options = self.verdict_options(shift=shift, only=only, offset=offset)
         options.record_samples = record_samples
-        return self._at_override(override).simulate(path, options, against=against)
+        controller = self._at_override(override, shaped=emitted and self.always_plans)
+        return controller.simulate(path, options, against=against)
 
-    def _at_override(self, override: float) -> SimulatedController:
-        return self.ordinary if override == 1.0 else SimulatedController(fanuc_model(self.machine), override)
+    def is_emitted_alike(self, path: _core.Path) -> bool:
+        """Whether a cut left unchanged moves as in the original: its arcs may be emitted as chords."""
+        has_chords = self.always_plans and self.shaped.model.planner.chord_tolerance_mm > 0.0
+        return not has_chords or path.largest_sweep_rad == 0.0
+
+    def _at_override(self, override: float, *, shaped: bool) -> SimulatedController:
+        if override == 1.0:
+            return self.simulated(shaped=shaped)
+        model = fanuc_model(self.machine)
+        return SimulatedController(_core.for_shaped_blocks(model) if shaped else model, override)
 
     def simulate_rapid(
         self, start_mm: FloatArray, end_mm: FloatArray, options: _core.SimulationOptions
@@ -405,7 +418,7 @@ class MachineModel:
             options.feed_slack_mm = 2.0 * increment_mm
         options.record_samples = record_samples
         if self.always_plans:
-            return self._at_override(override).simulate(blocks, options, against=path)
+            return self._at_override(override, shaped=True).simulate(blocks, options, against=path)
         options.last_seconds = last_seconds
         options.other_overrides = list(other_overrides)
         if starved_blocks:

@@ -82,10 +82,13 @@ def simulate(
     runs: list[RegionRun] = []
     simulated: list[_core.SimulationFigures] = []
     of_shaped: list[_core.SimulationFigures] = []
+    # A planner that cannot be switched off has the arcs of an emitted program as they are emitted, in every cut.
+    emitted = model.always_plans and (program.shaped_regions > 0 if shaped is None else shaped)
     for done, region in enumerate(program.regions, start=1):
         as_shaped = region.shaped if shaped is None else shaped
         path = nominal.get(region.first_line)
-        replay = partial(_play, region.path, path, model, plant, as_shaped, model.offset(region), band_um, limit_s)
+        by_shaped, offset = as_shaped or emitted, model.offset(region)
+        replay = partial(_play, region.path, path, model, plant, by_shaped, offset, band_um, limit_s)
         figures = [replay(record_samples)]
         if as_shaped:
             figures += [replay(0, block_end=rule) for rule in model.block_rules if rule != model.own_rule]

@@ -421,11 +421,15 @@ def simulate_unchanged(
     """A cut left unchanged in every operating condition that counts for it.
 
     Rules of block timing, a buffer underrun and look-ahead left on concern shaped blocks alone: there it is as it is
-    meant to run. Other feed overrides and uncertain modes are simulated where they count.
+    meant to run. Other feed overrides and uncertain modes are simulated where they count. Arcs are those that are
+    emitted.
     """
     path, offset = mine.path, model.offset(region)
     same = path.moves_as(region.path)
-    run = original if same else model.simulate_original(path, against=region.path, offset=offset)
+    if same and model.is_emitted_alike(path):
+        run = original
+    else:
+        run = model.simulate_original(path, against=region.path, offset=offset, emitted=True)
 
     def figures(case: Case) -> CaseFigures | None:
         if case.override == 1.0 and case.mode is None:
@@ -436,7 +440,7 @@ def simulate_unchanged(
         return case_figures(
             model.simulate_original(
                 path, against=None if same else region.path, override=case.override, shift=case.shift, only=only,
-                offset=offset,
+                offset=offset, emitted=True,
             )
         )  # fmt: skip
 

@@ -7,6 +7,7 @@ LinuxCNC 2.9's documentation; tests hold the moves against its own interpreter r
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -50,6 +51,8 @@ _LAST_WORD = {letter: re.compile(rf"{letter}[ \t]*({_NUMBER})", re.IGNORECASE) f
 _EVERY_WORD = {letter: re.compile(rf"{letter}[ \t]*([-+\d.]+)", re.IGNORECASE) for letter in "XYZ"}
 _BEGINS_WITH_G = re.compile(r"[ \t]*(?:N\d+[ \t]*)?G0?[0-3](?![\d.])", re.IGNORECASE)
 _G_CODE = re.compile(r"G0?([0-3])", re.IGNORECASE)
+# 1 to 99999, as FANUC has them.
+_N_WORD = re.compile(r"^[ \t]*/?[ \t]*N[ \t]*0*([1-9]\d{0,4})(?![\d.])", re.IGNORECASE | re.MULTILINE)
 
 
 def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
@@ -106,6 +109,7 @@ class _Interpreter:
         self._runner = BlockRunner(self._state, self._plain)
         self._frames = [_Frame(self._main, 0, self._main)]
         self._parameters = ParameterTable(self._state, self._frames[-1])
+        self._n_words = Counter(_N_WORD.findall(source))
         self._next = 0
         self._steps = 0
         self._broke = False
@@ -182,7 +186,7 @@ class _Interpreter:
             return False  # the slow way says what is wrong
         if modes.feed <= 0.0 and _LAST_WORD["F"].search(text) is None:
             return False
-        self._runner.line, self._runner.file = self._next + 1, self._file.index
+        self._runner.line, self._runner.file, self._runner.number = self._next + 1, self._file.index, ""
         self._runner.sync()
         if self._runner.written_motion != modes.motion and _BEGINS_WITH_G.match(text) is None:
             self._runner.put(f"G{modes.motion // 10:02d}")
@@ -214,7 +218,7 @@ class _Interpreter:
         """Execute one line."""
         self._next = index + 1
         self._steps += 1
-        self._runner.line, self._runner.file = index + 1, self._file.index
+        self._runner.line, self._runner.file, self._runner.number = index + 1, self._file.index, ""
         o_line = self._file.o_lines.get(index)
         if o_line is not None:
             self._control(index, o_line)
@@ -234,7 +238,13 @@ class _Interpreter:
                 self._special(special[0], dict(words), index)
                 words = [(letter, value) for letter, value in words if letter not in "mpl"]
             if words or block.comments:
+                self._runner.number = self._n_word(dict(words).get("n", 0.0))
                 self._runner.run(words, block.comments)
+
+    def _n_word(self, number: float) -> str:
+        """The N word of a line of the main program, once; empty: it has none, or another line has the same."""
+        stands_once = self._file is self._main and self._n_words.pop(f"{number:g}", 0) == 1
+        return f"N{number:g}" if stands_once else ""
 
     def _block(self, index: int) -> Block | None:
         """The words of a line; None: an empty one, or `%`."""

@@ -38,6 +38,7 @@ class BlockRunner:
         self.plain = plain
         self.line = 1
         self.file = 0
+        self.number = ""  # N word that the next block takes
         self.written_distance = 900  # what the plain program's reader takes for granted
         self.written_motion: int | None = None  # None: what is in force there is not followed
         self.written_feed = 0.0
@@ -45,7 +46,9 @@ class BlockRunner:
         self.offsets = Offsets(state, self.put)
 
     def put(self, text: str) -> None:
-        """Write one line."""
+        """Write one line; the first block of a line of the source takes its N word."""
+        if not text.startswith("("):
+            text, self.number = self.number + text, ""
         self.plain.put(text, self.line, self.file)
 
     def note(self, text: str, key: str) -> None:
