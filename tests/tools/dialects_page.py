@@ -12,11 +12,11 @@ _HEAD = """\
     shapegcode convert part.nc -m mine.toml --dialect linuxcnc -o shaped.ngc
 
 `emission.dialect` selects the control for which `convert` writes; programs for
-[other controls](input_dialects.md) can be read, too. The *source* of a statement is a document or a recording. Statements
-without a source are *assumed*, and the header of the program and the report of `convert` say so.
+[other controls](input_dialects.md) can be read, too. The *source* of a statement is a document or a recording.
+Statements without a source are *assumed*, and the header of the program and the report of `convert` say so.
 
-A word of the original is written only if it is listed under *the same* or *becomes*; every other word is refused with its
-line and its meaning on both controls, unless `emission.words` states a replacement.
+A word of the original is written only if it is listed under *the same* or *becomes*; every other word is refused with
+its line and its meaning on both controls, unless `emission.words` states a replacement.
 """
 
 

@@ -100,7 +100,9 @@ TESTS = {
         "velocity and acceleration",
     ),
     "events": HeldBy(
-        "python/test_motion_controller.py", "test_events_come_where_the_set_points_are", "events come when the set-points reach their position"
+        "python/test_motion_controller.py",
+        "test_events_come_where_the_set_points_are",
+        "events come when the set-points reach their position",
     ),
     "dwells": HeldBy("python/test_motion_controller.py", "test_a_dwell_is_rest_for_so_long", "the length of a dwell"),
     "stops": HeldBy(
