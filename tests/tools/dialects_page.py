@@ -11,13 +11,12 @@ _HEAD = """\
 
     shapegcode convert part.nc -m mine.toml --dialect linuxcnc -o shaped.ngc
 
-`emission.dialect` says for which control `convert` writes; programs are read in
-[other dialects](input_dialects.md) too. Where a page or a
-recording says what holds, it is named. What nobody found a text for is *assumed*, and the header of the program and the
-answer of `convert` say so.
+`emission.dialect` selects the control for which `convert` writes; programs for
+[other controls](input_dialects.md) can be read, too. The *source* of a statement is a document or a recording.
+Statements without a source are *assumed*, and the header of the program and the report of `convert` say so.
 
-Words of the original are written only if they are in *the same* or *becomes*; all others are refused with their line,
-what they are on FANUC and what they are there, unless `emission.words` says what they become.
+A word of the original is written only if it is listed under *the same* or *becomes*; every other word is refused with
+its line and its meaning on both controls, unless `emission.words` states a replacement.
 """
 
 
@@ -36,14 +35,14 @@ def _section(name: str, dialect: Dialect) -> str:
     cautions = [f"`{code}`: {text}" for code, text in dialect.cautions.items()]
     lines = [
         f"## {name}: {dialect.control}\n",
-        "| topic | what holds | source |",
+        "| topic | statement | source |",
         "|---|---|---|",
         *rows,
         "",
         f"* The same: {', '.join(f'`{code}`' for code in sorted(dialect.same))}.",
     ]
     lines += [f"* Becomes: {', '.join(becomes)}."] if becomes else []
-    lines += [f"* Means something else or nothing there: {'; '.join(means)}."] if means else []
+    lines += [f"* Other meaning, or unknown, on this control: {'; '.join(means)}."] if means else []
     lines += [f"* With a warning: {'; '.join(cautions)}."] if cautions else []
     return "\n".join([*lines, ""])
 

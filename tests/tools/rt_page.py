@@ -46,7 +46,7 @@ TESTS = {
     "threads": HeldBy(
         "cpp/thread_tests.cpp",
         "session_of",
-        "no data race between who pushes, plans, steps and looks, under ThreadSanitizer (`make threads`)",
+        "no data race between threads that push, plan, step and read the state, under ThreadSanitizer (`make threads`)",
     ),
     "limits": HeldBy(
         "cpp/test_motion_controller.cpp",
@@ -79,20 +79,20 @@ TESTS = {
     "hold": HeldBy(
         "cpp/test_online_planner.cpp",
         "a hold brakes behind the section that is being run, and the motion goes on from there",
-        "when a hold brakes, and that it goes on",
+        "when a hold decelerates, and that the path is resumed",
     ),
     "refused": HeldBy(
-        "cpp/test_motion_controller.cpp", "what cannot be run is refused, and says why", "every answer of a push"
+        "cpp/test_motion_controller.cpp", "what cannot be run is refused, and says why", "every result of a push"
     ),
     "starved": HeldBy(
         "cpp/test_motion_controller.cpp",
         "segments that run out stop the motion and are counted; it goes on with the next",
-        "segments that come too late",
+        "buffer underrun: segments that come too late",
     ),
     "settings": HeldBy(
         "python/test_motion_controller.py",
         "test_settings_that_cannot_be_are_refused",
-        "settings that cannot be are refused with value and limit",
+        "invalid settings are refused with value and limit",
     ),
     "derivatives": HeldBy(
         "python/test_motion_controller.py",
@@ -100,7 +100,9 @@ TESTS = {
         "velocity and acceleration",
     ),
     "events": HeldBy(
-        "python/test_motion_controller.py", "test_events_come_where_the_set_points_are", "events where the motion is"
+        "python/test_motion_controller.py",
+        "test_events_come_where_the_set_points_are",
+        "events come when the set-points reach their position",
     ),
     "dwells": HeldBy("python/test_motion_controller.py", "test_a_dwell_is_rest_for_so_long", "the length of a dwell"),
     "stops": HeldBy(
@@ -111,7 +113,7 @@ TESTS = {
     ),
     "state": HeldBy("python/test_motion_controller.py", "test_the_state_says_what_it_is", "the snapshot"),
     "delay": HeldBy(
-        "python/test_motion_controller.py", "test_the_delay_is_what_the_set_points_lag", "the delay of the filters"
+        "python/test_motion_controller.py", "test_the_delay_is_what_the_set_points_lag", "delay of the set-points"
     ),
     "sessions": HeldBy(
         "cpp/operator_session.cpp",
@@ -124,7 +126,7 @@ TESTS = {
     "flush": HeldBy(
         "python/test_probe_and_flush.py", "test_a_flush_at_rest_in_a_dwell_and_twice", "flush in every state"
     ),
-    "by hand": HeldBy(
+    "manual": HeldBy(
         "cpp/allocation_program.cpp",
         "MotionController: axes by hand, offset, spindle, emergency stop",
         "nor do these",
@@ -132,18 +134,18 @@ TESTS = {
     "jog": HeldBy(
         "python/test_manual_motion.py",
         "test_an_axis_is_jogged_from_hold_and_comes_back_onto_the_path",
-        "limits beside the path, and that nothing of it is skipped",
+        "limits while jogging, and that no part of the path is skipped",
     ),
     "increments": HeldBy(
         "python/test_manual_motion.py", "test_an_increment_takes_the_shortest_time", "an increment, by its closed form"
     ),
     "retrace": HeldBy(
-        "python/test_manual_motion.py", "test_the_path_is_retraced_and_run_on", "back along the path and on"
+        "python/test_manual_motion.py", "test_the_path_is_retraced_and_run_on", "back along the path and forward again"
     ),
     "travel": HeldBy(
         "python/test_manual_motion.py",
         "test_soft_limits_refuse_at_the_push_and_hold_when_they_move",
-        "soft limits",
+        "travel limits",
     ),
     "offset": HeldBy(
         "python/test_manual_motion.py",
@@ -153,7 +155,7 @@ TESTS = {
     "emergency": HeldBy(
         "python/test_manual_motion.py",
         "test_an_emergency_stop_takes_the_hardware_limit",
-        "the length of an emergency stop, by its closed form",
+        "distance of an emergency stop, by its closed form",
     ),
     "rapids": HeldBy(
         "python/test_spindle_feed.py", "test_rapids_have_an_override_of_their_own", "rapids and their override"
@@ -166,9 +168,9 @@ TESTS = {
     "thread": HeldBy(
         "python/test_spindle_feed.py",
         "test_a_thread_keeps_its_pitch",
-        "threads: the error of the pitch within the bound that is computed",
+        "threads: pitch error within the computed bound",
     ),
-    "C": HeldBy("cpp/c_interface.c", "refused_calls", "the C interface: what is refused, and how"),
+    "C": HeldBy("cpp/c_interface.c", "refused_calls", "the C interface: calls that are refused, with their status"),
     "closed loop": HeldBy(
         "python/test_example_control.py",
         "test_drives_are_the_linear_model",
@@ -188,70 +190,70 @@ class Call:
 
 
 CALLS = (
-    Call(("MotionController",), "before all others", "allocates what it ever needs; may throw", ("settings",)),
+    Call(("MotionController",), "before all others", "allocates all memory; may throw", ("settings",)),
     Call(
         ("push",),
-        "the one that pushes",
+        "pushing",
         "one junction",
         ("allocation", "beside push", "kernel", "threads", "refused", "starved"),
     ),
     Call(
         ("push_event", "push_dwell", "push_stop"),
-        "the one that pushes",
-        "an entry of a ring",
+        "pushing",
+        "an entry of a ring buffer",
         ("program", "threads", "events", "dwells", "stops"),
     ),
     Call(
         ("step",),
-        "the real-time one",
+        "stepping (real-time)",
         "a point, and every filter once; with `plans_in_step` also the planning",
         ("allocation", "beside push", "kernel", "threads", "limits", "random", "late", "bits", "derivatives"),
     ),
-    Call(("next_event",), "the real-time one", "an entry of a ring", ("program", "threads", "events")),
-    Call(("probe",), "the real-time one", "a copy, and a flush", ("program", "probe")),
+    Call(("next_event",), "stepping (real-time)", "an entry of a ring buffer", ("program", "threads", "events")),
+    Call(("probe",), "stepping (real-time)", "a copy, and a flush", ("program", "probe")),
     Call(
         ("plan",),
-        "the one that plans",
-        "of the window: bounded by its segments and by the longest stop",
+        "planning",
+        "plans the window: bounded by its segments and by the longest stop",
         ("program", "threads", "late", "tolerance", "limits"),
     ),
     Call(("feed_override",), "any", "a word", ("allocation", "threads", "override", "random")),
-    Call(("rapid_override",), "any", "a word", ("by hand", "threads", "rapids")),
+    Call(("rapid_override",), "any", "a word", ("manual", "threads", "rapids")),
     Call(
         ("exchange_shaper",),
         "any",
         "a word; every step runs all shapers of the settings",
-        ("by hand", "threads", "exchange", "sessions"),
+        ("manual", "threads", "exchange", "sessions"),
     ),
-    Call(("spindle",), "the real-time one", "two filters of third order", ("by hand", "thread")),
+    Call(("spindle",), "stepping (real-time)", "two filters of third order", ("manual", "thread")),
     Call(
         ("jog", "jog_by"),
-        "any, one for each axis",
-        "a word or two; in `step` some hundred tries at the most where an axis begins to stop",
-        ("by hand", "threads", "jog", "increments", "sessions"),
+        "any; for each axis always the same",
+        "a word or two; in `step` at most some hundred iterations when an axis starts to stop",
+        ("manual", "threads", "jog", "increments", "sessions"),
     ),
     Call(
         ("retrace",),
         "any",
-        "a word; in `step` a search by halves in the periods that are kept",
-        ("by hand", "threads", "retrace", "sessions"),
+        "a word; in `step` a bisection in the recorded periods",
+        ("manual", "threads", "retrace", "sessions"),
     ),
-    Call(("offset",), "any", "a word", ("by hand", "threads", "offset", "sessions")),
-    Call(("travel",), "any", "two words", ("by hand", "threads", "travel")),
-    Call(("emergency_stop",), "any", "two words", ("by hand", "emergency", "sessions")),
+    Call(("offset",), "any", "a word", ("manual", "threads", "offset", "sessions")),
+    Call(("travel",), "any", "two words", ("manual", "threads", "travel")),
+    Call(("emergency_stop",), "any", "two words", ("manual", "emergency", "sessions")),
     Call(("hold", "resume"), "any", "a word", ("allocation", "threads", "hold", "sessions")),
     Call(
         ("flush", "flushed"),
-        "any; `flushed` the one that pushes",
-        "a word; `flushed`: the filters",
+        "any; `flushed` the pushing thread",
+        "a word; `flushed` resets the filters",
         ("program", "threads", "flush", "sessions"),
     ),
     Call(("abort",), "any", "a word", ("allocation", "abort")),
-    Call(("restart",), "while none pushes or steps", "the filters", ("allocation", "abort")),
+    Call(("restart",), "any, while no thread pushes or steps", "resets the filters", ("allocation", "abort")),
     Call(
         ("state",),
         "any",
-        "a copy, again only where three steps were done meanwhile",
+        "a copy; repeated only if three steps were done meanwhile",
         ("allocation", "threads", "state"),
     ),
     Call(("axes", "delay_periods", "correction_delay"), "any", "a number", ("delay",)),
@@ -269,7 +271,7 @@ SYMBOLS = {
         "calloc",
         "free",
     ],
-    "memory that is there": ["memchr", "memcpy", "memmove", "memset", "strcmp", "strlen"],
+    "memory that is allocated already": ["memchr", "memcpy", "memmove", "memset", "strcmp", "strlen"],
     "mathematics": [
         "asin",
         "atan2",
@@ -293,7 +295,7 @@ SYMBOLS = {
         "std::to_chars(char*, char*, double, std::chars_format)",
         "std::to_chars(char*, char*, double, std::chars_format, int)",
     ],
-    "errors of constructors, and their way into C": [
+    "errors of constructors, and passing them to C": [
         "_Unwind_Resume",
         "__cxa_allocate_exception",
         "__cxa_begin_catch",
