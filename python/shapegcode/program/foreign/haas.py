@@ -62,20 +62,7 @@ _MACRO = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?(?:#|IF|WHILE|END|GOTO|DPRNT|PO
 
 
 def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
-    """The program in FANUC's words: what means another thing on a Haas is written anew, everything else stays.
-
-    Args:
-        source: the program.
-        file: its name, for messages.
-        machine: `controller.calculator_decimal_point` says what a number without a point is (setting 162).
-        folder: not used: programs that it calls are looked for as those of FANUC's.
-
-    Returns:
-        The program; its text is the source's to the letter where nothing differs.
-
-    Raises:
-        ProgramError: a word is refused.
-    """
+    """The program in FANUC's words: what means another thing on a Haas is written anew, everything else stays."""
     notes: dict[str, Note] = {}
     lines, called = _lines(source, file, notes)
     numbers = [*range(1, max(len(lines), 1) + 1)]
@@ -87,18 +74,7 @@ def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None =
 
 
 def called_haas_text(source: str, file: str) -> str:
-    """A program of another file that one for a Haas calls, in FANUC's words, line by line.
-
-    Args:
-        source: the program.
-        file: its name, for messages.
-
-    Returns:
-        The text.
-
-    Raises:
-        ProgramError: a word is refused.
-    """
+    """A program of another file that one for a Haas calls, in FANUC's words, line by line."""
     lines, called = _lines(source, file, {})
     if called:
         line = min(called.values())

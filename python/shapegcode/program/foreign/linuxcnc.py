@@ -53,21 +53,7 @@ _G_CODE = re.compile(r"G0?([0-3])", re.IGNORECASE)
 
 
 def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
-    """The plain program that a program in LinuxCNC's words comes to.
-
-    Args:
-        source: the program.
-        file: its name, for messages.
-        machine: its offsets and tools, and how much a program may ask.
-        folder: where subroutines and the tool table are looked for; None: nowhere but in the machine's folders.
-
-    Returns:
-        The plain program.
-
-    Raises:
-        ProgramError: a line cannot be read, or is refused.
-        OSError: a stated tool table cannot be read.
-    """
+    """The plain program that a program in LinuxCNC's words comes to."""
     return _Interpreter(source, file, machine, folder).run()
 
 

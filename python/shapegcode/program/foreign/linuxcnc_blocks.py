@@ -54,15 +54,7 @@ class BlockRunner:
         self.plain.note(self.line if not self.file else 1, where + text, key)
 
     def run(self, words: Sequence[tuple[str, float]], comments: Sequence[str]) -> None:
-        """Execute a block.
-
-        Args:
-            words: in order, with their values.
-            comments: of its line.
-
-        Raises:
-            ValueError: it cannot be read, or is refused.
-        """
+        """Execute a block."""
         codes, functions, values = sorted_words(words)
         refuse_codes(codes, functions, values)
         by_group = by_group_of(codes)

@@ -93,16 +93,7 @@ def by_group_of(codes: Sequence[int]) -> dict[str, int]:
 
 
 def refuse_codes(codes: Sequence[int], functions: Sequence[int], values: Mapping[str, float]) -> None:
-    """Codes and words that are not read.
-
-    Args:
-        codes: G codes of a block, in tenths.
-        functions: its M codes.
-        values: its other words.
-
-    Raises:
-        ValueError: one of them is not.
-    """
+    """Codes and words that are not read."""
     for code in codes:
         if code in REFUSED:
             raise ValueError(f"{code_text(code)} is {REFUSED[code]}: it is not read")
@@ -120,17 +111,7 @@ def refuse_codes(codes: Sequence[int], functions: Sequence[int], values: Mapping
 def refuse_unused(
     modes: Modes, by_group: Mapping[str, int], functions: Sequence[int], values: Mapping[str, float]
 ) -> None:
-    """Words that no code of the block uses, as LinuxCNC refuses them: X1e3 is X1 and E3, not 1000.
-
-    Args:
-        modes: in force before the block.
-        by_group: its G codes, in tenths, by their groups.
-        functions: its M codes.
-        values: its other words.
-
-    Raises:
-        ValueError: there is one, or two M codes of one group.
-    """
+    """Words that no code of the block uses, as LinuxCNC refuses them: X1e3 is X1 and E3, not 1000."""
     codes = {*by_group.values()}
     goes_on = any(letter in values for letter in "xyzabcijk@^") and not codes & (_ONE_SHOT - {530})
     motion = by_group.get("motion", modes.motion if goes_on else None)

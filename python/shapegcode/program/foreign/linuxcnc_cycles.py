@@ -19,20 +19,7 @@ _REVERSED = {3: 4, 4: 3}
 
 
 def drill(state: State, code: int, words: Mapping[str, float], fresh: bool) -> Iterator[str]:
-    """The lines of one block of a drilling cycle; the state is behind it then.
-
-    Args:
-        state: before the block; its position of the drilling axis must be known where R asks for it.
-        code: of the cycle, in tenths.
-        words: of the block.
-        fresh: the cycle begins with this block, or another one was in force.
-
-    Yields:
-        Lines in FANUC's words, with G90.
-
-    Raises:
-        ValueError: a word is missing, or the position is not known.
-    """
+    """The lines of one block of a drilling cycle; the state is behind it then."""
     modes, unit = state.modes, state.unit_mm
     normal = normal_axis(modes.plane)
     first, second = sorted(plane_axes(modes.plane))

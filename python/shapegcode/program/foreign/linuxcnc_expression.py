@@ -253,18 +253,7 @@ def _whole(value: float) -> int:
 
 
 def evaluate(value: float | Value, parameters: Parameters) -> float:
-    """The value of a word when its line runs.
-
-    Args:
-        value: the word's.
-        parameters: the values of parameters.
-
-    Returns:
-        The number.
-
-    Raises:
-        ValueError: it has none.
-    """
+    """The value of a word when its line runs."""
     try:
         result = value if isinstance(value, float) else value(parameters)
     except OverflowError:
@@ -275,14 +264,7 @@ def evaluate(value: float | Value, parameters: Parameters) -> float:
 
 
 def without_comments(line: str) -> tuple[str, tuple[str, ...]]:
-    """A line without comments and blanks, its letters small, and the comments.
-
-    Args:
-        line: as it is written.
-
-    Returns:
-        The line and the texts of its comments.
-    """
+    """A line without comments and blanks, its letters small, and the comments."""
     if "(" not in line and ";" not in line:
         return line.translate(_BLANKS).lower(), ()
     comments: list[str] = []
@@ -301,17 +283,7 @@ def without_comments(line: str) -> tuple[str, tuple[str, ...]]:
 
 
 def read_block(line: str) -> Block:
-    """The words of a line that is no O line.
-
-    Args:
-        line: as it is written.
-
-    Returns:
-        Its words, in order, their values still expressions.
-
-    Raises:
-        ValueError: it cannot be read.
-    """
+    """The words of a line that is no O line."""
     code, comments = without_comments(line)
     skips = code.startswith("/")
     if code.startswith("/o"):

@@ -29,11 +29,7 @@ class ParameterTable:
         self._global: dict[str, float] = {}
 
     def numbered(self, number: int) -> float:
-        """The value of `#number`; #1 to #30 are the subroutine's own.
-
-        Raises:
-            ValueError: only the machine knows it.
-        """
+        """The value of `#number`; #1 to #30 are the subroutine's own."""
         if 1 <= number <= _LAST_LOCAL:
             return self.frame.locals[number]
         if 1 <= number <= _LAST_USER:
@@ -46,11 +42,7 @@ class ParameterTable:
         return value
 
     def named(self, name: str) -> float:
-        """The value of `#<name>`; those that begin with _ are known everywhere.
-
-        Raises:
-            ValueError: it has none.
-        """
+        """The value of `#<name>`; those that begin with _ are known everywhere."""
         own = self._global if name.startswith("_") else self.frame.names
         if name in own:
             return own[name]
@@ -68,11 +60,7 @@ class ParameterTable:
         return True
 
     def set(self, name: str | float, value: float) -> None:
-        """Give a parameter a value.
-
-        Raises:
-            ValueError: a program may not set it.
-        """
+        """Give a parameter a value."""
         if isinstance(name, str):
             (self._global if name.startswith("_") else self.frame.names)[name] = value
             return

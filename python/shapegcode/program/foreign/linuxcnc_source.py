@@ -30,21 +30,13 @@ class OLine:
 
 @dataclass(eq=False)
 class SourceFile:
-    """One file of a program.
+    """One file of a program."""
 
-    Attributes:
-        name: for messages.
-        text: its lines, each with its line end.
-        index: 0: the main program; n: the n-th of the files that were read besides.
-        starts: offset of each line, and of the text's end.
-        o_lines: by line, from 0.
-    """
-
-    name: str
-    text: str
-    index: int
-    starts: list[int] = field(default_factory=list)
-    o_lines: dict[int, OLine] = field(default_factory=dict)
+    name: str  # for messages
+    text: str  # its lines, each with its line end
+    index: int  # 0: the main program; n: the n-th of the files that were read besides
+    starts: list[int] = field(default_factory=list)  # offset of each line, and of the text's end
+    o_lines: dict[int, OLine] = field(default_factory=dict)  # by line, from 0
     _places: dict[str, list[int]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -93,16 +85,7 @@ class SourceFile:
 
 
 def subroutine_file(label: str, folders: Sequence[Path], read: Callable[[Path], str]) -> tuple[Path, str] | None:
-    """The file that holds a subroutine: `name.ngc` in one of the folders.
-
-    Args:
-        label: of the call, "<name>" or "123".
-        folders: where to look.
-        read: gives a file's text.
-
-    Returns:
-        File and text; None: there is none.
-    """
+    """The file that holds a subroutine: `name.ngc` in one of the folders."""
     stem = label.strip("<>")
     if not re.fullmatch(r"[\w.+-]+", stem):
         return None

@@ -40,42 +40,24 @@ class Modes:
 
 @dataclass
 class State:
-    """Modes, position and offsets. Lengths are mm; the position is that of the program's coordinates.
-
-    Attributes:
-        modes: modal groups.
-        position: of X, Y, Z.
-        work: offsets of the nine work coordinate systems.
-        g92: offset of G92 and G52.
-        g52: the offset stands in the plain program as G52.
-        saved_g92: what G92.3 restores.
-        length: tool length offset of Z that is in force.
-        length_number: its H number, 0: none.
-        tool: in the spindle; selected: by T.
-        lengths: of tools, as far as they are known.
-        radii: likewise.
-        table: the tool table, if there is one.
-        cycle_dwell: the last P of a drilling cycle, s: G74 and G84 without P take it, even from before G80.
-        machine_unit_mm: length of the machine's own unit.
-        cycle: what a row of drilling cycles keeps.
-    """
+    """Modes, position and offsets. Lengths are mm; the position is that of the program's coordinates."""
 
     modes: Modes = field(default_factory=Modes)
-    position: Triple = field(default_factory=lambda: [None, None, None])
-    work: dict[int, Triple] = field(default_factory=dict)
-    g92: Triple = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    g52: bool = False
-    saved_g92: Triple = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    length: float | None = 0.0
-    length_number: int = 0
-    tool: int = 0
-    selected: int = 0
-    lengths: dict[int, float] = field(default_factory=dict)
-    radii: dict[int, float] = field(default_factory=dict)
+    position: Triple = field(default_factory=lambda: [None, None, None])  # of X, Y, Z
+    work: dict[int, Triple] = field(default_factory=dict)  # offsets of the nine work coordinate systems
+    g92: Triple = field(default_factory=lambda: [0.0, 0.0, 0.0])  # offset of G92 and G52
+    g52: bool = False  # the offset stands in the plain program as G52
+    saved_g92: Triple = field(default_factory=lambda: [0.0, 0.0, 0.0])  # what G92.3 restores
+    length: float | None = 0.0  # tool length offset of Z that is in force
+    length_number: int = 0  # its H number, 0: none
+    tool: int = 0  # in the spindle
+    selected: int = 0  # by T
+    lengths: dict[int, float] = field(default_factory=dict)  # of tools, as far as they are known
+    radii: dict[int, float] = field(default_factory=dict)  # likewise
     table: ToolTable | None = None
-    cycle: CycleWords | None = None
-    cycle_dwell: float = 0.0
-    machine_unit_mm: float = 1.0
+    cycle: CycleWords | None = None  # what a row of drilling cycles keeps
+    cycle_dwell: float = 0.0  # the last P of a drilling cycle, s: G74 and G84 without P take it, even from before G80
+    machine_unit_mm: float = 1.0  # length of the machine's own unit
 
     @property
     def unit_mm(self) -> float:

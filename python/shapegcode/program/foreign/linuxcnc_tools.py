@@ -16,17 +16,11 @@ _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class ToolRow:
-    """A row of the tool table.
+    """A row of the tool table."""
 
-    Attributes:
-        offset_mm: X, Y, Z.
-        diameter_mm: 0: none is given.
-        pocket: where it is.
-    """
-
-    offset_mm: tuple[float, float, float]
-    diameter_mm: float
-    pocket: int = 0
+    offset_mm: tuple[float, float, float]  # X, Y, Z
+    diameter_mm: float  # 0: none is given
+    pocket: int = 0  # where it is
 
 
 @dataclass(frozen=True)
@@ -44,20 +38,7 @@ class ToolTable:
 
 
 def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | None:
-    """The tool table of a program.
-
-    Args:
-        stated: `input.tool_table`: a tool table, or the INI file that names one; empty: `tool.tbl` beside the program.
-        unit: "mm" or "inch", of a table that no INI file names.
-        folder: of the program.
-
-    Returns:
-        The table; None: there is none.
-
-    Raises:
-        ProgramError: a line of it cannot be read.
-        OSError: the stated file cannot be read.
-    """
+    """The tool table that `input.tool_table` (or an INI file there) states, else `tool.tbl` of the folder; or None."""
     if not stated:
         beside = folder / "tool.tbl" if folder is not None else None
         if beside is None or not beside.is_file():
@@ -78,19 +59,7 @@ def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | 
 
 
 def read_tool_table(path: Path, unit: str) -> ToolTable:
-    """Read a tool table: lines `T1 P1 X0 Y0 Z12.5 D6 ;comment`.
-
-    Args:
-        path: the file.
-        unit: "mm" or "inch": the table's lengths are in the units of the machine.
-
-    Returns:
-        The table, in mm.
-
-    Raises:
-        ProgramError: a line cannot be read.
-        OSError: the file cannot be read.
-    """
+    """Read a tool table: lines `T1 P1 X0 Y0 Z12.5 D6 ;comment`."""
     factor = UNITS_MM[unit]
     tools: dict[int, ToolRow] = {}
     text = read_file(path, _MAX_BYTES).decode("utf-8", "replace")

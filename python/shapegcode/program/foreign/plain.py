@@ -13,38 +13,25 @@ MAX_DIGITS = 8
 
 @dataclass(frozen=True)
 class Note:
-    """Something to tell about a line of the source.
+    """Something to tell about a line of the source."""
 
-    Attributes:
-        line: of the source, from 1.
-        text: one sentence, with both meanings where a word means another thing on FANUC.
-    """
-
-    line: int
-    text: str
+    line: int  # of the source, from 1
+    text: str  # one sentence, with both meanings where a word means another thing on FANUC
 
 
 @dataclass(frozen=True)
 class ForeignSettings:
-    """How the plain program must be read, where the control differs from what the machine file says.
+    """How the plain program must be read, where the control differs from what the machine file says."""
 
-    Attributes:
-        tool_length_mm: by H number; the machine file's own values come first.
-        tool_radius_mm: by D number, likewise.
-        peck_clearance_mm: distance to which a peck of G73 and G83 returns; None: the machine file's.
-        arc_radius_tolerance_mm: largest difference of start and end radius; None: the machine file's.
-        calculator_decimal_point: whether X10 is 10 mm; None: as the machine file says.
-        called_text: writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none.
-        names: words of the plain program that stand for others of the source, for who writes for that control again:
-            {"T901": 'T="MILL"'}.
-    """
-
+    # by H number; the machine file's own values come first
     tool_length_mm: Mapping[int, float] = field(default_factory=dict)
-    tool_radius_mm: Mapping[int, float] = field(default_factory=dict)
-    peck_clearance_mm: float | None = None
-    arc_radius_tolerance_mm: float | None = None
-    calculator_decimal_point: bool | None = True
+    tool_radius_mm: Mapping[int, float] = field(default_factory=dict)  # by D number, likewise
+    peck_clearance_mm: float | None = None  # distance to which a peck of G73 and G83 returns; None: the machine file's
+    arc_radius_tolerance_mm: float | None = None  # largest difference of start and end radius; None: the machine file's
+    calculator_decimal_point: bool | None = True  # whether X10 is 10 mm; None: as the machine file says
+    # writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none
     called_text: Callable[[str, str], str] | None = None
+    # words that stand for others of the source, for who writes for that control again: {"T901": 'T="MILL"'}
     names: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -54,26 +41,17 @@ class ForeignProgram:
 
     Its numbers have a point where a unit hangs on it (`X10.`), I J K are distances from the start, dwells are
     `G04 X` in seconds; it begins and ends with a line `%`. One that calls programs of its own may keep these calls.
-
-    Attributes:
-        dialect: "linuxcnc", "haas", "siemens".
-        reason: why it was read so, in words.
-        text: the plain program.
-        lines: for each line of `text`, from 0, the line of the source, from 1.
-        notes: what to tell.
-        files: names of other files whose lines are in it (subprograms).
-        line_files: for each line of `text` its file: 0 the source, n the n-th of `files`; empty: all of the source.
-        settings: how to read it.
     """
 
-    dialect: str
-    text: str
-    lines: Sequence[int]
-    reason: str = ""
-    notes: tuple[Note, ...] = ()
-    files: tuple[str, ...] = ()
+    dialect: str  # "linuxcnc", "haas", "siemens"
+    text: str  # the plain program
+    lines: Sequence[int]  # for each line of `text`, from 0, the line of the source, from 1
+    reason: str = ""  # why it was read so, in words
+    notes: tuple[Note, ...] = ()  # what to tell
+    files: tuple[str, ...] = ()  # names of other files whose lines are in it (subprograms)
+    # for each line of `text` its file: 0 the source, n the n-th of `files`; empty: all of the source
     line_files: Sequence[int] = ()
-    settings: ForeignSettings = ForeignSettings()
+    settings: ForeignSettings = ForeignSettings()  # how to read it
 
 
 class PlainProgram:
@@ -89,13 +67,7 @@ class PlainProgram:
         self.size = 2  # characters
 
     def put(self, text: str, line: int, file: int = 0) -> None:
-        """Add one line.
-
-        Args:
-            text: without its line end.
-            line: of the source, from 1.
-            file: 0 the source, n the n-th of `names`.
-        """
+        """Add one line; `file`: 0 the source, n the n-th of `names`."""
         self._keep_up(line, file)
         self._parts.append(text + "\n")
         self.size += len(text) + 1
@@ -103,13 +75,7 @@ class PlainProgram:
         self._files.append(file)
 
     def put_lines(self, text: str, first_line: int, file: int = 0) -> None:
-        """Add lines of the source as they are.
-
-        Args:
-            text: whole lines, each with its line end.
-            first_line: the line of the source with which they begin.
-            file: as `put` takes it.
-        """
+        """Add lines of the source as they are, each with its line end."""
         self._keep_up(first_line, file)
         count = text.count("\n")
         self._parts.append(text)
@@ -127,26 +93,11 @@ class PlainProgram:
             self._lines.extend(range(len(self._lines) + 1, line))
 
     def note(self, line: int, text: str, key: str = "") -> None:
-        """Tell something once.
-
-        Args:
-            line: of the source.
-            text: the sentence.
-            key: of two notes with one key the first counts; empty: the sentence itself.
-        """
+        """Tell something once: of two notes with one key (empty: the text itself) the first counts."""
         self.notes.setdefault(key or text, Note(line, text))
 
     def finish(self, dialect: str, last_line: int, settings: ForeignSettings | None = None) -> ForeignProgram:
-        """Close it with the line `%`.
-
-        Args:
-            dialect: as `ForeignProgram` has it.
-            last_line: of the source.
-            settings: how to read it.
-
-        Returns:
-            The program.
-        """
+        """Close it with the line `%`."""
         self.put("%", last_line)
         return ForeignProgram(
             dialect,
@@ -169,14 +120,5 @@ def number_text(value: float) -> str:
 
 
 def refusal(file: str, line: int, message: str) -> ProgramError:
-    """The error that refuses a line of the source.
-
-    Args:
-        file: its name.
-        line: from 1.
-        message: what is wrong there, and what would help.
-
-    Returns:
-        The error, to be raised; its message starts with ``file:line:column``.
-    """
+    """The error that refuses a line of the source, from 1; what is wrong there, and what would help."""
     return located_error(file, line, 1, message)

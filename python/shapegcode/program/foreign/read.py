@@ -23,19 +23,6 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
 
     The dialect is that of `controller.dialect`; "auto": as words tell that only one control knows, and where none
     does, that of a control whose planner is LinuxCNC's (`controller.kind`).
-
-    Args:
-        data: the program.
-        machine: on which it is to run.
-        source: its name, for messages.
-        folder: where programs that it calls and tables that it needs are looked for; None: nowhere.
-
-    Returns:
-        The plain program, with the reason why it was read so.
-
-    Raises:
-        ProgramError: it is of another dialect than `controller.dialect` says, mixes dialects, or cannot be read; the
-            message starts with ``source:line:column``.
     """
     dialect, reason = input_dialect(data, machine, source)
     if dialect == "fanuc":
@@ -48,15 +35,7 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
 
 
 def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
-    """A semicolon ends a block for FANUC, and begins a comment for other controls.
-
-    Args:
-        data: a program in FANUC's words.
-        source: its name, for messages.
-
-    Raises:
-        ProgramError: words stand behind one.
-    """
+    """A semicolon ends a block for FANUC, and begins a comment for other controls."""
     line = words_behind_semicolon(data)
     if line is not None:
         raise refusal(
@@ -68,19 +47,7 @@ def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
 
 
 def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]:
-    """In whose words a program is.
-
-    Args:
-        data: the program.
-        machine: on which it is to run.
-        source: its name, for messages.
-
-    Returns:
-        The dialect, and the reason in words.
-
-    Raises:
-        ProgramError: it is of another dialect than `controller.dialect` says, or mixes dialects.
-    """
+    """In whose words a program is."""
     stated = machine.controller.dialect
     # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
     expected = stated if stated != "auto" else machine.controller.kind

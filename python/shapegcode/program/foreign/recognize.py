@@ -78,19 +78,12 @@ _OF_FANUC: tuple[tuple[re.Pattern[bytes], str], ...] = (
 
 @dataclass(frozen=True)
 class Recognition:
-    """What shows for which control a program is written.
-
-    Attributes:
-        dialect: of the control.
-        line: of the first sign, from 1.
-        words: the sign itself.
-        meaning: what it is there.
-    """
+    """What shows for which control a program is written."""
 
     dialect: InputDialect
-    line: int
+    line: int  # of the first sign, from 1
     words: str
-    meaning: str
+    meaning: str  # what it is there
 
     @property
     def reason(self) -> str:
@@ -102,13 +95,6 @@ def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]
     """The first sign of every control for which a program may be written.
 
     Only words that a control alone knows count; the first 64 KiB are looked at, comments left out.
-
-    Args:
-        text: the program.
-        of_fanuc: look for words of FANUC alone, too, where none of another control is found.
-
-    Returns:
-        One for each control, in the order of their lines; empty: nothing tells, it is in FANUC's words.
     """
     code = re.sub(rb";[^\n]*", b"", _COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
     code = code[: _end(code)]
@@ -128,12 +114,6 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
     """The first dwell or arc of a program that is allowed on FANUC, and usual with another meaning on LinuxCNC.
 
     A dwell of P1 to P9 is next to nothing in milliseconds, P of an arc are turns there.
-
-    Args:
-        text: a program in which no word tells for which control it is.
-
-    Returns:
-        Line and sentence; None: there is none.
     """
     capitals = text[:LOOKED_AT_BYTES].upper()
     if b"P" not in capitals:
@@ -154,14 +134,7 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
 
 
 def words_behind_semicolon(text: bytes) -> int | None:
-    """The first line with words behind a semicolon, which is a comment for other controls and a block for FANUC.
-
-    Args:
-        text: a program.
-
-    Returns:
-        The line, from 1; None: there is none.
-    """
+    """The first line with words behind a semicolon, which is a comment for other controls and a block for FANUC."""
     if b";" not in text:
         return None
     match = next((each for each in _BEHIND_SEMICOLON.finditer(text) if each[1]), None)

@@ -48,19 +48,6 @@ def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | Non
     """Read a SINUMERIK program in DIN words.
 
     Subprograms are looked for in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
-
-    Args:
-        source: its text.
-        file: its name, for messages.
-        machine: on which it runs: limits, tolerance of arcs, work offsets, block skip.
-        folder: that of the file; None: nowhere.
-
-    Returns:
-        The plain program, with the line of the source for each of its lines.
-
-    Raises:
-        ProgramError: a word is not read, or means nothing there; the message starts with ``file:line:column`` and says
-            what would have to stand there.
     """
     run = _Run(source, file, machine, folder)
     return run.program()

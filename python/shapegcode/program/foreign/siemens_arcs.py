@@ -22,21 +22,13 @@ _STRAIGHT = 1e-9  # sine of an angle below which a direction is one
 
 @dataclass(frozen=True)
 class Element:
-    """A line, an arc or a helix; positions in mm.
-
-    Attributes:
-        start: of it.
-        end: of it.
-        centre: of an arc; None: a line.
-        plane: 17, 18 or 19.
-        sweep_rad: of an arc, counter-clockwise positive, seen against the axis across the plane.
-    """
+    """A line, an arc or a helix; positions in mm."""
 
     start: Vector
     end: Vector
-    centre: Vector | None = None
-    plane: int = 17
-    sweep_rad: float = 0.0
+    centre: Vector | None = None  # of an arc; None: a line
+    plane: int = 17  # 17, 18 or 19
+    sweep_rad: float = 0.0  # of an arc, counter-clockwise positive, seen against the axis across the plane
 
     @property
     def length_mm(self) -> float:
@@ -93,11 +85,7 @@ def sweep_of(start: Vector, end: Vector, centre: Vector, plane: int, turn: int) 
 
 
 def by_centre(start: Vector, end: Vector, centre: Vector, plane: int, turn: int, tolerance_mm: float) -> Element:
-    """An arc by its centre.
-
-    Raises:
-        ValueError: start and end have other radii, by more than the tolerance.
-    """
+    """An arc by its centre."""
     first, second, _ = PLANES[plane]
     radii = [math.hypot(each[first] - centre[first], each[second] - centre[second]) for each in (start, end)]
     if radii[0] < 1e-9:
@@ -111,11 +99,7 @@ def by_centre(start: Vector, end: Vector, centre: Vector, plane: int, turn: int,
 
 
 def by_radius(start: Vector, end: Vector, radius: float, plane: int, turn: int, tolerance_mm: float) -> Element:
-    """An arc by its radius, negative: of more than half a turn.
-
-    Raises:
-        ValueError: no arc of this radius leads there.
-    """
+    """An arc by its radius, negative: of more than half a turn."""
     first, second, _ = PLANES[plane]
     chord = np.array([end[first] - start[first], end[second] - start[second]])
     half = 0.5 * float(np.hypot(*chord))
@@ -130,11 +114,7 @@ def by_radius(start: Vector, end: Vector, radius: float, plane: int, turn: int, 
 
 
 def by_angle(start: Vector, end: Vector, angle_deg: float, plane: int, turn: int) -> Element:
-    """An arc by its end and its opening angle, AR=.
-
-    Raises:
-        ValueError: the end is the start.
-    """
+    """An arc by its end and its opening angle, AR=."""
     first, second, _ = PLANES[plane]
     chord = np.array([end[first] - start[first], end[second] - start[second]])
     half = 0.5 * float(np.hypot(*chord))
@@ -164,11 +144,7 @@ def turned(start: Vector, centre: Vector, angle_deg: float, plane: int, turn: in
 
 
 def through(start: Vector, middle: Vector, end: Vector) -> Element:
-    """The arc from start to end through a point between them.
-
-    Raises:
-        ValueError: they lie on a line, or in no plane of two axes.
-    """
+    """The arc from start to end through a point between them."""
     across = np.cross(middle - start, end - middle)
     size = float(np.linalg.norm(across))
     reach = float(np.linalg.norm(middle - start) * np.linalg.norm(end - middle))
@@ -192,11 +168,7 @@ def through(start: Vector, middle: Vector, end: Vector) -> Element:
 
 
 def tangential(start: Vector, end: Vector, direction: Vector, plane: int) -> Element:
-    """The arc to an end that goes on in the direction of the path before it; a line where it leads straight on.
-
-    Raises:
-        ValueError: there was no direction in the plane, or the end lies behind.
-    """
+    """The arc to an end that goes on in the direction of the path before it; a line where it leads straight on."""
     first, second, _ = PLANES[plane]
     ahead = direction[[first, second]]
     chord = end[[first, second]] - start[[first, second]]

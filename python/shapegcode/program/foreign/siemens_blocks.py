@@ -24,23 +24,14 @@ from shapegcode.program.foreign.siemens_expressions import (
 
 @dataclass(frozen=True)
 class Word(AtColumn):
-    """One word of a block.
+    """One word of a block."""
 
-    Attributes:
-        name: "X", "CR", "M"; of a G code with its number, "G1"; of a call or a bare word its name.
-        column: where it stands, from 1.
-        value: what stands behind the address; None: nothing.
-        mode: "AC" or "IC" of `=AC(...)` and `=IC(...)`.
-        index: of `NAME[...]=`.
-        given: of a call `NAME(...)`; None: no brackets.
-    """
-
-    name: str
-    column: int
-    value: Expression | None = None
-    mode: str = ""
-    index: tuple[Expression, ...] = ()
-    given: tuple[Expression | None, ...] | None = None
+    name: str  # "X", "CR", "M"; of a G code with its number, "G1"; of a call or a bare word its name
+    column: int  # where it stands, from 1
+    value: Expression | None = None  # what stands behind the address; None: nothing
+    mode: str = ""  # "AC" or "IC" of `=AC(...)` and `=IC(...)`
+    index: tuple[Expression, ...] = ()  # of `NAME[...]=`
+    given: tuple[Expression | None, ...] | None = None  # of a call `NAME(...)`; None: no brackets
 
 
 @dataclass(frozen=True)
@@ -122,11 +113,7 @@ def split_comment(line: str) -> tuple[str, str]:
 
 @lru_cache(maxsize=4096)
 def block_of(line: str) -> SiemensBlock:
-    """Read a line.
-
-    Raises:
-        WordError: with what would have to stand there.
-    """
+    """Read a line."""
     code, comment = split_comment(line.rstrip())
     scan = SiemensScanner(in_capitals(code))
     head = _HEAD.match(scan.text)
@@ -366,19 +353,12 @@ def _assigned(scan: SiemensScanner, name: str, index: tuple[Expression, ...], be
 
 @dataclass(frozen=True)
 class ProgramLines:
-    """One program: its lines, and where it stands.
+    """One program: its lines, and where it stands."""
 
-    Attributes:
-        name: in capitals, without _N_ and _SPF.
-        file: that holds it.
-        first: line of the file at which `lines` begins, from 1.
-        lines: as they stand there.
-    """
-
-    name: str
-    file: str
-    first: int
-    lines: tuple[str, ...]
+    name: str  # in capitals, without _N_ and _SPF
+    file: str  # that holds it
+    first: int  # line of the file at which `lines` begins, from 1
+    lines: tuple[str, ...]  # as they stand there
     partners: dict[int, int] = field(default_factory=dict, compare=False)  # of IF, ELSE and loops: the next of them
     starts: dict[int, int] = field(default_factory=dict, compare=False)  # of the end of a loop: its begin
 
@@ -387,11 +367,7 @@ class ProgramLines:
         return block_of(self.lines[index])
 
     def find_structure(self) -> None:
-        """Find what belongs together, once.
-
-        Raises:
-            StructureError: something is not closed, or closed without being open.
-        """
+        """Find what belongs together, once."""
         if self.partners:
             return
         open_ones: list[tuple[str, int, int]] = []  # word, first line, last line that it led to
