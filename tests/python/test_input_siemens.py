@@ -442,6 +442,7 @@ BAD = {
     "REPEATB AGAIN P=2": (4, ["REPEATB"]),
     "G2 X10 Y0 I3 J0": (4, ["start radius 3.000", "end radius 7.000"]),
     "G2 X10 Y0 CR=3": (4, ["CR=3", "5.000"]),
+    "G2 X10 Y0 R5": (4, ["R alone", "R1=", "CR="]),
     "G2 X10 Y0": (4, ["G2", "I, J, K, CR= or AR="]),
     "G2 X10 Y0 I5 K1": (4, ["K", "plane G17"]),
     "G2 X0 Y0 CR=5": (4, ["CR=", "whole circle"]),

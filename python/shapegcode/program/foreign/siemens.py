@@ -111,7 +111,10 @@ class _Run:
             variable.write(word.name, index, value, word.column)
             return
         parameter = self._r_number(word.name, index, word.column)
-        assert parameter is not None  # `knows` was asked
+        if parameter is None:
+            raise word.error(
+                f"{word.name} alone: its number would have to follow (R1= or R[1]=); the radius of an arc is CR="
+            )
         self._r[parameter] = float(number(value, word.column))
 
     def _r_number(self, name: str, index: tuple[Value, ...], column: int) -> int | None:
