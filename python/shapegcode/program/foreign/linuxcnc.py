@@ -27,7 +27,7 @@ from shapegcode.program.foreign.linuxcnc_parameters import ParameterTable
 from shapegcode.program.foreign.linuxcnc_source import KEYWORDS, OLine, SourceFile, subroutine_file
 from shapegcode.program.foreign.linuxcnc_state import Modes, State, normal_axis
 from shapegcode.program.foreign.linuxcnc_tools import find_tool_table
-from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram, refusal
+from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram, program_folders, refusal
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -81,10 +81,7 @@ class _Interpreter:
         self._machine = machine
         self._main = SourceFile(file, source, 0)
         self._file = self._main
-        self._folders = [
-            *([folder] if folder is not None else []),
-            *(Path(name).expanduser() for name in machine.input.program_folders),
-        ]
+        self._folders = program_folders(machine, folder)
         self._files: dict[str, SourceFile] = {}
         self._blocks: dict[tuple[int, int], Block] = {}
         self._plain = PlainProgram()

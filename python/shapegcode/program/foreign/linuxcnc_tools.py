@@ -20,7 +20,6 @@ class ToolRow:
 
     offset_mm: tuple[float, float, float]  # X, Y, Z
     diameter_mm: float  # 0: none is given
-    pocket: int = 0  # where it is
 
 
 @dataclass(frozen=True)
@@ -71,5 +70,5 @@ def read_tool_table(path: Path, unit: str) -> ToolTable:
         if "T" not in words or _WORD.sub("", code).strip():
             raise refusal(str(path), number, f"{code[:40]!r} is no row of a tool table (T1 P1 Z12.5 D6)")
         x, y, z = (words.get(axis, 0.0) * factor for axis in "XYZ")
-        tools[int(words["T"])] = ToolRow((x, y, z), words.get("D", 0.0) * factor, int(words.get("P", 0.0)))
+        tools[int(words["T"])] = ToolRow((x, y, z), words.get("D", 0.0) * factor)
     return ToolTable(tools, str(path), unit)

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shapegcode.errors import ProgramError, located_error
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
 
 MAX_DIGITS = 8
 """Digits of a word in FANUC's words (alarm 0003)."""
@@ -27,7 +32,6 @@ class ForeignSettings:
     tool_length_mm: Mapping[int, float] = field(default_factory=dict)
     tool_radius_mm: Mapping[int, float] = field(default_factory=dict)  # by D number, likewise
     peck_clearance_mm: float | None = None  # distance to which a peck of G73 and G83 returns; None: the machine file's
-    arc_radius_tolerance_mm: float | None = None  # largest difference of start and end radius; None: the machine file's
     calculator_decimal_point: bool | None = True  # whether X10 is 10 mm; None: as the machine file says
     # writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none
     called_text: Callable[[str, str], str] | None = None
@@ -108,6 +112,12 @@ class PlainProgram:
             line_files=self._files if self.names else (),
             settings=settings or ForeignSettings(),
         )
+
+
+def program_folders(machine: Machine, folder: Path | None) -> list[Path]:
+    """Where programs that another one calls are looked for: its own folder first."""
+    own = [] if folder is None else [folder]
+    return own + [Path(name).expanduser() for name in machine.input.program_folders]
 
 
 def number_text(value: float) -> str:

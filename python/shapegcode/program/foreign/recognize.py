@@ -18,7 +18,7 @@ _TURNS = re.compile(
     rb"G0*[23](?![\d.])[ \t]*+(?:[FIJKRXYZ][ \t]*+[-+\d.]++[ \t]*+)++P[ \t]*0*([2-9]|[1-9]\d+)(?![\d.])"
 )
 _PERCENT = re.compile(rb"(?m)^[ \t]*%[ \t\r]*$")
-_COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
+COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
 
 _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ...] = (
     (
@@ -96,7 +96,7 @@ def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]
 
     Only words that a control alone knows count; the first 64 KiB are looked at, comments left out.
     """
-    code = re.sub(rb";[^\n]*", b"", _COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
+    code = re.sub(rb";[^\n]*", b"", COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
     code = code[: _end(code)]
     found: dict[InputDialect, tuple[int, Recognition]] = {}
     for dialect, hints, sign, meaning in _SIGNS:
@@ -118,7 +118,7 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
     capitals = text[:LOOKED_AT_BYTES].upper()
     if b"P" not in capitals:
         return None
-    code = _COMMENT.sub(b" ", capitals)
+    code = COMMENT.sub(b" ", capitals)
     found = [match for match in (_SHORT_DWELL.search(code), _TURNS.search(code)) if match is not None]
     if not found:
         return None

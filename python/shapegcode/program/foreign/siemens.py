@@ -14,7 +14,7 @@ from pathlib import Path
 
 from shapegcode.errors import ProgramError, located_error
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram
+from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram, program_folders
 from shapegcode.program.foreign.siemens_blocks import (
     Jump,
     ProgramLines,
@@ -60,11 +60,7 @@ class _Run:
         self.machine, self.file = machine, file
         self.out = PlainProgram()
         self.path = SiemensPath(machine, self.out)
-        folders = [
-            *([folder] if folder else []),
-            *(Path(name).expanduser() for name in machine.input.program_folders),
-        ]
-        self._store = _Store(programs_of_source(source, file), folders)
+        self._store = _Store(programs_of_source(source, file), program_folders(machine, folder))
         self.words = BlockWords(self.path, self, uses_m6=_CHANGES_TOOL.search(source) is not None)
         self._r: dict[int, float] = {}
         self._locals: list[dict[str, Variable]] = []
