@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+from shapegcode.program.foreign.arcs import centre_by_radius, sweep_of
 from shapegcode.program.foreign.linuxcnc_codes import (
     SYSTEMS,
     by_group_of,
@@ -17,7 +18,7 @@ from shapegcode.program.foreign.linuxcnc_codes import (
 )
 from shapegcode.program.foreign.linuxcnc_cycles import drill
 from shapegcode.program.foreign.linuxcnc_offsets import Offsets
-from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, plane_axes, system_words
+from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, plane_axes, system_words, words_of
 from shapegcode.program.foreign.plain import PlainProgram, number_text
 
 _BEFORE_MOTION = (6, 19, 3, 4, 5, 7, 8, 9, 48, 49)
@@ -26,7 +27,6 @@ _KEPT_OUTPUTS = {
     50: "feed override", 51: "spindle override", 52: "adaptive feed", 53: "feed hold switch", 62: "digital output",
     63: "digital output", 64: "digital output", 65: "digital output", 67: "analog output", 68: "analog output",
 }  # fmt: skip
-_FULL_TURN = 1e-9  # rad
 
 
 class BlockRunner:
@@ -302,10 +302,11 @@ class BlockRunner:
         head.append(f"G{modes.motion // 10:02d}")
         self.written_motion = modes.motion
         if modes.motion < 20:
-            self.put("".join(head) + _words(values, "xyzabc") + self._feed_word(values))
+            self.put("".join(head) + words_of(values, "xyzabc") + self._feed_word(values))
         else:
-            for number, (axes, feed) in enumerate(self._arc(values, start, incremental=incremental)):
-                self.put(("".join(head) if number == 0 else "") + axes + feed)
+            first, *others = self._arc(values, start, incremental=incremental)
+            for block in ("".join(head) + first, *others):
+                self.put(block)
 
     def _feed_word(self, values: Mapping[str, float]) -> str:
         modes = self.state.modes
@@ -340,9 +341,7 @@ class BlockRunner:
             to = to[0] - x / unit, to[1] - y / unit
         return {**{letter: value for letter, value in values.items() if letter not in "@^"}, "x": to[0], "y": to[1]}
 
-    def _arc(
-        self, values: Mapping[str, float], start: Sequence[float | None], *, incremental: bool
-    ) -> list[tuple[str, str]]:
+    def _arc(self, values: Mapping[str, float], start: Sequence[float | None], *, incremental: bool) -> list[str]:
         """Words of an arc and its F: one block, and one more for each further full turn."""
         state, modes, unit = self.state, self.state.modes, self.state.unit_mm
         first, second = plane_axes(modes.plane)
@@ -358,32 +357,27 @@ class BlockRunner:
         if not known:
             if turns > 1 or modes.centres == 901 or modes.feed_mode == 930:
                 raise ValueError("the position is not known, which this arc needs (P turns, G90.1, G93)")
-            return [(_words(values, "xyzabcijkr"), self._feed_word(values))]
-        here = start[first] or 0.0, start[second] or 0.0
-        to = state.position[first] or 0.0, state.position[second] or 0.0
-        sense = 1.0 if modes.motion == 30 else -1.0
+            return [words_of(values, "xyzabcijkr") + self._feed_word(values)]
+        here = complex(start[first] or 0.0, start[second] or 0.0)
+        to = complex(state.position[first] or 0.0, state.position[second] or 0.0)
+        turn = 1 if modes.motion == 30 else -1
+        given = complex(values.get(names[0], 0.0), values.get(names[1], 0.0)) * unit
         if "r" in values:
-            centre = _centre_of_radius(here, to, values["r"] * unit, sense)
-        elif modes.centres == 901:
-            if any(name not in values for name in names):
-                raise ValueError(f"G90.1 needs {names[0].upper()} and {names[1].upper()}")
-            centre = values[names[0]] * unit, values[names[1]] * unit
+            centre = _centre_of_radius(here, to, values["r"] * unit, turn)
+        elif modes.centres == 901 and any(name not in values for name in names):
+            raise ValueError(f"G90.1 needs {names[0].upper()} and {names[1].upper()}")
         else:
-            centre = here[0] + values.get(names[0], 0.0) * unit, here[1] + values.get(names[1], 0.0) * unit
-        words = "".join(
-            f"{name.upper()}{number_text((middle - begin) / unit)}"
-            for name, middle, begin in zip(names, centre, here, strict=True)
-        )
-        sweep = _sweep(here, to, centre, sense)
-        radius = math.hypot(here[0] - centre[0], here[1] - centre[1])
-        feed = self._arc_feed(values, sweep + (turns - 1.0) * math.tau, radius, start)
-        blocks: list[tuple[str, str]] = []
+            centre = given if modes.centres == 901 else here + given
+        spoke = (centre - here) / unit
+        words = words_of({names[0]: spoke.real, names[1]: spoke.imag}, "".join(names))
+        total = abs(sweep_of(here, to, centre, turn)) + (turns - 1.0) * math.tau
+        feed = self._arc_feed(values, total, abs(here - centre), start)
+        blocks: list[str] = []
         normal = 3 - first - second
-        total = sweep + (turns - 1.0) * math.tau
         rise = values.get(AXES[normal])
         name = AXES[normal].upper()
         last = {letter: value for letter, value in values.items() if letter in "xyzabc"}
-        for turn in range(1, int(turns)):
+        for time in range(1, int(turns)):
             axial = ""
             if rise is not None:
                 if start[normal] is None and not incremental:
@@ -391,12 +385,12 @@ class BlockRunner:
                 share = math.tau / total
                 begin = (start[normal] or 0.0) / unit
                 step = rise * share if incremental else (rise - begin) * share
-                axial = f"{name}{number_text(step if incremental else begin + turn * step)}"
+                axial = f"{name}{number_text(step if incremental else begin + time * step)}"
                 if incremental:
-                    last[AXES[normal]] = rise * (1.0 - turn * share)
-            blocks.append((axial + words, feed if turn == 1 else ""))
-        blocks.append((_words(last, "xyzabc") + words, feed if turns < 2 else ""))
-        return blocks
+                    last[AXES[normal]] = rise * (1.0 - time * share)
+            blocks.append(axial + words)
+        blocks.append(words_of(last, "xyzabc") + words)
+        return [blocks[0] + feed, *blocks[1:]]
 
     def _arc_feed(self, values: Mapping[str, float], sweep: float, radius: float, start: Sequence[float | None]) -> str:
         """F of an arc: in G93 LinuxCNC's counts the whole block, FANUC's the radius."""
@@ -444,10 +438,6 @@ class BlockRunner:
         state.modes = kept
 
 
-def _words(values: Mapping[str, float], letters: str) -> str:
-    return "".join(f"{letter.upper()}{number_text(values[letter])}" for letter in letters if letter in values)
-
-
 def _plain_comment(text: str) -> str:
     """A comment that FANUC's reader takes; those that LinuxCNC executes are left out."""
     if text.lower().startswith(("msg,", "debug,", "print,", "log", "probe")):
@@ -455,26 +445,11 @@ def _plain_comment(text: str) -> str:
     return "".join(c for c in text.upper() if " " <= c <= "~" and c not in "()%;").strip()
 
 
-def _centre_of_radius(
-    here: tuple[float, float], to: tuple[float, float], radius: float, sense: float
-) -> tuple[float, float]:
-    """The centre of an arc with R; negative: more than half a turn."""
-    chord = math.hypot(to[0] - here[0], to[1] - here[1])
+def _centre_of_radius(here: complex, to: complex, radius: float, turn: int) -> complex:
+    """The centre of an arc with R."""
+    chord = abs(to - here)
     if chord == 0.0 or radius == 0.0:
         raise ValueError("an arc with R ends where it begins, or its R is 0")
-    half = chord / 2.0
-    if half - abs(radius) > 0.00127:
+    if chord / 2.0 - abs(radius) > 0.00127:
         raise ValueError(f"R{abs(radius):g} mm is too small for a chord of {chord:g} mm")
-    height = math.sqrt(max(0.0, radius * radius - half * half))
-    side = sense * (1.0 if radius > 0.0 else -1.0) * height / chord
-    middle = (here[0] + to[0]) / 2.0, (here[1] + to[1]) / 2.0
-    return middle[0] - side * (to[1] - here[1]), middle[1] + side * (to[0] - here[0])
-
-
-def _sweep(here: tuple[float, float], to: tuple[float, float], centre: tuple[float, float], sense: float) -> float:
-    """The angle of an arc's last turn, rad; a full circle where it ends as it begins."""
-    begin = math.atan2(here[1] - centre[1], here[0] - centre[0])
-    end = math.atan2(to[1] - centre[1], to[0] - centre[0])
-    sweep = math.fmod(sense * (end - begin), math.tau)
-    sweep += math.tau if sweep < 0.0 else 0.0
-    return math.tau if sweep < _FULL_TURN else sweep
+    return centre_by_radius(here, to, radius, turn)

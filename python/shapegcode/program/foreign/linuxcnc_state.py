@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.foreign.linuxcnc_tools import ToolTable
+from shapegcode.program.foreign.plain import number_text
 
 AXES = "xyz"
 CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
@@ -118,3 +120,13 @@ def plane_axes(plane: int) -> tuple[int, int]:
 def system_words(system: int) -> str:
     """A work coordinate system in FANUC's words."""
     return f"G{53 + system}" if system <= 6 else f"G54.1 P{system - 6}"
+
+
+def given_axes(values: Mapping[str, float]) -> list[int]:
+    """Indices of the linear axes among words."""
+    return [axis for axis in range(3) if AXES[axis] in values]
+
+
+def words_of(values: Mapping[str, float], letters: str = AXES) -> str:
+    """Those of these letters in FANUC's words, in the order of the letters."""
+    return "".join(f"{letter.upper()}{number_text(values[letter])}" for letter in letters if letter in values)

@@ -6,6 +6,7 @@ p. 139; polar coordinates 1265481 pp. 174, 175; FLIN 662833 p. 458; chamfers 679
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,9 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from shapegcode.machine import Machine
-from shapegcode.program.foreign import siemens_arcs as arcs
+from shapegcode.program.foreign import arcs
+from shapegcode.program.foreign.arcs import PLANES, Element, Vector
 from shapegcode.program.foreign.plain import PlainProgram, number_text
-from shapegcode.program.foreign.siemens_arcs import PLANES, Element, Vector
 from shapegcode.program.foreign.siemens_expressions import AtColumn, WordError
 
 _FLIN_ERROR_MM = 0.0005  # of blocks of constant feed in the place of one whose feed is linear
@@ -343,21 +344,22 @@ class SiemensPath:
                 raise ValueError("CT needs the direction of a move before it, whose start is known")
             return arcs.tangential(here, target, modes.frame.linear.T @ self.direction, modes.plane)
         turn = 1 if modes.motion == "G3" else -1
-        centre = here.copy()
+        about = here.copy()
         for axis, (value, mode, column) in given.centre.items():
             if axis not in (first, second):
                 raise WordError(
                     f"{'IJK'[axis]} lies across the plane G{modes.plane}: it would have to be left out", column
                 )
-            centre[axis] = value if mode == "AC" else here[axis] + value
+            about[axis] = value if mode == "AC" else here[axis] + value
+        start, centre = arcs.flat(here, modes.plane), arcs.flat(about, modes.plane)
         if given.radius is not None:
             return arcs.by_radius(here, target, given.radius, modes.plane, turn, tolerance)
         if given.angle is not None:
             if not 0.0 < given.angle < 360.0:
                 raise ValueError(f"AR={given.angle:g}: it would have to lie between 0 and 360 degrees")
             if given.centre:
-                end = arcs.turned(here, centre, given.angle, modes.plane, turn)
-                target[[first, second]] = end[[first, second]]
+                end = centre + (start - centre) * cmath.rect(1.0, turn * math.radians(given.angle))
+                target = arcs.moved_to(target, modes.plane, end)
                 return arcs.by_centre(here, target, centre, modes.plane, turn, tolerance)
             return arcs.by_angle(here, target, given.angle, modes.plane, turn)
         if not given.centre:
