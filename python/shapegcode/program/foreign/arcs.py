@@ -95,9 +95,8 @@ class Element:
         """Unit vector along the path; zeros where it has no length."""
         step = self.end - self.start
         if self.centre is not None:
-            step = moved_to(
-                step, self.plane, 1j * self.sweep_rad * flat(self.point_at(share) - self.centre, self.plane)
-            )
+            spoke = flat(self.point_at(share) - self.centre, self.plane)
+            step = moved_to(step, self.plane, 1j * self.sweep_rad * spoke)
         length = float(np.linalg.norm(step))
         return step / length if length > 0.0 else step
 

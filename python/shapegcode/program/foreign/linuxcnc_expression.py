@@ -10,24 +10,14 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from shapegcode.program.foreign.linuxcnc_parameters import ParameterTable
 
 _EQUAL = 1e-4  # EQ, NE: values nearer to each other are equal; in later versions than 2.9.0~pre1 for LE and GE too
 
-Value = Callable[["Parameters"], float]
-
-
-class Parameters(Protocol):
-    """Where expressions find the values of parameters."""
-
-    def numbered(self, number: int) -> float:
-        """The value of `#number`."""
-
-    def named(self, name: str) -> float:
-        """The value of `#<name>`."""
-
-    def exists(self, name: str) -> bool:
-        """Whether `#<name>` has a value."""
+Value = Callable[["ParameterTable"], float]
 
 
 @dataclass(frozen=True)
@@ -252,7 +242,7 @@ def _whole(value: float) -> int:
     return number
 
 
-def evaluate(value: float | Value, parameters: Parameters) -> float:
+def evaluate(value: float | Value, parameters: ParameterTable) -> float:
     """The value of a word when its line runs."""
     try:
         result = value if isinstance(value, float) else value(parameters)

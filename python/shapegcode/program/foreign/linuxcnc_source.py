@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -84,7 +84,7 @@ class SourceFile:
         return opening is not None and self.o_lines[opening].keyword == "do"
 
 
-def subroutine_file(label: str, folders: Sequence[Path], read: Callable[[Path], str]) -> tuple[Path, str] | None:
+def subroutine_file(label: str, folders: Sequence[Path]) -> Path | None:
     """The file that holds a subroutine: `name.ngc` in one of the folders."""
     stem = label.strip("<>")
     if not re.fullmatch(r"[\w.+-]+", stem):
@@ -93,5 +93,5 @@ def subroutine_file(label: str, folders: Sequence[Path], read: Callable[[Path], 
         for suffix in (".ngc", ".NGC", ".nc"):
             path = folder / (stem + suffix)
             if path.is_file():
-                return path, read(path)
+                return path
     return None

@@ -35,6 +35,16 @@ class ToolTable:
         """Length of its unit."""
         return UNITS_MM[self.units]
 
+    @property
+    def lengths_mm(self) -> dict[int, float]:
+        """By tool."""
+        return {number: tool.offset_mm[2] for number, tool in self.tools.items()}
+
+    @property
+    def radii_mm(self) -> dict[int, float]:
+        """Likewise."""
+        return {number: tool.diameter_mm / 2.0 for number, tool in self.tools.items()}
+
 
 def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | None:
     """The tool table that `input.tool_table` (or an INI file there) states, else `tool.tbl` of the folder; or None."""
