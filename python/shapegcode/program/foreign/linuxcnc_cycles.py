@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from shapegcode.program.foreign.linuxcnc_state import AXES, CycleWords, State, normal_axis, plane_axes
+from shapegcode.program.foreign.linuxcnc_state import AXES, CycleWords, State, normal_axis, plane_axes, words_of
 from shapegcode.program.foreign.plain import number_text
 
 PECK_CLEARANCE_MM = 0.254
@@ -59,11 +59,8 @@ def drill(state: State, code: int, words: Mapping[str, float], fresh: bool) -> I
             if incremental and here is None:
                 raise ValueError(f"the position of {AXES[axis].upper()} is not known, from which G91 counts")
             state.position[axis] = given * unit + ((here or 0.0) if incremental else 0.0)
-        place = "".join(
-            f"{AXES[axis].upper()}{number_text(value / unit)}"
-            for axis in (first, second)
-            if (value := state.position[axis]) is not None
-        )
+        known = ((axis, state.position[axis]) for axis in (first, second))
+        place = words_of({AXES[axis]: value / unit for axis, value in known if value is not None})
         if lift is not None:
             yield f"G00{place}{AXES[normal].upper()}{number_text(lift / unit)}"
             state.position[normal], row.entered, lift = lift, None, None

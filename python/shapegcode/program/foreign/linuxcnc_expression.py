@@ -206,26 +206,22 @@ class Scanner:
 
     def _expression(self) -> Value:
         """Up to the bracket that closes it; operators of one precedence from left to right."""
-        values = [_worked_out(self.value())]
-        pending: list[tuple[int, Callable[[float, float], float]]] = []
-        while not self.take("]"):
-            found = _OPERATOR.match(self.text, self.at)
-            if found is None:
-                raise ValueError(f"an operator or ] is expected at {self.left[:12]!r}")
+        value = self._operation(0)
+        if not self.take("]"):
+            raise ValueError(f"an operator or ] is expected at {self.left[:12]!r}")
+        return value
+
+    def _operation(self, above: int) -> Value:
+        """Values and the operators of a higher rank between them."""
+        left = _worked_out(self.value())
+        while (found := _OPERATOR.match(self.text, self.at)) and (rank := _OPERATORS[found[0]][0]) > above:
             self.at = found.end()
-            rank, operator = _OPERATORS[found[0]]
-            while pending and pending[-1][0] >= rank:
-                _join(values, pending.pop()[1])
-            pending.append((rank, operator))
-            values.append(_worked_out(self.value()))
-        while pending:
-            _join(values, pending.pop()[1])
-        return values[0]
+            left = _joined(_OPERATORS[found[0]][1], left, self._operation(rank))
+        return left
 
 
-def _join(values: list[Value], operator: Callable[[float, float], float]) -> None:
-    right, left = values.pop(), values.pop()
-    values.append(lambda parameters: operator(left(parameters), right(parameters)))
+def _joined(operator: Callable[[float, float], float], left: Value, right: Value) -> Value:
+    return lambda parameters: operator(left(parameters), right(parameters))
 
 
 def _worked_out(value: float | Value) -> Value:

@@ -123,14 +123,13 @@ class _Run:
 
     def _run(self, program: ProgramLines, variables: dict[str, Variable]) -> str:
         """Execute a program to its end; says which word ended it."""
-        where = f"{program.file}"
         try:
             program.find_structure()
         except StructureError as error:
             raise self._error(program, error.index, 1, str(error)) from None
         self._locals.append(variables)
         flow = _Flow(program)
-        file = 0 if program.file == self.file else self.out.names.index(where) + 1
+        file = 0 if program.file == self.file else self.out.names.index(program.file) + 1
         index = 0
         while index < len(program.lines):
             self.path.line, self.path.file = program.first + index, file
@@ -142,15 +141,10 @@ class _Run:
                     index += 1
                     continue
                 block = program.block(index)
-                if not self._is_skipped(block):
-                    if block.kind == "WORDS":
-                        if ended := self._words(block):
-                            self._locals.pop()
-                            return ended
-                        index += 1
-                        continue
-                    index = self._control(flow, block, index)
-                    continue
+                if block.kind == "WORDS" and not self._is_skipped(block) and (ended := self._words(block)):
+                    self._locals.pop()
+                    return ended
+                index = index + 1 if block.kind == "WORDS" else self._control(flow, block, index)
             except WordError as error:
                 raise self._error(program, index, error.column, str(error)) from None
             except RecursionError:
@@ -158,7 +152,6 @@ class _Run:
                 raise self._error(program, index, 1, message) from None
             except (OverflowError, ValueError):
                 raise self._error(program, index, 1, "a value is too large to be computed") from None
-            index += 1
         self._locals.pop()
         return ""
 
@@ -270,6 +263,8 @@ class _Run:
     def _control(self, flow: _Flow, block: SiemensBlock, index: int) -> int:
         """A statement of control flow; gives the line that follows."""
         program, kind = flow.program, block.kind
+        if self._is_skipped(block):
+            return index + 1
         self.words.comment(block.comment)
         if kind in ("IF", "WHILE"):
             return index + 1 if self._is_true(block.condition) else program.partners[index] + 1

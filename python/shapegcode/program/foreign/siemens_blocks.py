@@ -296,11 +296,11 @@ def _word(scan: SiemensScanner) -> Word:
         raise scan.error(f"{scan.rest} where a word would have to begin: an address, a name or a code")
     scan.at = name.end()
     index = indices(scan) if scan.text[scan.at : scan.at + 1] == "[" else ()
-    if _ASSIGNED.match(scan.text, scan.at):
+    address = _ADDRESS.match(scan.text, begin)
+    if _ASSIGNED.match(scan.text, scan.at) and not (address and _ends_before_a_word(address, name, scan.at)):
         return _assigned(scan, name[0], index, begin)
     if index:
         raise scan.error(f"{name[0]}[...] without a value: = and a value would have to follow")
-    address = _ADDRESS.match(scan.text, begin)
     if address is not None and (address.end() >= name.end() or not _is_name(name[0])):
         scan.at = address.end()
         letter, digits = address[1], address[2]
@@ -327,17 +327,13 @@ def _is_name(name: str) -> bool:
     return len(name) > 1 and (name[1].isalpha() or name[1] == "_")
 
 
+def _ends_before_a_word(address: re.Match[str], name: re.Match[str], at: int) -> bool:
+    """Whether the next word begins within what looks like a name: `X10Y=5`."""
+    begins = address.end() < name.end() == at and name.string[address.end()].isalpha()
+    return begins and address[1] in "GMXYZFS" and not _is_name(name[0])
+
+
 def _assigned(scan: SiemensScanner, name: str, index: tuple[Expression, ...], begin: int) -> Word:
-    # `X10Y=5`: an address with its number, and the next word behind it
-    address = _ADDRESS.match(scan.text, begin)
-    if address is not None and not index and address.end() < begin + len(name) and not _is_name(name):
-        letter, digits = address[1], address[2]
-        if letter in "GMXYZFS" and scan.text[address.end()].isalpha():
-            scan.at = address.end()
-            if letter == "G":
-                return Word(f"G{int(digits)}", begin + 1)
-            constant = float(digits)
-            return Word(letter, begin + 1, lambda _scope: constant)
     scan.require("=", "=")
     scan.skip()
     mode = _MODE.match(scan.text, scan.at)

@@ -15,7 +15,7 @@ import numpy as np
 
 from shapegcode.machine import Machine
 from shapegcode.program.foreign import arcs
-from shapegcode.program.foreign.arcs import PLANES, Element, Vector
+from shapegcode.program.foreign.arcs import PLANES, Element, Vector, flat
 from shapegcode.program.foreign.plain import PlainProgram, number_text
 from shapegcode.program.foreign.siemens_expressions import AtColumn, WordError
 
@@ -130,8 +130,9 @@ class SiemensPath:
             self.out.put(text, self.line, self.file)
 
     def note(self, text: str, key: str = "") -> None:
-        """Tell something once."""
-        self.out.note(self.line, text, key)
+        """Tell something once; nothing of an empty text."""
+        if text:
+            self.out.note(self.line, text, key)
 
     # ---- frames and offsets ------------------------------------------------------------------------------------------
 
@@ -154,17 +155,17 @@ class SiemensPath:
             self._plane = plane
             self.put(f"G{plane}")
 
-    def set_offset(self, name: str, written: str) -> None:
+    def set_offset(self, name: str) -> None:
         """Another work offset."""
         if name == self.modes.offset:
             return
         table, before = self.machine.input.work_offsets, self.modes.offset
         self.modes.offset = name
         self.shifted = [True] * 3
-        self.put(written)
+        self.put(offset_word(name))
         if table and before:
             zero = (0.0, 0.0, 0.0)
-            self.at = self.at + np.array(table.get(_table_name(before), zero)) - table.get(_table_name(name), zero)
+            self.at = self.at + np.array(table.get(offset_word(before), zero)) - table.get(offset_word(name), zero)
         else:
             self.at = np.full(3, math.nan)
 
@@ -351,7 +352,7 @@ class SiemensPath:
                     f"{'IJK'[axis]} lies across the plane G{modes.plane}: it would have to be left out", column
                 )
             about[axis] = value if mode == "AC" else here[axis] + value
-        start, centre = arcs.flat(here, modes.plane), arcs.flat(about, modes.plane)
+        start, centre = flat(here, modes.plane), flat(about, modes.plane)
         if given.radius is not None:
             return arcs.by_radius(here, target, given.radius, modes.plane, turn, tolerance)
         if given.angle is not None:
@@ -429,10 +430,7 @@ class SiemensPath:
 
     def _write_part(self, part: Element, moved: list[bool], exact: str, feed: float, time_min: float) -> None:
         """One block of constant feed; with a time its feed is that which takes it between the rounded ends."""
-        first, second, _ = PLANES[part.plane]
-        count = 1
-        if part.centre is not None:
-            count = 1 if abs(part.sweep_rad) <= _MAX_SWEEP else math.ceil(abs(part.sweep_rad) / math.pi)
+        count = 1 if abs(part.sweep_rad) <= _MAX_SWEEP else math.ceil(abs(part.sweep_rad) / math.pi)
         for k in range(count):
             piece = part if count == 1 else part.part(k / count, (k + 1) / count)
             start, end = self._grid(piece.start), self._grid(piece.end)
@@ -441,15 +439,15 @@ class SiemensPath:
                 if length == 0.0:
                     continue
                 feed = length * count / time_min
-            radius = math.inf if piece.centre is None else math.hypot(*(piece.start - piece.centre)[[first, second]])
-            if piece.centre is None or radius * abs(piece.sweep_rad) < 3.0 * self._increment:
-                self.put(f"{exact}G01{self._axes(piece.end, moved)}{self._feed_word(feed)}")
-                continue
-            centre = _between(piece.centre, start, end, first, second)
-            words = "".join(
-                f"{'IJK'[k]}{number_text(round(float(centre[k] - start[k]), 5))}" for k in sorted((first, second))
-            )
-            code = "G03" if piece.sweep_rad > 0.0 else "G02"
+            words, code = "", "G01"
+            if piece.centre is not None:
+                begin, centre = flat(piece.start, piece.plane), flat(piece.centre, piece.plane)
+                if abs(begin - centre) * abs(piece.sweep_rad) >= 3.0 * self._increment:
+                    code = "G03" if piece.sweep_rad > 0.0 else "G02"
+                    begin = flat(start, piece.plane)
+                    spoke = _between(centre, begin, flat(end, piece.plane)) - begin
+                    parts = sorted(zip(PLANES[piece.plane], (spoke.real, spoke.imag), strict=False))
+                    words = "".join(f"{'IJK'[k]}{number_text(round(part, 5))}" for k, part in parts)
             self.put(f"{exact}{code}{self._axes(piece.end, moved)}{words}{self._feed_word(feed)}")
 
     def _pieces(self, element: Element, given: Given, known: bool) -> list[tuple[float, float, float, float]]:
@@ -556,27 +554,20 @@ class SiemensPath:
             self.out.put(text, line, file)
 
 
-def _between(centre: Vector, start: Vector, end: Vector, first: int, second: int) -> Vector:
+def _between(centre: complex, start: complex, end: complex) -> complex:
     """The centre as near as possible that has both rounded ends at one radius; itself where that is far."""
-    plane = [first, second]
-    chord = end[plane] - start[plane]
-    size = float(np.hypot(*chord))
-    if size < 0.01:
+    if abs(end - start) < 0.01:
         return centre
-    along = chord / size
-    off = float((centre[plane] - 0.5 * (start[plane] + end[plane])) @ along)
-    if abs(off) > 0.002:
-        return centre
-    moved = centre.copy()
-    moved[plane] = centre[plane] - off * along
-    return moved
+    along = (end - start) / abs(end - start)
+    off = ((centre - 0.5 * (start + end)) * along.conjugate()).real
+    return centre if abs(off) > 0.002 else centre - off * along
 
 
 def _code(motion: str) -> str:
     return f"{motion[0]}{int(motion[1:]):02d}"
 
 
-def _table_name(offset: str) -> str:
-    """How the table of the machine file calls a work offset."""
-    number = int(offset[1:])
-    return offset if number < 500 else f"G54.1P{number - 500 or 300}"
+def offset_word(name: str) -> str:
+    """A settable frame as FANUC's work offset: G505 is G54.1P5, G500 (no offset of its own) G54.1P300."""
+    code = int(name[1:])
+    return name if code < 500 else f"G54.1P{code - 500 or 300}"

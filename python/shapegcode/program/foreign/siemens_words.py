@@ -11,19 +11,16 @@ import re
 import tomllib
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.foreign.plain import number_text
 from shapegcode.program.foreign.siemens_blocks import SiemensBlock, Word
-from shapegcode.program.foreign.siemens_expressions import Value, WordError, number, whole
-from shapegcode.program.foreign.siemens_path import Given, SiemensFrame, SiemensModes, SiemensPath
+from shapegcode.program.foreign.siemens_expressions import Scope, Value, WordError, number, whole
+from shapegcode.program.foreign.siemens_path import Given, SiemensFrame, SiemensModes, SiemensPath, offset_word
 from shapegcode.program.stamp import plain_comment
-
-if TYPE_CHECKING:
-    from shapegcode.program.foreign.siemens_expressions import Scope
 
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _CENTRES = {"I": 0, "J": 1, "K": 2}
@@ -54,11 +51,8 @@ def _tables() -> tuple[dict[str, str], dict[str, str], dict[re.Pattern[str], str
     return words, addresses, {re.compile(pattern): reason for pattern, reason in tables["refused"].items()}
 
 
-class Run(Protocol):
+class Run(Scope, Protocol):
     """What words need of the program that holds them."""
-
-    def value_of(self, name: str, index: tuple[Value, ...], column: int) -> Value:
-        """As a scope has it."""
 
     def knows(self, name: str) -> bool:
         """Whether something can be set by this name."""
@@ -76,7 +70,6 @@ class BlockWords:
     def __init__(self, path: SiemensPath, run: Run, *, uses_m6: bool) -> None:
         """Begin without a tool."""
         self.path, self._run = path, run
-        self._scope: Scope = run
         self._uses_m6 = uses_m6
         self._tool, self._next_tool, self._edge, self._next_edge = 0, 0, -1, -1
         self._tools: dict[str, int] = {}
@@ -103,7 +96,7 @@ class BlockWords:
         now = self.path.modes
         self.path.set_plane(modes.plane)
         if modes.offset and modes.offset != now.offset:
-            self.path.set_offset(modes.offset, _offset_word(modes.offset))
+            self.path.set_offset(modes.offset)
         self.path.set_frame(modes.frame)
         self.path.modes = modes
 
@@ -170,14 +163,14 @@ class BlockWords:
 
     def _number(self, word: Word) -> float:
         assert word.value is not None
-        return float(number(word.value(self._scope), word.column))
+        return float(number(word.value(self._run), word.column))
 
     def _length(self, word: Word) -> float:
         return self._number(word) * self.path.modes.unit
 
     def _whole(self, word: Word) -> int:
         assert word.value is not None
-        return whole(word.value(self._scope), word.name, word.column)
+        return whole(word.value(self._run), word.name, word.column)
 
     # ---- codes -------------------------------------------------------------------------------------------------------
 
@@ -204,12 +197,12 @@ class BlockWords:
         elif name in ("G60", "G64", "G641", "G642", "G643", "G644", "G645"):
             self._path_control(name)
         elif re.fullmatch(r"G5[4-7]|G500|G50[5-9]|G5[1-9]\d", name):
-            self.path.set_offset(name, _offset_word(name))
+            self.path.set_offset(name)
             if int(name[1:]) >= 500:
-                self.path.names[_offset_word(name)] = name
-                self.path.note(f"{name} is written as {_offset_word(name)}", name)
+                self.path.names[offset_word(name)] = name
+                self.path.note(f"{name} is written as {offset_word(name)}", name)
         elif name in _tables()[0]:
-            self._leave_out(_tables()[0][name])
+            self.path.note(_tables()[0][name])
         elif name not in ("RET",):
             raise self._refusal(word)
 
@@ -220,10 +213,6 @@ class BlockWords:
             self.path.put(code)
         if name not in ("G60", "G64"):
             self.path.note("G641 to G645 are read as G64: by how much the control rounds corners is its own", "G641")
-
-    def _leave_out(self, told: str) -> None:
-        if told:
-            self.path.note(told)
 
     def _refusal(self, word: Word) -> WordError:
         for pattern, reason in _tables()[2].items():
@@ -241,7 +230,7 @@ class BlockWords:
         name, modes = word.name, self.path.modes
         assert word.value is not None
         if self._run.knows(name):
-            self._run.assign(word, word.value(self._scope))
+            self._run.assign(word, word.value(self._run))
         elif name in _AXES:
             given.axes[_AXES[name]] = (self._length(word), word.mode, word.column)
         elif name in _CENTRES or name in _MIDDLES:
@@ -262,7 +251,7 @@ class BlockWords:
         elif name in _ROTARY:
             rotary[name] = self._number(word)
         elif name in _tables()[1]:
-            self._leave_out(_tables()[1][name])
+            self.path.note(_tables()[1][name])
         else:
             raise self._unknown(word)
 
@@ -369,7 +358,7 @@ class BlockWords:
 
     def _select_tool(self, word: Word) -> None:
         assert word.value is not None
-        value = word.value(self._scope)
+        value = word.value(self._run)
         if isinstance(value, str):
             if value not in self._tools:
                 self._tools[value] = 901 + len(self._tools)
@@ -505,19 +494,13 @@ class BlockWords:
     def _called(self, words: tuple[Word, ...]) -> None:
         word = words[0]
         if word.given and word.given[0] is not None and len(words) == 1:
-            name = word.given[0](self._scope)
+            name = word.given[0](self._run)
             if isinstance(name, str):
                 self._run.call_named(name, word)
                 return
         raise word.error(
             f'{word.name}: the name of a program in quotes and brackets would have to follow: {word.name}("NAME")'
         )
-
-
-def _offset_word(name: str) -> str:
-    """A settable frame as FANUC's work offset: G505 is G54.1P5, G500 (no offset of its own) G54.1P300."""
-    code = int(name[1:])
-    return name if code < 500 else f"G54.1P{code - 500 or 300}"
 
 
 def _frame_of(kind: str, values: dict[str, float], plane: int, column: int) -> SiemensFrame:
