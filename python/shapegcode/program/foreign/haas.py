@@ -31,7 +31,6 @@ _REFUSED: Mapping[str, str] = {
 }  # fmt: skip
 _CYCLES = frozenset(("73", "74", "81", "82", "83", "84", "85", "86", "89"))
 _CALL_BASE = 90_000_000  # O numbers of the subprograms that M97 calls, by their N number
-_EXTRA_OFFSETS = range(110, 130)
 
 _NOT_THE_SAME = re.compile(
     r"[;GMFP](?:(?<=;)|(?<=G)[ \t]*(?:0*4(?![\d.])"
@@ -47,7 +46,7 @@ _P = re.compile(r"P[ \t]*([#\[]|[-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
 _INTEGER_F = re.compile(r"F[ \t]*([-+]?\d+)(?![\d.])", re.IGNORECASE)
 _LEFT_OUT = re.compile(r"G[ \t]*(103|187)(?![\d.])((?:[ \t]*[PE][ \t]*[\d.]+)*)", re.IGNORECASE)
 _OFFSET = re.compile(r"G[ \t]*154[ \t]*P[ \t]*(\d+)", re.IGNORECASE)
-_OLD_OFFSET = re.compile(r"G[ \t]*(1[12]\d)(?![\d.])", re.IGNORECASE)
+_OLD_OFFSET = re.compile(r"G[ \t]*(1[12]\d)(?![\d.])", re.IGNORECASE)  # G110 ... G129 are G154 P1 ... P20
 _M97 = re.compile(r"M[ \t]*0*97[ \t]*P[ \t]*(\d+)((?:[ \t]*L[ \t]*\d+)?)", re.IGNORECASE)
 _M98 = re.compile(r"M[ \t]*0*98(?!\d)", re.IGNORECASE)
 _PROGRAM = re.compile(r"P[ \t]*(?:\d{5,}(?![ \t]*\d)|#\d+|\[[^\]]*\])", re.IGNORECASE)
@@ -154,7 +153,7 @@ def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
         note(f"G{match[1]}", f"G{match[1]} {what}: no path, and left out here; no model of it acts on the time")
     words = _LEFT_OUT.sub("", words)
     words = _OFFSET.sub(r"G54.1P\1", words)
-    words = _OLD_OFFSET.sub(lambda match: _old_offset(match[1], match[0]), words)
+    words = _OLD_OFFSET.sub(lambda match: f"G54.1P{int(match[1]) - 109}", words)
     words = _M97.sub(lambda match: f"M98P{_CALL_BASE + int(match[1])}{match[2].strip() or 'L1'}", words)
     if (unread := _UNREAD_M97.search(words)) is not None:
         raise ValueError(f"{unread[0]} takes an N number right behind it (M97 P1000): it is not read otherwise")
@@ -178,7 +177,7 @@ def _refuse(codes: list[str], code: str) -> None:
     for name in codes:
         if name in _REFUSED:
             raise ValueError(f"G{name} is {_REFUSED[name]} on a Haas: it is not read")
-        if name not in _AS_FANUC and name not in {"103", "154", "187"} and not _is_old_offset(name):
+        if name not in _AS_FANUC and not re.fullmatch(r"103|154|187|1[12]\d", name):
             raise ValueError(f"G{name}: no text was found that says what it is on a Haas: it is not read")
     if (feed := _INTEGER_F.search(code)) is not None:
         value = int(feed[1])
@@ -195,15 +194,6 @@ def _refuse(codes: list[str], code: str) -> None:
         )
     if "10" in codes and re.search(r"L[ \t]*2(?!\d)", code, re.IGNORECASE) and re.search(r"P[ \t]*0+(?!\d)", code):
         raise ValueError("G10 L2 P0 sets the origin of G52 on a Haas, and an external offset on FANUC: it is not read")
-
-
-def _is_old_offset(name: str) -> bool:
-    return name.isdigit() and int(name) in _EXTRA_OFFSETS
-
-
-def _old_offset(number: str, otherwise: str) -> str:
-    """G110 ... G129 are G154 P1 ... P20."""
-    return f"G54.1P{int(number) - 109}" if int(number) in _EXTRA_OFFSETS else otherwise
 
 
 def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) -> str:

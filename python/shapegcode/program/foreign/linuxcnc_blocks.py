@@ -5,21 +5,16 @@ Order of execution: LinuxCNC's G-code overview, "G-Code Order of Execution".
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from shapegcode.program.foreign.arcs import centre_by_radius, sweep_of
-from shapegcode.program.foreign.linuxcnc_codes import (
-    SYSTEMS,
-    by_group_of,
-    refuse_codes,
-    refuse_unused,
-    sorted_words,
-)
+from shapegcode.program.foreign.linuxcnc_codes import SYSTEMS, by_group_of, refuse_unused, sorted_words
 from shapegcode.program.foreign.linuxcnc_cycles import drill
 from shapegcode.program.foreign.linuxcnc_offsets import Offsets
-from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, plane_axes, system_words, words_of
-from shapegcode.program.foreign.plain import PlainProgram, number_text
+from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, given_axes, plane_axes, system_words
+from shapegcode.program.foreign.plain import PlainProgram, number_text, words_of
 
 _BEFORE_MOTION = (6, 19, 3, 4, 5, 7, 8, 9, 48, 49)
 _STOPS = (0, 1, 2, 30, 60)
@@ -56,17 +51,13 @@ class BlockRunner:
     def run(self, words: Sequence[tuple[str, float]], comments: Sequence[str]) -> None:
         """Execute a block."""
         codes, functions, values = sorted_words(words)
-        refuse_codes(codes, functions, values)
-        by_group = by_group_of(codes)
+        by_group = by_group_of(codes, functions, values)
         refuse_unused(self.state.modes, by_group, functions, values)
         for text in filter(None, map(_plain_comment, comments)):
             self.put(f"({text})")
         if not words:
             return
-        modes = self.state.modes
-        before = modes.feed_mode
-        modes.feed_mode = by_group.get("feed", before)
-        self._feed(values, changed=modes.feed_mode != before)
+        self._feed(by_group.get("feed"), values)
         self._functions(functions, values)
         if "dwell" in by_group:
             self._dwell(values)
@@ -77,11 +68,16 @@ class BlockRunner:
     def sync(self) -> None:
         """Before lines that are taken as they are: G90 or G91 and F are in force in the plain program too."""
         modes = self.state.modes
-        if self.written_distance != modes.distance:
-            self.put(f"G{modes.distance // 10}")
-            self.written_distance = modes.distance
+        if code := self._distance(modes.distance):
+            self.put(code)
         if self.written_feed != modes.feed and modes.feed > 0.0 and modes.feed_mode != 930:
             self.put(self._written_f())
+
+    def _distance(self, code: int) -> str:
+        """G90 or G91, where the plain program has the other one; it has this from then on."""
+        changes = self.written_distance != code
+        self.written_distance = code
+        return f"G{code // 10}" if changes else ""
 
     def _written_f(self) -> str:
         """F of the mode in force, which the plain program has from then on."""
@@ -90,10 +86,10 @@ class BlockRunner:
 
     # ---- what comes before the move --------------------------------------------------------------------------
 
-    def _feed(self, values: Mapping[str, float], *, changed: bool) -> None:
+    def _feed(self, mode: int | None, values: Mapping[str, float]) -> None:
         modes = self.state.modes
-        if changed:
-            modes.feed = self.written_feed = 0.0
+        if mode not in {None, modes.feed_mode}:
+            modes.feed_mode, modes.feed, self.written_feed = mode or 0, 0.0, 0.0
         if "f" in values:
             if values["f"] < 0.0:
                 raise ValueError(f"F{values['f']:g} is negative")
@@ -126,10 +122,8 @@ class BlockRunner:
             elif function in _KEPT_OUTPUTS:
                 self.note(f"M{function} ({_KEPT_OUTPUTS[function]}) moves nothing and is left out", f"M{function}")
             elif 100 <= function <= 199:
-                self.note(
-                    f"M{function} runs a program of the machine's own: it is kept without P and Q", f"M{function}"
-                )
                 line.append(f"M{function}")
+                self.note(f"{line[-1]} runs a program of the machine's own: it is kept without P and Q", line[-1])
         for start in range(0, len(line), 3):  # no more M codes in a block than every FANUC control takes
             self.put("".join(line[start : start + 3]))
 
@@ -256,18 +250,17 @@ class BlockRunner:
             raise ValueError("a drilling cycle in G93")
         feed = self._written_f() if modes.feed > 0.0 else ""
         self.written_motion = None
-        lines = [*self._holes(values, fresh=fresh)]
-        if self.written_distance != 900:
-            self.put("G90")
-            self.written_distance = 900
+        lines = list(self._holes(values, fresh=fresh))
+        if code := self._distance(900):
+            self.put(code)
         for index, line in enumerate(lines):
             self.put(line + (feed if index == 0 or line.startswith("G01") else ""))
 
     def _holes(self, values: Mapping[str, float], *, fresh: bool) -> Iterator[str]:
         """The lines of a block of a cycle; with polar words each repetition goes on from the hole before it."""
-        polar = "@" in values or "^" in values
-        times = int(values.get("l", 1.0)) if polar else 1
-        if polar:
+        times = 1
+        if "@" in values or "^" in values:
+            times = int(values.get("l", 1.0))
             values = {letter: value for letter, value in values.items() if letter != "l"}
         for time in range(times):
             yield from drill(self.state, self.state.modes.motion, self._cartesian(values), fresh and time == 0)
@@ -288,24 +281,16 @@ class BlockRunner:
                 return
         incremental = modes.distance == 910 and not machine
         start = [*state.position]
-        for axis in range(3):
-            if (given := values.get(AXES[axis])) is not None:
-                here = state.position[axis]
-                state.position[axis] = (
-                    given * state.unit_mm if not incremental else None if here is None else here + given * state.unit_mm
-                )
-        head = [*codes]
-        wanted = 910 if incremental else 900
-        if self.written_distance != wanted:
-            head.append(f"G{wanted // 10}")
-            self.written_distance = wanted
-        head.append(f"G{modes.motion // 10:02d}")
+        for axis in given_axes(values):
+            here, given = state.position[axis], values[AXES[axis]] * state.unit_mm
+            state.position[axis] = given if not incremental else None if here is None else here + given
+        head = f"{''.join(codes)}{self._distance(910 if incremental else 900)}G{modes.motion // 10:02d}"
         self.written_motion = modes.motion
         if modes.motion < 20:
-            self.put("".join(head) + words_of(values, "xyzabc") + self._feed_word(values))
+            self.put(head + words_of(values, "xyzabc") + self._feed_word(values))
         else:
             first, *others = self._arc(values, start, incremental=incremental)
-            for block in ("".join(head) + first, *others):
+            for block in (head + first, *others):
                 self.put(block)
 
     def _feed_word(self, values: Mapping[str, float]) -> str:
@@ -329,17 +314,17 @@ class BlockRunner:
         if x is None or y is None:
             raise ValueError("the position of X and Y is not known, from which @ and ^ go on")
         unit = state.unit_mm
-        radius, angle = math.hypot(x, y) / unit, math.degrees(math.atan2(y, x))
+        here, incremental = complex(x, y) / unit, state.modes.distance == 910
+        radius, angle = abs(here), math.degrees(cmath.phase(here))
         if radius == 0.0 and "^" not in values:
             raise ValueError("a polar radius @ without an angle ^ at the origin")
-        if state.modes.distance == 910:
+        if incremental:
             radius, angle = radius + values.get("@", 0.0), angle + values.get("^", 0.0)
         else:
             radius, angle = values.get("@", radius), values.get("^", angle)
-        to = radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle))
-        if state.modes.distance == 910:
-            to = to[0] - x / unit, to[1] - y / unit
-        return {**{letter: value for letter, value in values.items() if letter not in "@^"}, "x": to[0], "y": to[1]}
+        to = cmath.rect(radius, math.radians(angle)) - (here if incremental else 0.0)
+        others = {letter: value for letter, value in values.items() if letter not in "@^"}
+        return {**others, "x": to.real, "y": to.imag}
 
     def _arc(self, values: Mapping[str, float], start: Sequence[float | None], *, incremental: bool) -> list[str]:
         """Words of an arc and its F: one block, and one more for each further full turn."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.foreign.linuxcnc_tools import ToolTable
-from shapegcode.program.foreign.plain import number_text
 
 AXES = "xyz"
 CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
@@ -125,8 +124,3 @@ def system_words(system: int) -> str:
 def given_axes(values: Mapping[str, float]) -> list[int]:
     """Indices of the linear axes among words."""
     return [axis for axis in range(3) if AXES[axis] in values]
-
-
-def words_of(values: Mapping[str, float], letters: str = AXES) -> str:
-    """Those of these letters in FANUC's words, in the order of the letters."""
-    return "".join(f"{letter.upper()}{number_text(values[letter])}" for letter in letters if letter in values)

@@ -129,6 +129,11 @@ def number_text(value: float) -> str:
     return "0." if text in {"0.", "-0."} else text
 
 
+def words_of(values: Mapping[str, float], letters: str = "xyz") -> str:
+    """Values of these letters as words of the plain program, in the order of the letters."""
+    return "".join(f"{letter.upper()}{number_text(values[letter])}" for letter in letters if letter in values)
+
+
 def refusal(file: str, line: int, message: str) -> ProgramError:
     """The error that refuses a line of the source, from 1; what is wrong there, and what would help."""
     return located_error(file, line, 1, message)
