@@ -15,8 +15,7 @@ from shapegcode.errors import ProgramError, located_error
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.foreign.plain import ForeignProgram
-from shapegcode.program.foreign.read import foreign_program
-from shapegcode.program.foreign.recognize import CONTROLS, LOOKED_AT_BYTES, doubtful_word
+from shapegcode.program.foreign.read import CONTROLS, LOOKED_AT_BYTES, doubtful_word, foreign_program
 from shapegcode.program.reading import Reading, given_text, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict

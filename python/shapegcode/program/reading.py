@@ -17,8 +17,7 @@ from shapegcode.io.atomic import named_errors
 from shapegcode.io.data_file import open_file
 from shapegcode.program.computer import require_memory
 from shapegcode.program.foreign.plain import program_folders
-from shapegcode.program.foreign.read import refuse_words_behind_semicolon
-from shapegcode.program.foreign.recognize import COMMENT, LOOKED_AT_BYTES
+from shapegcode.program.foreign.read import COMMENT, LOOKED_AT_BYTES, refuse_words_behind_semicolon
 from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:

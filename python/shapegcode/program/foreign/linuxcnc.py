@@ -19,8 +19,7 @@ from shapegcode.program.foreign.linuxcnc_cycles import PECK_CLEARANCE_MM
 from shapegcode.program.foreign.linuxcnc_expression import Block, Scanner, evaluate, read_block, without_comments
 from shapegcode.program.foreign.linuxcnc_parameters import MAX_ARGUMENTS, Frame, ParameterTable
 from shapegcode.program.foreign.linuxcnc_source import KEYWORDS, OLine, SourceFile, subroutine_file
-from shapegcode.program.foreign.linuxcnc_state import Modes, State, normal_axis
-from shapegcode.program.foreign.linuxcnc_tools import find_tool_table
+from shapegcode.program.foreign.linuxcnc_state import Modes, State, find_tool_table, normal_axis
 from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram, program_folders, refusal
 
 if TYPE_CHECKING:

@@ -281,8 +281,7 @@ class _Run:
         if kind == "ENDFOR":
             begin = program.starts[index]
             head = program.block(begin)
-            counter = self.value_of(head.name, tuple(each(self) for each in head.index), head.column)
-            self._set_counter(head, number(counter, head.column) + 1)
+            self._set_counter(head, self._counter(head) + 1)
             return begin + 1 if self._counts_on(head) else index + 1
         if kind == "JUMPS":
             for jump in block.jumps:
@@ -309,10 +308,12 @@ class _Run:
             raise block.error(f"{block.name} of FOR is no variable of this program: DEF would have to define it before")
         self.assign(Word(block.name, block.column, None, "", block.index), value)
 
+    def _counter(self, block: SiemensBlock) -> float | int:
+        return number(self.value_of(block.name, tuple(each(self) for each in block.index), block.column), block.column)
+
     def _counts_on(self, block: SiemensBlock) -> bool:
         assert block.condition is not None
-        now = number(self.value_of(block.name, tuple(each(self) for each in block.index), block.column), block.column)
-        end = number(block.condition(self), block.column)
+        now, end = self._counter(block), number(block.condition(self), block.column)
         return is_equal(now, end) or now < end
 
     def _define(self, block: SiemensBlock) -> None:
