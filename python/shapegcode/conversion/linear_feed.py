@@ -242,6 +242,10 @@ class _JoinedBlocks:
         """Periods at whose ends blocks end."""
         return [self._knots[block.last + 1] for block in blocks]
 
+    def _time_s(self, at: int, end: int) -> float:
+        """Of the blocks from one to the one before another."""
+        return (self._knots[end] - self._knots[at]) * self._period
+
     def _speed_at(self, knot: int) -> float:
         """Of the command, from the periods beside."""
         m = self._knots[knot]
@@ -266,7 +270,7 @@ class _JoinedBlocks:
         before, behind = self._speed_at(at), self._speed_at(at + 1)
         is_short = self._knots[at + 1] - self._knots[at] == 1
         if is_short and abs(behind - before) * self._period > 2.0 * self._tolerance:
-            shape, whole_s = self._shape(at, at + 1), (self._knots[at + 1] - self._knots[at]) * self._period
+            shape, whole_s = self._shape(at, at + 1), self._time_s(at, at + 1)
             start = _written(before + self._bias(at, at + 1)) if at else 0.0
             end = None if shape is None else end_speed(shape.length_mm, start, whole_s - late_s)
             if shape is not None and end is not None and (last := _written(end)) > 0.0:
@@ -282,7 +286,7 @@ class _JoinedBlocks:
 
     def _constant(self, at: int, late_s: float) -> tuple[LinearBlock, float]:
         """The block as it was; it makes up for what the one before was late."""
-        segment, whole_s = self._segments[at], (self._knots[at + 1] - self._knots[at]) * self._period
+        segment, whole_s = self._segments[at], self._time_s(at, at + 1)
         feed = round(segment.length_mm / (whole_s - late_s) * 60.0, 4)
         radius = segment.radius_mm if segment.sweep_rad else 0.0
         block = LinearBlock(
@@ -300,7 +304,7 @@ class _JoinedBlocks:
         for end in range(at + 1, min(at + 4, len(self._segments))):
             # From rest: the speed that leads to that of the command.
             shape = self._shape(at, end)
-            time_s = (self._knots[end] - self._knots[at]) * self._period - late_s
+            time_s = self._time_s(at, end) - late_s
             start = None if shape is None else end_speed(shape.length_mm, self._speed_at(end), time_s)
             if start is not None and start > 0.0 and _written(start) > 0.0:
                 block, late = self._block(at, end, _written(start), late_s, sets_feed=True)
@@ -325,7 +329,7 @@ class _JoinedBlocks:
     ) -> tuple[LinearBlock | None, float]:
         """A block between two ends, if its motion stays within the tolerance, and how late it ends."""
         shape = self._shape(at, end)
-        whole_s = (self._knots[end] - self._knots[at]) * self._period
+        whole_s = self._time_s(at, end)
         time_s = whole_s - late_s
         if shape is None or (exact := end_speed(shape.length_mm, speed, time_s)) is None:
             return None, 0.0

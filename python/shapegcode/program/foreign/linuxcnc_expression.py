@@ -76,39 +76,30 @@ _OPERATORS: dict[str, tuple[int, Callable[[float, float], float]]] = {
 }
 
 
-def _inverse(name: str, function: Callable[[float], float]) -> Callable[[float], float]:
+def _of_some(name: str, must: str, function: Callable[[float], float]) -> Callable[[float], float]:
+    """A function that has no value for every number: then Python's raises."""
+
     def checked(value: float) -> float:
-        if not -1.0 <= value <= 1.0:
-            raise ValueError(f"{name} of {value:g}: it must be -1 to 1")
-        return math.degrees(function(value))
+        try:
+            return function(value)
+        except ValueError:
+            raise ValueError(f"{name} of {value:g}: it must {must}") from None
 
     return checked
 
 
-def _logarithm(value: float) -> float:
-    if value <= 0.0:
-        raise ValueError(f"LN of {value:g}: it must be positive")
-    return math.log(value)
-
-
-def _root(value: float) -> float:
-    if value < 0.0:
-        raise ValueError(f"SQRT of {value:g}: it must not be negative")
-    return math.sqrt(value)
-
-
 _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "abs": abs,
-    "acos": _inverse("ACOS", math.acos),
-    "asin": _inverse("ASIN", math.asin),
+    "acos": _of_some("ACOS", "be -1 to 1", lambda value: math.degrees(math.acos(value))),
+    "asin": _of_some("ASIN", "be -1 to 1", lambda value: math.degrees(math.asin(value))),
     "cos": lambda value: math.cos(value * math.pi / 180.0),
     "exp": math.exp,
     "fix": lambda value: float(math.floor(value)),
     "fup": lambda value: float(math.ceil(value)),
-    "ln": _logarithm,
+    "ln": _of_some("LN", "be positive", math.log),
     "round": lambda value: float(int(value + (0.5 if value >= 0.0 else -0.5))),
     "sin": lambda value: math.sin(value * math.pi / 180.0),
-    "sqrt": _root,
+    "sqrt": _of_some("SQRT", "not be negative", math.sqrt),
     "tan": lambda value: math.tan(value * math.pi / 180.0),
 }
 

@@ -72,29 +72,21 @@ class PlainProgram:
 
     def put(self, text: str, line: int, file: int = 0) -> None:
         """Add one line; `file`: 0 the source, n the n-th of `names`."""
-        self._keep_up(line, file)
-        self._parts.append(text + "\n")
-        self.size += len(text) + 1
-        self._lines.append(line)
-        self._files.append(file)
+        self.put_lines(text + "\n", line, file)
 
     def put_lines(self, text: str, first_line: int, file: int = 0) -> None:
         """Add lines of the source as they are, each with its line end."""
-        self._keep_up(first_line, file)
+        missing = first_line - 1 - len(self._lines)
+        if file == 0 and missing > 0:  # blank ones, so that a line keeps its number as long as that is possible
+            self._add("\n" * missing, len(self._lines) + 1, file)
+        self._add(text, first_line, file)
+
+    def _add(self, text: str, first_line: int, file: int) -> None:
         count = text.count("\n")
         self._parts.append(text)
         self.size += len(text)
         self._lines.extend(range(first_line, first_line + count))
         self._files.extend([file] * count)
-
-    def _keep_up(self, line: int, file: int) -> None:
-        """Blank lines, so that a line has the number that it has in the source, as long as that is possible."""
-        missing = line - 1 - len(self._lines)
-        if file == 0 and missing > 0:
-            self._parts.append("\n" * missing)
-            self.size += missing
-            self._files.extend([0] * missing)
-            self._lines.extend(range(len(self._lines) + 1, line))
 
     def note(self, line: int, text: str, key: str = "") -> None:
         """Tell something once: of two notes with one key (empty: the text itself) the first counts."""

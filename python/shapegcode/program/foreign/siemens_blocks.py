@@ -158,24 +158,15 @@ def _statement(scan: SiemensScanner, name: str, block: SiemensBlock) -> SiemensB
     if _JUMP.fullmatch(name):
         scan.at = begin
         return replace(block, kind="JUMPS", jumps=_jumps(scan, None))
-    if name == "CASE":
-        return _case(scan, block)
-    if name == "FOR":
-        return _for(scan, block)
-    if name == "REPEAT":
-        return _repeat(scan, block)
     if name == "DEF":
         return replace(block, kind="DEF", definitions=_definitions(scan))
-    if name == "PROC":
-        return _procedure(scan, block)
-    if name in _SYNCHRONOUS:
-        scan.at = len(scan.text)
-        return replace(block, words=(Word(name, begin + 1),))
-    if name == "EXTERN":
-        scan.at = len(scan.text)
-        return replace(block, kind="EXTERN")
-    scan.at = begin
-    return None
+    if (read := _READERS.get(name)) is not None:
+        return read(scan, block)
+    if name not in {"EXTERN", *_SYNCHRONOUS}:
+        scan.at = begin
+        return None
+    scan.at = len(scan.text)
+    return replace(block, kind="EXTERN") if name == "EXTERN" else replace(block, words=(Word(name, begin + 1),))
 
 
 def _jumps(scan: SiemensScanner, condition: Expression | None) -> tuple[Jump, ...]:
@@ -280,6 +271,9 @@ def _procedure(scan: SiemensScanner, block: SiemensBlock) -> SiemensBlock:
     saves = _WORD["SAVE"].search(scan.text, scan.at) is not None
     scan.at = len(scan.text)  # attributes of the display: DISPLOF, SBLOF ...
     return replace(block, kind="PROC", name=name, definitions=tuple(found), saves=saves)
+
+
+_READERS = {"CASE": _case, "FOR": _for, "REPEAT": _repeat, "PROC": _procedure}
 
 
 def _words(scan: SiemensScanner) -> tuple[Word, ...]:

@@ -182,17 +182,15 @@ class SiemensPath:
         if given.polar:
             if set(given.polar) != {"AP", "RP"}:
                 raise given.error(f"G{code} with {' and '.join(given.polar)} alone: AP= and RP= would have to be given")
-            angle = math.radians(given.polar["AP"][0])
-            step = given.polar["RP"][0] * np.array([math.cos(angle), math.sin(angle)])
+            step = cmath.rect(given.polar["RP"][0], math.radians(given.polar["AP"][0]))
         elif {first, second} <= given.axes.keys():
-            step = np.array([given.axes[first][0], given.axes[second][0]])
+            step = complex(given.axes[first][0], given.axes[second][0])
         else:
             raise given.error(f"G{code}: both axes of the plane would have to be given, or AP= and RP=")
         origin = {110: self.modes.frame.undo(self.at), 111: np.zeros(3), 112: self.pole}[code]
         if not np.all(np.isfinite(origin[[first, second]])):
             raise given.error(f"G{code}: the position is not known here: the axes would have to be programmed before")
-        self.pole = origin.copy()
-        self.pole[[first, second]] = origin[[first, second]] + step
+        self.pole = arcs.moved_to(origin, self.modes.plane, flat(origin, self.modes.plane) + step)
         self.polar.pop("AP", None)
 
     def quick_move(self, code: str, words: list[tuple[str, str]], feed: str) -> bool:
@@ -281,8 +279,7 @@ class SiemensPath:
         frame = self.modes.frame
         end = frame.apply(target)
         moved = [bool(np.any(np.abs(frame.linear[k, list(given.axes)]) > 1e-12)) for k in range(3)]
-        unknown = [k for k in range(3) if moved[k] and math.isnan(end[k])]
-        if unknown:
+        if any(moved[k] and math.isnan(end[k]) for k in range(3)):
             self._by_distance(given, end, moved)
             return
         still = np.nan_to_num(self.at)  # axes at rest count for nothing
@@ -508,11 +505,10 @@ class SiemensPath:
 
     def _corner_of(self, element: Element, given: Given, known: bool) -> _HeldCorner | None:
         kind, size = given.corner or ("RND", self.modes.rounding_mm)
-        if size == 0.0:
+        is_possible = self.modes.motion != "G0" and known and size > 0.0
+        if size == 0.0 or (given.corner is None and size > 0.0 and not is_possible):
             return None
-        if self.modes.motion == "G0" or not known or size < 0.0:
-            if given.corner is None and size > 0.0:
-                return None
+        if not is_possible:
             raise given.error(
                 f"{kind}={size:g}: it would have to be more than 0, in a block with a feed whose start is known"
             )
