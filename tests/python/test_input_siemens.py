@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import tomllib
 from importlib import resources
@@ -387,6 +388,15 @@ def test_subprograms(tmp_path: Path) -> None:
     lines = dict(zip(program.text.splitlines(), zip(program.lines, program.line_files, strict=True), strict=True))
     assert [Path(name).name for name in program.files] == ["RECT.SPF", "l10.spf"]
     assert lines["G01Y3."] == (4, 1) and lines["G01X7."] == (1, 2) and lines["G01Y7."] == (15, 0)
+
+
+def test_a_subprogram_is_read_as_far_as_a_program_may_be_long_and_only_from_a_file(tmp_path: Path) -> None:
+    (tmp_path / "LONG.SPF").write_text("G1 X1\n" * 1000)
+    with pytest.raises(OSError, match=r"more than 500 bytes"):
+        read(START + "LONG\nM30\n", {"controller.max_program_bytes": 500}, tmp_path)
+    os.mkfifo(tmp_path / "PIPE.SPF")  # nobody writes to it: it is refused and not waited for
+    with pytest.raises(OSError, match=r"a pipe, not a regular file"):
+        read(START + "PIPE\nM30\n", None, tmp_path)
 
 
 def test_lines_lead_back_to_the_source() -> None:

@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.io.data_file import read_file
 from shapegcode.io.ini import UNITS_MM
 from shapegcode.program.foreign.linuxcnc_blocks import BlockRunner
 from shapegcode.program.foreign.linuxcnc_cycles import PECK_CLEARANCE_MM
@@ -20,13 +19,19 @@ from shapegcode.program.foreign.linuxcnc_expression import Block, Scanner, evalu
 from shapegcode.program.foreign.linuxcnc_parameters import MAX_ARGUMENTS, Frame, ParameterTable
 from shapegcode.program.foreign.linuxcnc_source import KEYWORDS, OLine, SourceFile, subroutine_file
 from shapegcode.program.foreign.linuxcnc_state import Modes, State, find_tool_table, normal_axis
-from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram, program_folders, refusal
+from shapegcode.program.foreign.plain import (
+    ForeignProgram,
+    ForeignSettings,
+    PlainProgram,
+    called_source,
+    program_folders,
+    refusal,
+)
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 _MAX_NESTING = 10  # INTERP_SUB_ROUTINE_LEVELS
-_MAX_FILE_BYTES = 10_000_000
 
 # No word that means another thing on FANUC, and no number with more digits than FANUC's reader takes.
 _NUMBER = r"[-+]?(?=[\d.]{1,9}(?![\d.]))\d*\.?\d*"
@@ -291,8 +296,7 @@ class _Interpreter:
                     f"subroutine O{label} is neither in the file nor is there {name}.ngc beside it or in "
                     "input.program_folders"
                 )
-            most = min(_MAX_FILE_BYTES, self._machine.controller.max_program_bytes)
-            text = read_file(path, most).decode("utf-8-sig", "replace")
+            text = called_source(path, self._machine)
             self._plain.names.append(str(path))
             self._files[label] = SourceFile(str(path), text, len(self._plain.names))
             self._read_lines += self._files[label].count

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.errors import ProgramError, located_error
+from shapegcode.io.data_file import read_file
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
+_MAX_CALLED_BYTES = 10_000_000
 MAX_DIGITS = 8
 """Digits of a word in FANUC's words (alarm 0003)."""
 
@@ -110,6 +112,12 @@ def program_folders(machine: Machine, folder: Path | None) -> list[Path]:
     """Where programs that another one calls are looked for: its own folder first."""
     own = [] if folder is None else [folder]
     return own + [Path(name).expanduser() for name in machine.input.program_folders]
+
+
+def called_source(path: Path, machine: Machine) -> str:
+    """The text of a program that another one calls, as long as it may be."""
+    most = min(_MAX_CALLED_BYTES, machine.controller.max_program_bytes)
+    return read_file(path, most).decode("utf-8-sig", "replace")
 
 
 def number_text(value: float) -> str:

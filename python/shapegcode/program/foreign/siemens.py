@@ -14,7 +14,13 @@ from pathlib import Path
 
 from shapegcode.errors import ProgramError, located_error
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram, program_folders
+from shapegcode.program.foreign.plain import (
+    ForeignProgram,
+    ForeignSettings,
+    PlainProgram,
+    called_source,
+    program_folders,
+)
 from shapegcode.program.foreign.siemens_blocks import (
     Jump,
     ProgramLines,
@@ -60,7 +66,7 @@ class _Run:
         self.machine, self.file = machine, file
         self.out = PlainProgram()
         self.path = SiemensPath(machine, self.out)
-        self._store = _Store(programs_of_source(source, file), program_folders(machine, folder))
+        self._store = _Store(programs_of_source(source, file), machine, folder)
         self.words = BlockWords(self.path, self, uses_m6=_CHANGES_TOOL.search(source) is not None)
         self._r: dict[int, float] = {}
         self._locals: list[dict[str, Variable]] = []
@@ -388,10 +394,10 @@ class _Flow:
 class _Store:
     """Programs of the text, and of files beside it."""
 
-    def __init__(self, programs: list[ProgramLines], folders: list[Path]) -> None:
-        self.main = programs[0]
+    def __init__(self, programs: list[ProgramLines], machine: Machine, folder: Path | None) -> None:
+        self.main, self._machine = programs[0], machine
         self._known: dict[str, ProgramLines | None] = {each.name: each for each in programs}
-        self._folders = folders
+        self._folders = program_folders(machine, folder)
         self._files: Mapping[str, Path] | None = None
 
     def find(self, name: str) -> ProgramLines | None:
@@ -410,6 +416,5 @@ class _Store:
         for known in (f"{name}.SPF", f"{name}.MPF", f"_N_{name}_SPF", f"_N_{name}_MPF"):
             if known in self._files:
                 path = self._files[known]
-                found = programs_of_source(path.read_bytes().decode("utf-8-sig", "replace"), str(path))
-                return replace(found[0], name=name)
+                return replace(programs_of_source(called_source(path, self._machine), str(path))[0], name=name)
         return None
