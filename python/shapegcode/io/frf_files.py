@@ -15,7 +15,14 @@ import numpy as np
 from shapegcode.errors import RecordError
 from shapegcode.io.columns import Label, tap_label
 from shapegcode.io.data_file import open_file
-from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse, checked_lines, scale_of
+from shapegcode.io.frequency_response import (
+    FEWEST_LINES,
+    ComplexArray,
+    FrequencyResponse,
+    checked_lines,
+    frequency_factor,
+    scale_of,
+)
 from shapegcode.io.layout import utf8_text
 from shapegcode.io.record import FloatArray, ReadOptions
 from shapegcode.io.table import TextTable
@@ -81,7 +88,7 @@ def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
     quantity, factor, told = scale_of(table.where, text, options)
     warnings += told
     values_of = _polar(column, said, warnings) if polar else column["real"] + 1j * column["imaginary"]
-    frequency = column["frequency"] * _frequency_factor(said["frequency"])
+    frequency = column["frequency"] * frequency_factor(said["frequency"])
     rows = np.flatnonzero(np.diff(frequency) <= 0.0)
     if rows.size:
         row = int(rows[0]) + 1
@@ -157,12 +164,6 @@ def _places(table: TextTable, header: list[str], options: ReadOptions) -> dict[s
 def _axis(text: str) -> str | None:
     words = re.findall(r"[^\W\d_]+", text.lower())
     return next((word for word in words if word in {"x", "y", "z"}), None)
-
-
-def _frequency_factor(text: str) -> float:
-    if re.search(r"rad", text, re.IGNORECASE):
-        return 1.0 / (2.0 * np.pi)
-    return 1000.0 if re.search(r"khz", text, re.IGNORECASE) else 1.0
 
 
 def _polar(column: dict[str, FloatArray], said: dict[str, str], warnings: list[str]) -> ComplexArray:

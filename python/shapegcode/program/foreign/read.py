@@ -178,7 +178,8 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
         refuse_words_behind_semicolon(data, source)
         return None
     text = data.removeprefix(BOM_UTF8).decode("latin-1")
-    read = _reader(dialect)
+    # Loaded when a program of its dialect is read: most are FANUC's.
+    read: Reader = getattr(import_module(f"shapegcode.program.foreign.{dialect}"), f"read_{dialect}")
     program = read(text, file=source, machine=machine, folder=folder)
     return replace(program, reason=reason)
 
@@ -226,10 +227,3 @@ def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]
     if machine.controller.kind == "linuxcnc":
         return "linuxcnc", "controller.kind = linuxcnc"
     return "fanuc", ""
-
-
-def _reader(dialect: str) -> Reader:
-    """Loaded when a program of its dialect is read: most are FANUC's."""
-    module = import_module(f"shapegcode.program.foreign.{dialect}")
-    reader: Reader = getattr(module, f"read_{dialect}")
-    return reader

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 from shapegcode.errors import ProgramError, located_error
@@ -358,12 +359,11 @@ class _Flow:
         ahead, behind = range(index + 1, count), range(index, -1, -1)
         ways = {"GOTOF": [ahead], "GOTOB": [behind]}.get(jump.command, [ahead, behind])
         around = self.program.depth_path(index)
-        for way in ways:
-            for line in way:
-                if self._is_at(line, jump.target):
-                    inside = self.program.depth_path(line)
-                    if inside == around[: len(inside)]:
-                        return line
+        for line in chain(*ways):
+            if self._is_at(line, jump.target):
+                inside = self.program.depth_path(line)
+                if inside == around[: len(inside)]:
+                    return line
         if jump.command == "GOTOC":
             return index + 1
         where = {"GOTOF": "behind", "GOTOB": "before"}.get(jump.command, "anywhere near")

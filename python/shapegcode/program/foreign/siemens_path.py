@@ -308,7 +308,7 @@ class SiemensPath:
             words += f"{'XYZ'[k]}{self._length(step)}"
         feed = "" if self.modes.motion == "G0" else self._feed_word(self._constant_feed(given, math.nan))
         self.put("G91")
-        self.put(f"{_code(self.modes.motion)}{words}{feed}")
+        self.put(f"{'G00' if self.modes.motion == 'G0' else 'G01'}{words}{feed}")
         self.put("G90")
         self._step = None
         self.moves += 1
@@ -557,10 +557,6 @@ def _between(centre: complex, start: complex, end: complex) -> complex:
     along = (end - start) / abs(end - start)
     off = ((centre - 0.5 * (start + end)) * along.conjugate()).real
     return centre if abs(off) > 0.002 else centre - off * along
-
-
-def _code(motion: str) -> str:
-    return f"{motion[0]}{int(motion[1:]):02d}"
 
 
 def offset_word(name: str) -> str:
