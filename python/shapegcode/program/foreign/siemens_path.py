@@ -76,13 +76,13 @@ class SiemensModes:
 class Given(AtColumn):
     """Words of one block that say where to go; lengths in mm."""
 
-    axes: dict[int, tuple[float, str, int]] = field(default_factory=dict)  # value, AC or IC, column
-    centre: dict[int, tuple[float, str, int]] = field(default_factory=dict)
-    middle: dict[int, tuple[float, str, int]] = field(default_factory=dict)
+    axes: dict[int, tuple[float, bool, int]] = field(default_factory=dict)  # value, whether from the start, column
+    centre: dict[int, tuple[float, bool, int]] = field(default_factory=dict)
+    middle: dict[int, tuple[float, bool, int]] = field(default_factory=dict)
     radius: float | None = None
     angle: float | None = None
     turns: int = 0
-    polar: dict[str, tuple[float, str, int]] = field(default_factory=dict)  # AP, RP
+    polar: dict[str, tuple[float, str, int]] = field(default_factory=dict)  # AP, RP: value, AC or IC, column
     corner: tuple[str, float] | None = None  # RND, CHR, CHF
     start_feed: float | None = None  # that was in force before the block
     has_feed: bool = False
@@ -238,8 +238,7 @@ class SiemensPath:
             self._polar_end(given)
         here = modes.frame.undo(self.at)
         target = here.copy()
-        for axis, (value, mode, column) in given.axes.items():
-            incremental = mode == "IC" or (mode == "" and modes.incremental)
+        for axis, (value, incremental, column) in given.axes.items():
             if incremental and self.shifted[axis]:
                 setting = "a setting (SD42440, SD42442) says whether the control adds that"
                 wanted = "it would have to be programmed absolutely before"
@@ -271,9 +270,9 @@ class SiemensPath:
             raise given.error("AP= and RP=: both would have to be given, here or before")
         angle = math.radians(self.polar["AP"])
         for axis, share in ((first, math.cos(angle)), (second, math.sin(angle))):
-            given.axes[axis] = (self.pole[axis] + self.polar["RP"] * share, "AC", given.column)
+            given.axes[axis] = (self.pole[axis] + self.polar["RP"] * share, False, given.column)
         if self.modes.motion in ("G2", "G3") and not given.centre and given.radius is None:
-            given.centre = {axis: (float(self.pole[axis]), "AC", given.column) for axis in (first, second)}
+            given.centre = {axis: (float(self.pole[axis]), False, given.column) for axis in (first, second)}
 
     def _straight(self, given: Given, target: Vector) -> None:
         frame = self.modes.frame
@@ -343,12 +342,12 @@ class SiemensPath:
             return arcs.tangential(here, target, modes.frame.linear.T @ self.direction, modes.plane)
         turn = 1 if modes.motion == "G3" else -1
         about = here.copy()
-        for axis, (value, mode, column) in given.centre.items():
+        for axis, (value, incremental, column) in given.centre.items():
             if axis not in (first, second):
                 raise WordError(
                     f"{'IJK'[axis]} lies across the plane G{modes.plane}: it would have to be left out", column
                 )
-            about[axis] = value if mode == "AC" else here[axis] + value
+            about[axis] = here[axis] + value if incremental else value
         start, centre = flat(here, modes.plane), flat(about, modes.plane)
         if given.radius is not None:
             return arcs.by_radius(here, target, given.radius, modes.plane, turn, tolerance)
@@ -366,8 +365,7 @@ class SiemensPath:
 
     def _middle(self, given: Given, here: Vector) -> Vector:
         middle = here.copy()
-        for axis, (value, mode, _) in given.middle.items():
-            incremental = mode == "IC" or (mode == "" and self.modes.incremental)
+        for axis, (value, incremental, _) in given.middle.items():
             middle[axis] = here[axis] + value if incremental else value
         if len(given.middle) < 2:
             raise ValueError("CIP: the intermediate point would have to be given by two or three of I1=, J1=, K1=")

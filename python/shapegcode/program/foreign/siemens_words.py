@@ -165,6 +165,9 @@ class BlockWords:
     def _length(self, word: Word) -> float:
         return self._number(word) * self.path.modes.unit
 
+    def _is_incremental(self, word: Word) -> bool:
+        return word.mode == "IC" or (word.mode == "" and self.path.modes.incremental)
+
     def _whole(self, word: Word) -> int:
         assert word.value is not None
         return whole(word.value(self._run), word.name, word.column)
@@ -233,7 +236,7 @@ class BlockWords:
         if self._run.knows(name):
             self._run.assign(word, word.value(self._run))
         elif name in _AXES:
-            given.axes[_AXES[name]] = (self._length(word), word.mode, word.column)
+            given.axes[_AXES[name]] = (self._length(word), self._is_incremental(word), word.column)
         elif name in _CENTRES or name in _MIDDLES:
             self._centre(word, given)
         elif name in ("CR", "AR", "TURN", "AP", "RP"):
@@ -262,8 +265,10 @@ class BlockWords:
         if motion != "CIP" if is_middle else motion not in ("G2", "G3"):
             wanted = "CIP" if is_middle else "G2 or G3"
             raise word.error(f"{word.name} with {motion or 'no G code'}: {wanted} would have to be in force")
-        table, axes = (given.middle, _MIDDLES) if is_middle else (given.centre, _CENTRES)
-        table[axes[word.name]] = (self._length(word), word.mode, word.column)
+        if is_middle:
+            given.middle[_MIDDLES[word.name]] = (self._length(word), self._is_incremental(word), word.column)
+        else:
+            given.centre[_CENTRES[word.name]] = (self._length(word), word.mode != "AC", word.column)
 
     def _round_word(self, word: Word, given: Given) -> None:
         name = word.name
@@ -306,8 +311,8 @@ class BlockWords:
         if self.path.modes.motion != "G0" or given.polar:
             raise given.error(f"{code} with {self.path.modes.motion or 'no G code'}: it is read with G0 and axes alone")
         to: dict[str, float] = {}
-        for axis, (value, mode, column) in given.axes.items():
-            if mode == "IC" or (mode == "" and self.path.modes.incremental):
+        for axis, (value, is_incremental, column) in given.axes.items():
+            if is_incremental:
                 raise WordError(f"{code} incrementally: the axis would have to be programmed absolutely", column)
             to["XYZ"[axis]] = round(value, 5)
         self.path.put(f"G53G00{words_of(to, 'XYZ')}")
@@ -434,7 +439,7 @@ class BlockWords:
             given = Given(column=words[0].column)
             for word in others:
                 if word.name in _AXES and word.value is not None and word.mode != "IC":
-                    given.axes[_AXES[word.name]] = (self._length(word), word.mode, word.column)
+                    given.axes[_AXES[word.name]] = (self._length(word), False, word.column)
                 elif word.name in ("AP", "RP"):
                     value = self._length(word) if word.name == "RP" else self._number(word)
                     given.polar[word.name] = (value, "", word.column)
