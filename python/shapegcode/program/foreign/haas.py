@@ -122,17 +122,11 @@ def _refuse_in_cycles(code: str, file: str) -> None:
         if not cycle or {"10", "65"} & {*codes}:
             continue
         if cycle in {"73", "74", "83", "84"} and (word := _PECKS.search(line)):
-            raise refusal(
-                file,
-                number,
-                f"{word[0][0]} in a drilling cycle changes the pecks or the retract of a Haas, and K counts the holes "
-                "on FANUC: it is not read",
-            )
+            what = "changes the pecks or the retract of a Haas, and K counts the holes on FANUC"
+            raise refusal(file, number, f"{word[0][0]} in a drilling cycle {what}: it is not read")
         if _VARIABLE_P.search(line) and re.search(r"M[ \t]*0*9[789](?!\d)", line) is None:
-            raise refusal(
-                file, number, f"the dwell of G{cycle} by a variable is seconds or milliseconds, as the point of its "
-                "value says"
-            )  # fmt: skip
+            what = f"the dwell of G{cycle} by a variable"
+            raise refusal(file, number, f"{what} is seconds or milliseconds, as the point of its value says")
 
 
 def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
@@ -202,24 +196,21 @@ def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) 
     match = _P.search(words)
     if match is None or (others and "4" not in codes):
         return words
-    if match[1] in {"#", "["}:
-        if "4" in codes:
-            raise ValueError("a dwell by a variable is seconds or milliseconds, as the point of its value says")
-        return words
+    if "4" in codes and match[1] in {"#", "["}:
+        raise ValueError("a dwell by a variable is seconds or milliseconds, as the point of its value says")
     if "." not in match[1]:
-        return words  # milliseconds, as FANUC's
+        return words  # milliseconds, as FANUC's, or a variable
     seconds = float(match[1])
     note(
         "dwell",
         f"P{match[1]} with a point is a dwell of {seconds:g} s on a Haas, without one milliseconds; FANUC's P is "
         "milliseconds and has no point",
     )
-    if "4" in codes:
-        return words[: match.start()] + f"X{number_text(seconds)}" + words[match.end() :]
     milliseconds = round(seconds * 1e3)
-    if abs(milliseconds - seconds * 1e3) > 1e-6:
+    if "4" not in codes and abs(milliseconds - seconds * 1e3) > 1e-6:
         raise ValueError(f"P{match[1]} is no whole number of milliseconds, in which FANUC's cycles wait")
-    return words[: match.start()] + f"P{milliseconds}" + words[match.end() :]
+    word = f"X{number_text(seconds)}" if "4" in codes else f"P{milliseconds}"
+    return words[: match.start()] + word + words[match.end() :]
 
 
 def _with_subprograms(lines: list[str], called: Mapping[int, int], file: str) -> tuple[list[str], list[int]]:

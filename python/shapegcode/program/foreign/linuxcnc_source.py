@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 KEYWORDS = (
@@ -28,23 +28,18 @@ class OLine:
     rest: str
 
 
-@dataclass(eq=False)
 class SourceFile:
     """One file of a program."""
 
-    name: str  # for messages
-    text: str  # its lines, each with its line end
-    index: int  # 0: the main program; n: the n-th of the files that were read besides
-    starts: list[int] = field(default_factory=list)  # offset of each line, and of the text's end
-    o_lines: dict[int, OLine] = field(default_factory=dict)  # by line, from 0
-    _places: dict[str, list[int]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Find its lines and O words."""
-        self.text = self.text.replace("\r\n", "\n").replace("\r", " ")  # alone it is a blank to LinuxCNC
+    def __init__(self, name: str, text: str, index: int) -> None:
+        """Find its lines and O words; `index`: 0: the main program, n: the n-th of the files that were read besides."""
+        self.name, self.index = name, index
+        self.text = text.replace("\r\n", "\n").replace("\r", " ")  # alone it is a blank to LinuxCNC
         if not self.text.endswith("\n"):
             self.text += "\n"
-        self.starts = [0, *(match.end() for match in re.finditer("\n", self.text))]
+        self.starts = [0, *(match.end() for match in re.finditer("\n", self.text))]  # of each line; the text's end
+        self.o_lines: dict[int, OLine] = {}  # by line, from 0
+        self._places: dict[str, list[int]] = {}
         for match in _O_LINE.finditer(self.text):
             line = bisect_right(self.starts, match.start(1)) - 1
             label = "".join(match[1].split()).lower()
