@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import tomllib
 from importlib import resources
@@ -389,6 +390,15 @@ def test_subprograms(tmp_path: Path) -> None:
     assert lines["G01Y3."] == (4, 1) and lines["G01X7."] == (1, 2) and lines["G01Y7."] == (15, 0)
 
 
+def test_a_subprogram_is_read_as_far_as_a_program_may_be_long_and_only_from_a_file(tmp_path: Path) -> None:
+    (tmp_path / "LONG.SPF").write_text("G1 X1\n" * 1000)
+    with pytest.raises(OSError, match=r"more than 500 bytes"):
+        read(START + "LONG\nM30\n", {"controller.max_program_bytes": 500}, tmp_path)
+    os.mkfifo(tmp_path / "PIPE.SPF")  # nobody writes to it: it is refused and not waited for
+    with pytest.raises(OSError, match=r"a pipe, not a regular file"):
+        read(START + "PIPE\nM30\n", None, tmp_path)
+
+
 def test_lines_lead_back_to_the_source() -> None:
     source = f"%_N_A_MPF\n;$PATH=/_N_MPF_DIR\n{START}N10 X1 ; FIRST\nG3 X1 Y0 I5 J0\nM30\n"
     program = read(source)
@@ -442,6 +452,7 @@ BAD = {
     "REPEATB AGAIN P=2": (4, ["REPEATB"]),
     "G2 X10 Y0 I3 J0": (4, ["start radius 3.000", "end radius 7.000"]),
     "G2 X10 Y0 CR=3": (4, ["CR=3", "5.000"]),
+    "G2 X10 Y0 R5": (4, ["R alone", "R1=", "CR="]),
     "G2 X10 Y0": (4, ["G2", "I, J, K, CR= or AR="]),
     "G2 X10 Y0 I5 K1": (4, ["K", "plane G17"]),
     "G2 X0 Y0 CR=5": (4, ["CR=", "whole circle"]),

@@ -19,8 +19,7 @@ from shapegcode.cli.options import load_machine
 from shapegcode.cli.runner import check_files, output_console, standard_output, write_results
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.program.foreign.read import input_dialect
-from shapegcode.program.foreign.recognize import CONTROLS
+from shapegcode.program.foreign.read import CONTROLS, input_dialect
 from shapegcode.program.reading import program_bytes
 from shapegcode.program.several import ProgramPlace, is_subprogram, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN

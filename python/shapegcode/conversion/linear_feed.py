@@ -40,33 +40,19 @@ _REST_SHARE = 1.5  # of the tolerance: how far that may lead off the command
 
 @dataclass(frozen=True)
 class LinearBlock:
-    """A block that takes the place of some blocks of constant feed.
+    """A block that takes the place of some blocks of constant feed."""
 
-    Attributes:
-        first: index of the first of them.
-        last: of the last one.
-        end_mm: where it ends.
-        radius_mm: of an arc; 0: a line.
-        sweep_rad: of an arc.
-        length_mm: of its path.
-        normal: axis across the plane of an arc.
-        start_feed: at its start, mm/min.
-        feed: at its end, mm/min.
-        sets_feed: the feed at its start is not that of the block before: a line before it says it.
-        is_linear: False: its feed is constant.
-    """
-
-    first: int
-    last: int
-    end_mm: Vector
-    radius_mm: float
-    sweep_rad: float
-    length_mm: float
-    normal: int
-    start_feed: float
-    feed: float
-    sets_feed: bool = False
-    is_linear: bool = True
+    first: int  # index of the first of them
+    last: int  # of the last one
+    end_mm: Vector  # where it ends
+    radius_mm: float  # of an arc; 0: a line
+    sweep_rad: float  # of an arc
+    length_mm: float  # of its path
+    normal: int  # axis across the plane of an arc
+    start_feed: float  # at its start, mm/min
+    feed: float  # at its end, mm/min
+    sets_feed: bool = False  # the feed at its start is not that of the block before: a line before it says it
+    is_linear: bool = True  # False: its feed is constant
 
     @property
     def time_s(self) -> float:
@@ -75,31 +61,13 @@ class LinearBlock:
 
 
 def duration_s(length_mm: float, start_mm_per_s: float, end_mm_per_s: float) -> float:
-    """Time of a block whose speed is linear along its path.
-
-    Args:
-        length_mm: of the path.
-        start_mm_per_s: speed at its start, more than 0.
-        end_mm_per_s: at its end, more than 0.
-
-    Returns:
-        The time.
-    """
+    """Time of a block whose speed is linear along its path."""
     ratio = end_mm_per_s / start_mm_per_s - 1.0
     return length_mm / start_mm_per_s * (math.log1p(ratio) / ratio if abs(ratio) > 1e-9 else 1.0)
 
 
 def end_speed(length_mm: float, start_mm_per_s: float, time_s: float) -> float | None:
-    """Speed at the end of such a block that lasts a given time; the speed at its start where these are swapped.
-
-    Args:
-        length_mm: of the path.
-        start_mm_per_s: speed at its start, more than 0.
-        time_s: how long it shall last.
-
-    Returns:
-        The speed; None: it would be more than some hundred times as high or low.
-    """
+    """Speed at the end of a block that lasts a given time, or at its start where these are swapped; None: none."""
     if length_mm <= 0.0 or time_s <= 0.0 or start_mm_per_s <= 0.0:
         return None
     wanted = math.log(time_s * start_mm_per_s / length_mm)  # of log1p(x) / x, which is e**(-y / 2) and little else
@@ -120,17 +88,7 @@ def end_speed(length_mm: float, start_mm_per_s: float, time_s: float) -> float |
 
 
 def distance_mm(length_mm: float, start_mm_per_s: float, end_mm_per_s: float, times_s: Vector) -> Vector:
-    """Distance along such a block.
-
-    Args:
-        length_mm: of its path.
-        start_mm_per_s: speed at its start.
-        end_mm_per_s: at its end.
-        times_s: since its start, shape (n,).
-
-    Returns:
-        Distances, shape (n,).
-    """
+    """Distances along such a block at times since its start, (n,)."""
     slope = (end_mm_per_s - start_mm_per_s) / length_mm
     if abs(slope * length_mm) < 1e-9 * start_mm_per_s:
         return start_mm_per_s * times_s
@@ -144,17 +102,9 @@ def linear_blocks(
     joints: Sequence[int] = (),
     modes: Sequence[tuple[int, float, float]] = (),
 ) -> list[LinearBlock]:
-    """Join blocks of constant feed into blocks of linear feed.
+    """Join blocks of constant feed, each of whole periods, into blocks of linear feed.
 
-    Args:
-        path: the blocks, from rest to rest; each lasts a whole number of periods.
-        period_s: the block period.
-        tolerance_mm: how far the motion may be from the ends of the periods.
-        joints: indices of blocks that a block must begin with.
-        modes: axis, natural frequency in Hz and damping ratio of vibrations that the motion shall not leave at its end.
-
-    Returns:
-        The blocks, in order.
+    A block begins at each joint; of `modes` (axis, Hz, damping ratio) no vibration is left at the end.
     """
     fit = _JoinedBlocks(path, period_s, tolerance_mm, frozenset(joints))
     blocks = list(fit.blocks())
@@ -162,16 +112,7 @@ def linear_blocks(
 
 
 def positions_mm(start_mm: Vector, blocks: Sequence[LinearBlock], times_s: Vector) -> Vector:
-    """Where the motion of blocks is.
-
-    Args:
-        start_mm: of the first block, shape (3,).
-        blocks: in order.
-        times_s: since its start, ascending, shape (n,).
-
-    Returns:
-        Positions, shape (n, 3); behind the last block its end.
-    """
+    """Where the motion of blocks is at ascending times, (n, 3); behind the last block its end."""
     ends = np.cumsum([block.time_s for block in blocks])
     found = np.tile(blocks[-1].end_mm, (len(times_s), 1))
     begin_s, start = 0.0, start_mm
@@ -201,16 +142,7 @@ def _on(start: Vector, block: LinearBlock, shares: Vector) -> Vector:
 
 
 def largest_difference_mm(path: _core.Path, blocks: Sequence[LinearBlock], period_s: float) -> float:
-    """By how much the motion differs from blocks of constant feed at the ends of their periods.
-
-    Args:
-        path: blocks of constant feed, each of a whole number of periods.
-        blocks: what takes their place.
-        period_s: the block period.
-
-    Returns:
-        The largest distance.
-    """
+    """By how much the motion differs from blocks of constant feed at the ends of their periods."""
     points = _JoinedBlocks(path, period_s, 0.0, frozenset()).points
     times = np.arange(1.0, len(points)) * period_s
     moved = positions_mm(points[0], blocks, times)
@@ -220,17 +152,7 @@ def largest_difference_mm(path: _core.Path, blocks: Sequence[LinearBlock], perio
 def linear_lines(
     lines: Mapping[int, str], path: _core.Path, blocks: Sequence[LinearBlock], decimals: int
 ) -> dict[int, list[str]]:
-    """What takes the place of the lines of shaped blocks, in the words of a SINUMERIK.
-
-    Args:
-        lines: of the blocks of constant feed, by their numbers.
-        path: these blocks.
-        blocks: what takes their place.
-        decimals: of positions in mm.
-
-    Returns:
-        New lines by the number of each old one; none for one that is joined with that before it.
-    """
+    """What takes the place of lines of shaped blocks, by their numbers; none where one is joined with another."""
     numbers = [int(number) for number in path.segment_lines]
     written: dict[int, list[str]] = {number: [] for number in numbers}
     is_linear, code, start = False, "", np.asarray(path.start_mm, dtype=float)
@@ -320,6 +242,10 @@ class _JoinedBlocks:
         """Periods at whose ends blocks end."""
         return [self._knots[block.last + 1] for block in blocks]
 
+    def _time_s(self, at: int, end: int) -> float:
+        """Of the blocks from one to the one before another."""
+        return (self._knots[end] - self._knots[at]) * self._period
+
     def _speed_at(self, knot: int) -> float:
         """Of the command, from the periods beside."""
         m = self._knots[knot]
@@ -344,7 +270,7 @@ class _JoinedBlocks:
         before, behind = self._speed_at(at), self._speed_at(at + 1)
         is_short = self._knots[at + 1] - self._knots[at] == 1
         if is_short and abs(behind - before) * self._period > 2.0 * self._tolerance:
-            shape, whole_s = self._shape(at, at + 1), (self._knots[at + 1] - self._knots[at]) * self._period
+            shape, whole_s = self._shape(at, at + 1), self._time_s(at, at + 1)
             start = _written(before + self._bias(at, at + 1)) if at else 0.0
             end = None if shape is None else end_speed(shape.length_mm, start, whole_s - late_s)
             if shape is not None and end is not None and (last := _written(end)) > 0.0:
@@ -360,7 +286,7 @@ class _JoinedBlocks:
 
     def _constant(self, at: int, late_s: float) -> tuple[LinearBlock, float]:
         """The block as it was; it makes up for what the one before was late."""
-        segment, whole_s = self._segments[at], (self._knots[at + 1] - self._knots[at]) * self._period
+        segment, whole_s = self._segments[at], self._time_s(at, at + 1)
         feed = round(segment.length_mm / (whole_s - late_s) * 60.0, 4)
         radius = segment.radius_mm if segment.sweep_rad else 0.0
         block = LinearBlock(
@@ -378,7 +304,7 @@ class _JoinedBlocks:
         for end in range(at + 1, min(at + 4, len(self._segments))):
             # From rest: the speed that leads to that of the command.
             shape = self._shape(at, end)
-            time_s = (self._knots[end] - self._knots[at]) * self._period - late_s
+            time_s = self._time_s(at, end) - late_s
             start = None if shape is None else end_speed(shape.length_mm, self._speed_at(end), time_s)
             if start is not None and start > 0.0 and _written(start) > 0.0:
                 block, late = self._block(at, end, _written(start), late_s, sets_feed=True)
@@ -403,7 +329,7 @@ class _JoinedBlocks:
     ) -> tuple[LinearBlock | None, float]:
         """A block between two ends, if its motion stays within the tolerance, and how late it ends."""
         shape = self._shape(at, end)
-        whole_s = (self._knots[end] - self._knots[at]) * self._period
+        whole_s = self._time_s(at, end)
         time_s = whole_s - late_s
         if shape is None or (exact := end_speed(shape.length_mm, speed, time_s)) is None:
             return None, 0.0

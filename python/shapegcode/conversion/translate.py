@@ -37,7 +37,7 @@ _RADIUS = re.compile(r"R|(?<![\d.])\.")
 _COMMENT = re.compile(r"\(([^()]*)\)")
 _ACTIVE_COMMENT = re.compile(r"\s*(MSG|DEBUG|PRINT|LOG|PROBE|PY|AXIS)")
 _PLACE = re.compile(r"(N\d+)?\(EMISSION (PROLOGUE|EPILOGUE|LOCK|UNLOCK)\)")
-_LENGTHS = "XYZIJKR"
+_MOTION = ("G00", "G01", "G02", "G03")
 _CYCLES = {"G73", "G81", "G82", "G83", "G85"}
 _GROUPS = ({"G20", "G21"}, {"G93", "G94", "G95"}, {"G61", "G64"}, {f"G{code}" for code in range(54, 60)})
 _WITH_AXES = {"G10", "G27", "G28", "G29", "G30", "G31", "G52", "G53", "G92"}
@@ -242,10 +242,13 @@ class _Translator:
         if number in self._linear:
             return self._linear[number]
         if state.percents > 1 or (state.ended_at and line.lstrip()[:1] not in ("%", "(", "")):
-            return self._left_out(number)
+            # Another control might run it.
+            left_out = f"{self._where(number)}: what stands behind the end of the program is left out"
+            self.cautions.setdefault("end", left_out)
+            return []
         if (place := _PLACE.fullmatch(line)) is not None:
             first, *rest = self._machine.emission.around_cuts[place[2]]
-            return [(place[1] or "") + first, *rest] if not self._dialect.one_code else [first, *rest]
+            return [("" if self._dialect.one_code else place[1] or "") + first, *rest]
         compact = line.replace(" ", "")
         if state.is_open and (move := _MOVE.fullmatch(compact)) is not None and "K" not in line:
             return self._move(number, compact, move)
@@ -256,11 +259,13 @@ class _Translator:
         if self._has_percent and not state.percents:
             return []  # a leader, which no control reads
         before = [] if state.is_open else self.opening(body)
-        skip, body = self._skipped(number, body)
+        skip = re.match(r"(?:/\d?)?", body)[0]  # type: ignore[index]
+        if skip and self._dialect.one_code:
+            raise self._error(number, f"/ (block skip) is not known to {self._dialect.control}")
+        body = body[len(skip) :].lstrip()
         if _WORD.sub("", body).strip():
             raise self._error(number, f"{body}: macro statements and names are not translated")
-        words = [(letter, value) for letter, value in _WORD.findall(body)]
-        return [*before, *self._block(number, skip, words, comments)]
+        return [*before, *self._block(number, skip, _WORD.findall(body), comments)]
 
     def opening(self, first: str) -> list[str]:
         """Lines before the first block: what the control may have otherwise when it is switched on.
@@ -312,23 +317,10 @@ class _Translator:
             return [self._comment(f"{plain_comment(body).strip()} {' '.join(comments)}".strip())]
         return shown or [""]
 
-    def _left_out(self, number: int) -> list[str]:
-        """A line behind the end of the program, which another control might run."""
-        self.cautions.setdefault("end", f"{self._where(number)}: what stands behind the end of the program is left out")
-        return []
-
     def name(self) -> str:
         """Of the program, where the control wants one."""
         found = re.search(rb"(?m)^[O:](\d+)", self._program.core.slice(0, min(self._program.core.size, 4096)))
         return f"O{found[1].decode()}" if found else "SHAPED"
-
-    def _skipped(self, number: int, body: str) -> tuple[str, str]:
-        skip = re.match(r"/\d?\s*", body)
-        if skip is None:
-            return "", body
-        if self._dialect.one_code:
-            raise self._error(number, f"/ (block skip) is not known to {self._dialect.control}")
-        return skip[0].strip(), body[skip.end() :]
 
     def _block(self, number: int, skip: str, words: Sequence[tuple[str, str]], comments: Sequence[str]) -> list[str]:
         """A block of words."""
@@ -336,7 +328,7 @@ class _Translator:
         before, behind, out = [], [], []
         for code in codes:
             self._note(code)
-        motion = [code for code in codes if code in ("G00", "G01", "G02", "G03")]
+        motion = [code for code in codes if code in _MOTION]
         if {"G28", "G30"} & {*codes} - self._own.keys() and motion:
             before += motion  # two codes that use the axis words of one block
         if "G09" in codes and self._dialect.exact_stop is not None:
@@ -357,14 +349,19 @@ class _Translator:
                 out.append("")
                 continue
             out.append(self._word(number, letter, value, code, codes))
-        if self._dialect.time_feed:
-            before, out, behind = self._timed(number, before, out, behind)
-        lines = self._split(number, codes, words, out) if self._dialect.one_code else [self._joined(out)]
+        if (time := self._times.get(number)) is not None:  # in place of F, between G93 and G94
+            out = ["G93" if word == "G94" else word for word in out if not word.startswith("F")] + [f"F{time}"]
+            out[:0] = [self._dialect.lock_word] if self._machine.emission.override == "lock" else []
+            before += ["G93"] * (number in self._firsts)
+            behind += ["G94"] * (number in self._lasts)
+        # A reader of `G4 F1` or `D1` beside other words needs the blank.
+        gap = " " * (self._dialect.comment == ";")
+        lines = self._split(number, codes, words, out) if self._dialect.one_code else [gap.join(filter(None, out))]
         lines = [skip + line for line in (*before, *lines, *behind) if line]
         self._hold(number, words, codes, lines)
         if comments:
             text = " ".join(self._comment(text) for text in comments)
-            lines = [f"{lines[0]}{' ' * (self._dialect.comment == ';')}{text}", *lines[1:]] if lines else [text]
+            lines = [f"{lines[0]}{gap}{text}", *lines[1:]] if lines else [text]
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
@@ -388,11 +385,9 @@ class _Translator:
         want = {letter: float(self._length(letter, value, self._dialect)) for letter, value in words if letter in "XYZ"}
         have = {letter: float(value) for line in lines for letter, value in _COORDINATE.findall(line)}
         lost = [letter for letter, value in want.items() if not abs(have.get(letter, math.nan) - value) <= _SAME_MM]
-        if lost or have.keys() - want.keys() - {*("XYZ" if self._is_arc() else "")}:
+        is_chords = self._dialect.one_code and self.state.motion in (2, 3)
+        if lost or (have.keys() - want.keys() and not is_chords):
             raise RoundTripError(f"line {number}: {words} became {lines} for {self._dialect.control}")
-
-    def _is_arc(self) -> bool:
-        return self._dialect.one_code and self.state.motion in (2, 3)
 
     def _taken(self, codes: Sequence[str]) -> bool:
         """Whether what takes the place of a code like G28 takes that of its axes too."""
@@ -402,7 +397,7 @@ class _Translator:
     def _note(self, code: str) -> None:
         """Keep what a code puts into force."""
         state = self.state
-        if code in ("G00", "G01", "G02", "G03"):
+        if code in _MOTION:
             state.motion, state.cycle = int(code[1:]), False
         elif code in ("G20", "G21"):
             state.unit = code
@@ -423,7 +418,11 @@ class _Translator:
         if letter not in "GMNST" and self._taken(codes):
             return ""
         if "G04" in codes and (code == "G04" or letter in "XUP"):
-            return self._dwell(number, codes) if code == "G04" else ""
+            if code != "G04":
+                return ""
+            if [each for each in codes if each != "G04"] or number not in self._dwells:
+                raise self._error(number, "G04 stands in a block with other codes, or has no time")
+            return self._seconds(number, self._dwells[number], dialect.dwell)
         if letter in "GM":
             if code == "G43" and dialect.arc_radius == "CR=":
                 return "D1"
@@ -451,7 +450,9 @@ class _Translator:
         if self.state.cycle and letter in "QL":
             return letter + (self._length("Q", value, dialect) if letter == "Q" else value)
         if self.state.cycle and letter == "P":
-            return self._cycle_dwell(number, value, codes)
+            if "G82" not in codes:
+                raise self._error(number, f"P{value}: only in a block with G82 is it known what it means there")
+            return self._seconds(number, int(value) * 1e-3, dialect.dwell.partition("G04")[2])
         why = " repeats a drilling cycle" if letter == "K" else ""
         raise self._error(number, f"{letter}{value}{why}: what it means to {dialect.control} is not known{_CURE}")
 
@@ -468,24 +469,12 @@ class _Translator:
         bare = dialect.arc_radius == "CR=" and value.lstrip("+-").startswith(".")
         return value.replace(".", "0.") if bare else value
 
-    def _dwell(self, number: int, codes: Sequence[str]) -> str:
-        if [code for code in codes if code != "G04"] or number not in self._dwells:
-            raise self._error(number, "G04 stands in a block with other codes, or has no time")
-        return self._seconds(number, self._dwells[number], self._dialect.dwell)
-
-    def _cycle_dwell(self, number: int, value: str, codes: Sequence[str]) -> str:
-        if "G82" not in codes:
-            raise self._error(number, f"P{value}: only in a block with G82 is it known what it means there")
-        return self._seconds(number, int(value) * 1e-3, self._dialect.dwell.partition("G04")[2])
-
     def _seconds(self, number: int, time_s: float, form: str) -> str:
         milliseconds = round(time_s * 1e3)
         if "{ms}" in form and abs(time_s * 1e3 - milliseconds) > 1e-6:
-            raise self._error(
-                number, f"a dwell of {time_s * 1e3:g} ms: {self._dialect.control} takes whole milliseconds"
-            )
-        text = f"{time_s:.6f}".rstrip("0")
-        return form.format(ms=milliseconds, s=text)
+            what = f"a dwell of {time_s * 1e3:g} ms"
+            raise self._error(number, f"{what}: {self._dialect.control} takes whole milliseconds")
+        return form.format(ms=milliseconds, s=f"{time_s:.6f}".rstrip("0"))
 
     def _offset(self, number: int, value: str) -> str:
         if self._own.get("G43", "G43") != "G43":
@@ -501,26 +490,7 @@ class _Translator:
         return ""
 
     def _filled(self, text: str) -> str:
-        inch = self.state.unit == "G20"
-        blend = f"{_BLEND_MM / 25.4:.5f}" if inch else f"{_BLEND_MM:g}"
-        return text.replace("{blend}", blend)
-
-    def _joined(self, words: Sequence[str]) -> str:
-        # A reader of `G4 F1` or `D1` beside other words needs the blank.
-        gap = " " if self._dialect.comment == ";" else ""
-        return gap.join(word for word in words if word)
-
-    def _timed(
-        self, number: int, before: list[str], out: list[str], behind: list[str]
-    ) -> tuple[list[str], list[str], list[str]]:
-        """The block with its time in place of F, between G93 and G94."""
-        if number not in self._times:
-            return before, out, behind
-        own = [word for word in out if not word.startswith("F")]
-        own = ["G93" if word == "G94" else word for word in own]
-        lock = [self._dialect.lock_word] if self._machine.emission.override == "lock" else []
-        first, last = ["G93"] * (number in self._firsts), ["G94"] * (number in self._lasts)
-        return [*before, *first], [*lock, *own, f"F{self._times[number]}"], [*behind, *last]
+        return text.replace("{blend}", f"{_BLEND_MM / 25.4:.5f}" if self.state.unit == "G20" else f"{_BLEND_MM:g}")
 
     def _split(
         self, number: int, codes: Sequence[str], words: Sequence[tuple[str, str]], out: Sequence[str]
@@ -531,7 +501,7 @@ class _Translator:
         for (letter, value), text in zip(words, out, strict=True):
             if letter in "XYZ":
                 move.append(text)
-            elif letter in "GM" and text and code_name(letter + value) not in ("G00", "G01", "G02", "G03"):
+            elif letter in "GM" and text and code_name(letter + value) not in _MOTION:
                 code = code_name(letter + value)
                 tail = {"M03": "S", "M04": "S", "M06": "T"}.get(code, "")
                 filled = f"{text} {tail}{named[tail]}" if tail in named and tail else text
@@ -571,8 +541,7 @@ class _Translator:
         return f"(NOTE {text})" if active else f"({text})"
 
     def _where(self, number: int) -> str:
-        file, line = self._place(number)
-        return f"{file}:{line}"
+        return "{}:{}".format(*self._place(number))
 
     def _place(self, number: int) -> tuple[str, int]:
         """File and line of the original from which a line comes."""
@@ -586,8 +555,7 @@ class _Translator:
         return file or self._original.source, line
 
     def _error(self, number: int, message: str) -> _core.ProgramError:
-        file, line = self._place(number)
-        return located_error(file, line, 1, message)
+        return located_error(*self._place(number), 1, message)
 
     def _refusal(self, number: int, code: str) -> _core.ProgramError:
         here = fanuc_meaning(code)

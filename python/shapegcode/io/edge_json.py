@@ -64,12 +64,8 @@ def read_rows(source: str, addresses: tuple[str, ...], files: Iterable[tuple[str
         columns[address] = column = np.ascontiguousarray(values[kept, rank])
         missing = np.flatnonzero(np.isnan(column))
         if missing.size:
-            rest = (
-                "no value at all"
-                if missing.size == len(column)
-                else f"no value in {missing.size} of {len(column)} samples"
-            )
-            notes.append(f"{address}: {rest}, the first at counter {counter[missing[0]]}")
+            where = "at all" if missing.size == len(column) else f"in {missing.size} of {len(column)} samples"
+            notes.append(f"{address}: no value {where}, the first at counter {counter[missing[0]]}")
     return Rows(counter, columns, tuple(notes))
 
 
@@ -173,9 +169,7 @@ class Events:
                 elif kind == "LFData":
                     self._values(where, content)
                 elif kind in EVENTS:
-                    if not isinstance(content, dict):
-                        raise RecordError(f"{where} = {str(content)[:40]!r}: must be an object")
-                    self._event(where, kind, content)
+                    self._event(where, kind, _object(where, content))
 
     def notes(self) -> list[str]:
         """What was left out, and where the clock does not go with the counter."""
@@ -214,11 +208,16 @@ class Events:
     def _values(self, where: str, content: Any) -> None:
         if not isinstance(content, list):
             raise RecordError(f"{where} = {str(content)[:40]!r}: must be a list")
-        for index, each in enumerate(content):
-            if not isinstance(each, dict):
-                raise RecordError(f"{where}[{index}] = {str(each)[:40]!r}: must be an object")
+        for index, entry in enumerate(content):
+            each = _object(f"{where}[{index}]", entry)
             counter, time_s = self._when(f"{where}[{index}]", each)
             self.values.append(EdgeValue(counter, time_s, str(each.get("address", "")), str(each.get("value", ""))))
+
+
+def _object(where: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise RecordError(f"{where} = {str(value)[:40]!r}: must be an object")
+    return value
 
 
 def _integer(where: str, table: Mapping[str, Any], name: str) -> int | None:
@@ -328,20 +327,12 @@ def _parsed(file: DataFile, where: str, data: bytes) -> dict[str, Any]:
     return found
 
 
-@dataclass
 class _Part:
     """One file of a recording."""
 
-    where: str
-    data: dict[str, Any]
-    version: str = field(init=False)
-    cycle_s: float = field(init=False)
-    signals: tuple[tuple[str, str], ...] = field(init=False)  # address, label of the axis
-    payload: list[Any] = field(init=False)
-    notes: list[str] = field(init=False, default_factory=list)
-
-    def __post_init__(self) -> None:
-        header = self.data["Header"]
+    def __init__(self, where: str, data: dict[str, Any]) -> None:
+        header = data["Header"]
+        self.where, self.notes = where, list[str]()
         self.version = self._version(header)
         kind = header.get("Format", "DEFAULT")
         if kind != "DEFAULT":
@@ -354,19 +345,13 @@ class _Part:
                 f"{high:g} ms; without it counters are no times"
             )
         self.cycle_s = cycle / 1000.0
-        self.signals = self._signals(header)
-        payload = self.data.get("Payload")
+        self.signals = self._signals(header)  # address, label of the axis
+        self.addresses = tuple(address for address, _ in self.signals)
+        payload = data.get("Payload")
         if not isinstance(payload, list):
             raise RecordError(f"{self.where}: Payload is missing or no list: the file holds no data")
-        for index, entry in enumerate(payload):
-            if not isinstance(entry, dict):
-                raise RecordError(f"{self.where}: Payload[{index}] = {str(entry)[:40]!r}: must be an object")
-        self.payload = payload
-        self._footer()
-
-    @property
-    def addresses(self) -> tuple[str, ...]:
-        return tuple(address for address, _ in self.signals)
+        self.payload: list[dict[str, Any]] = [_object(f"{where}: Payload[{k}]", each) for k, each in enumerate(payload)]
+        self._footer(data)
 
     @property
     def first_counter(self) -> float:
@@ -417,8 +402,8 @@ class _Part:
             )
         return tuple(found)
 
-    def _footer(self) -> None:
-        footer = self.data.get("Footer")
+    def _footer(self, data: dict[str, Any]) -> None:
+        footer = data.get("Footer")
         if not isinstance(footer, dict):
             self.notes.append("no Footer: the recorder did not end the file")
             return
@@ -433,7 +418,6 @@ class _Part:
 
 def _capture(path: Path, parts: list[_Part], rows: Rows) -> EdgeCapture:
     first = parts[0]
-    time = (rows.counter - rows.counter[0]) * first.cycle_s
     gaps = _gaps(rows, first.cycle_s)
     notes = [note for part in parts for note in part.notes] + list(rows.notes)
     notes += [
@@ -452,7 +436,7 @@ def _capture(path: Path, parts: list[_Part], rows: Rows) -> EdgeCapture:
         version=first.version,
         cycle_s=first.cycle_s,
         counter=rows.counter,
-        time_s=time,
+        time_s=(rows.counter - rows.counter[0]) * first.cycle_s,
         columns=rows.columns,
         axes=_axes(first.signals),
         blocks=tuple(sorted(events.blocks, key=lambda each: each.counter)),

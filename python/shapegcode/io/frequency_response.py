@@ -116,6 +116,11 @@ def checked_lines(
     return frequency_hz, response, coherence, []
 
 
+def frequency_factor(text: str) -> float:
+    """To Hz, by what a label says."""
+    return 1.0 / (2.0 * np.pi) if "rad" in text.lower() else 1000.0 if "khz" in text.lower() else 1.0
+
+
 def ratio_unit(text: str) -> tuple[Unit, float] | None:
     """Unit of a response over a force: ``m/N``, ``(m/s²)/N``, ``µm/N``, ``g/N``, ``m/s^2/N``, ``1/kg``."""
     plain = text.strip().strip("[]")

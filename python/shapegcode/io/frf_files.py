@@ -15,7 +15,14 @@ import numpy as np
 from shapegcode.errors import RecordError
 from shapegcode.io.columns import Label, tap_label
 from shapegcode.io.data_file import open_file
-from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse, checked_lines, scale_of
+from shapegcode.io.frequency_response import (
+    FEWEST_LINES,
+    ComplexArray,
+    FrequencyResponse,
+    checked_lines,
+    frequency_factor,
+    scale_of,
+)
 from shapegcode.io.layout import utf8_text
 from shapegcode.io.record import FloatArray, ReadOptions
 from shapegcode.io.table import TextTable
@@ -68,12 +75,11 @@ def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
         header = _blank_cells(path, table) or header
     units = [*table.layout.units, *[""] * len(header)]
     places = _places(table, header, options)
+    said = {part: f"{header[index]} {units[index]}" for part, index in places.items()}
     values = table.numbers(list(places.values()), FEWEST_LINES)
     column = dict(zip(places, values.T, strict=True))
     polar = "magnitude" in column
-    shown = places["magnitude" if polar else "real"]
-    label = f"{header[shown]} {units[shown]}".strip()
-    other = "" if polar else f"{header[places['imaginary']]} {units[places['imaginary']]}".strip()
+    label, other = said["magnitude" if polar else "real"].strip(), said.get("imaginary", "").strip()
     warnings: list[str] = []
     text = next((each for each in (label, other, *_preamble(path, table)) if _says(each)), label)
     if path.suffix.lower() == ".frf" and not _says(text) and options.quantity is None and options.response_unit is None:
@@ -81,9 +87,8 @@ def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
         text = "receptance m/N"
     quantity, factor, told = scale_of(table.where, text, options)
     warnings += told
-    cartesian = None if polar else np.asarray(column["real"] + 1j * column["imaginary"], dtype=np.complex128)
-    values_of = _polar(column, header, units, places, warnings) if cartesian is None else cartesian
-    frequency = column["frequency"] * _frequency_factor(f"{header[places['frequency']]} {units[places['frequency']]}")
+    values_of = _polar(column, said, warnings) if polar else column["real"] + 1j * column["imaginary"]
+    frequency = column["frequency"] * frequency_factor(said["frequency"])
     rows = np.flatnonzero(np.diff(frequency) <= 0.0)
     if rows.size:
         row = int(rows[0]) + 1
@@ -161,26 +166,12 @@ def _axis(text: str) -> str | None:
     return next((word for word in words if word in {"x", "y", "z"}), None)
 
 
-def _frequency_factor(text: str) -> float:
-    if re.search(r"rad", text, re.IGNORECASE):
-        return 1.0 / (2.0 * np.pi)
-    return 1000.0 if re.search(r"khz", text, re.IGNORECASE) else 1.0
-
-
-def _polar(
-    column: dict[str, FloatArray], header: list[str], units: list[str], places: dict[str, int], warnings: list[str]
-) -> ComplexArray:
-    said = f"{header[places['magnitude']]} {units[places['magnitude']]}"
-    magnitude = column["magnitude"]
-    if re.search(r"\bdb\b", said, re.IGNORECASE):
+def _polar(column: dict[str, FloatArray], said: dict[str, str], warnings: list[str]) -> ComplexArray:
+    magnitude, phase, unit = column["magnitude"], column["phase"], said["phase"].lower()
+    if re.search(r"\bdb\b", said["magnitude"], re.IGNORECASE):
         magnitude = 10.0 ** (magnitude / _DB)
-    said = f"{header[places['phase']]} {units[places['phase']]}".lower()
-    phase = column["phase"]
-    if "rad" in said:
-        degrees = False
-    elif re.search(r"deg|grad|°", said):
-        degrees = True
-    else:
+    degrees = "rad" not in unit
+    if degrees and not re.search(r"deg|grad|°", unit):
         degrees = bool(np.ptp(phase) > 4.0 * np.pi)
         warnings.append(f"the phase has no unit: {'degrees' if degrees else 'radians'} are taken")
     return np.asarray(magnitude * np.exp(1j * (np.radians(phase) if degrees else phase)), dtype=np.complex128)

@@ -14,14 +14,7 @@ _ENTRY = re.compile(r"([A-Za-z0-9_]+)\s*=\s*(.*?)\s*(?:[;#].*)?")
 
 
 def ini_entries(text: str) -> dict[tuple[str, str], tuple[str, int]]:
-    """Entries with their lines; the first of a name counts, as in LinuxCNC.
-
-    Args:
-        text: of the file.
-
-    Returns:
-        By section and name, both in capitals: the value without its comment, and its line, from 1.
-    """
+    """By section and name in capitals the value and its line, from 1; the first of a name counts, as in LinuxCNC."""
     entries: dict[tuple[str, str], tuple[str, int]] = {}
     section = ""
     for number, raw in enumerate(text.splitlines(), start=1):

@@ -124,6 +124,7 @@ _HEAD_BYTES = 262_144
 _HEAD_LINES = 400
 #: So many rows of numbers on end are data; a preamble may hold one or two.
 _ROWS_TO_KNOW = 3
+_MARK = re.compile(r"^\s*(#+|%+|//+|\*+)\s*")  # of a comment
 _DELIMITERS = ("\t", ";", ",", " ")
 _NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
 _RATE = re.compile(
@@ -231,10 +232,6 @@ def _stated_period(lines: list[str]) -> float | None:
     return None
 
 
-def _uncommented(line: str) -> str:
-    return re.sub(r"^\s*(#+|%+|//+|\*+)\s*", "", line)
-
-
 def _labels_known(cells: list[str]) -> int:
     return sum(tap_label(cell).measures is not None for cell in cells)
 
@@ -251,7 +248,7 @@ def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
             f"{shown[:80]!r}"
         )
     above = [
-        (number, cells_of(_uncommented(line), rows.delimiter))
+        (number, cells_of(_MARK.sub("", line), rows.delimiter))
         for number, line in enumerate(lines[: rows.start], start=1)
         if re.search(r"\w", line)
     ]

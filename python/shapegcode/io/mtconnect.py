@@ -204,7 +204,7 @@ class _Document:
 
     def _item(self, name: str, kind: str, given: str, identity: str) -> Item | None:
         """What a data item is: chosen by its id or name, else by its element, and by its sub-type."""
-        chosen = {one.strip().lower() for one in (self._table.chosen or {}).values()}
+        chosen = {one.strip().lower() for one in self._table.chosen.values()}
         if {given.lower(), identity.lower()} & chosen:
             return self._table.find(given or identity, identity)
         label = f"{name} ({given or identity})" if given or identity else name

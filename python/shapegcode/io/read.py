@@ -39,13 +39,13 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
         raise RecordError(f"{path}: XML, which holds a frequency response at best: needed is a record over time")
     if _is_uff(head):
         return read_uff(path, options)
-    for suffixes, kind in (({".uff", ".unv", ".uf", ".uf58"}, "UFF"), ({".wav", ".wave"}, "WAV")):
-        if path.suffix.lower() in suffixes:
-            begins = "'    -1' (start of a dataset)" if kind == "UFF" else "'RIFF'"
-            raise RecordError(
-                f"{path}: not a {kind} file: it begins with {head[:16]!r} instead of {begins}; rename it if it is text "
-                "with columns"
-            )
+    if path.suffix.lower() in _NO_TEXT:
+        is_wav = path.suffix.lower().startswith(".wav")
+        kind, begins = ("WAV", "'RIFF'") if is_wav else ("UFF", "'    -1' (start of a dataset)")
+        raise RecordError(
+            f"{path}: not a {kind} file: it begins with {head[:16]!r} instead of {begins}; rename it if it is text "
+            "with columns"
+        )
     return read_csv(path, klipper_options(options) if is_klipper(head) else options)
 
 
@@ -137,20 +137,14 @@ def read_wav(path: Path, options: ReadOptions) -> list[Record]:
             f"{path}: sample {row + 1} of channel {channel + 1} is {data[row, channel]}: must be a finite number"
         )
     notes: list[str] = []
-    response = data[:, -1]
+    force, response = data[:, 0], data[:, -1]
     force_n: FloatArray | None = None
     if channels == 2:
-        force = data[:, 1] if options.response_first else data[:, 0]
-        response = data[:, 0] if options.response_first else data[:, 1]
+        if options.response_first:
+            force, response = response, force
         if not options.ignore_force:
-            missing = [
-                name
-                for name, scale in (
-                    ("--force-scale", options.force_scale),
-                    ("--response-scale", options.response_scale),
-                )
-                if scale is None
-            ]
+            scales = {"--force-scale": options.force_scale, "--response-scale": options.response_scale}
+            missing = [name for name, scale in scales.items() if scale is None]
             if shares and missing:
                 raise RecordError(
                     f"{path}: integer samples are shares of full scale; a mass needs {' and '.join(missing)} (N, m/s² "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
 from typing import Literal, TypeAlias, get_args
 
@@ -90,19 +90,15 @@ class Item:
     rank: int  # of its name among those of its role; the lowest is taken
 
 
-@dataclass
 class ItemTable:
     """Finds out what the items of a file are."""
 
-    chosen: Mapping[str, str] | None = None  # names by role, which hold over the known ones
-    # names that were met in the file, and what they are
-    seen: dict[str, Item | None] = field(init=False, default_factory=dict)
-    _chosen: dict[str, tuple[Role, int]] = field(init=False, default_factory=dict)
-    _items: dict[tuple[str, Role], Item] = field(init=False, default_factory=dict)
-    _roles: frozenset[str] = field(init=False, default=frozenset())
-
-    def __post_init__(self) -> None:
-        for role, name in (self.chosen or {}).items():
+    def __init__(self, chosen: Mapping[str, str] | None = None) -> None:
+        self.chosen = chosen or {}  # names by role, which hold over the known ones
+        self.seen: dict[str, Item | None] = {}  # names that were met in the file, and what they are
+        self._chosen: dict[str, tuple[Role, int]] = {}
+        self._items: dict[tuple[str, Role], Item] = {}
+        for role, name in self.chosen.items():
             if role not in ROLES:
                 close = difflib.get_close_matches(role, ROLES, n=1, cutoff=0.5)
                 hint = f"; did you mean {close[0]}?" if close else ""
@@ -110,7 +106,6 @@ class ItemTable:
             if not isinstance(name, str) or not name.strip():
                 raise RecordError(f"items: {role} = {name!r}: must be the name of an item in the log")
             self._chosen[name.strip().lower()] = role, 0
-        self._roles = frozenset(self.chosen or {})
 
     def find(self, *names: str) -> Item | None:
         """What an item is."""
@@ -129,13 +124,13 @@ class ItemTable:
                     return Item(names[0], *chosen)
         for name in names:
             found = _KNOWN.get(plain_name(name.rpartition(":")[2]))
-            if found is not None and found[0] not in self._roles:
+            if found is not None and found[0] not in self.chosen:
                 return Item(names[0], *found)
         return None
 
     def sought(self, role: Role) -> str:
         """The names that are looked for, for messages."""
-        return (self.chosen or {}).get(role) or ", ".join(_NAMES[role].split()[:6])
+        return self.chosen.get(role) or ", ".join(_NAMES[role].split()[:6])
 
 
 Event: TypeAlias = tuple[int, float, bytes, Item, bytes]

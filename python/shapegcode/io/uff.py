@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from shapegcode.errors import RecordError
 from shapegcode.io.columns import tap_label
-from shapegcode.io.frequency_response import FrequencyResponse, checked_lines, scale_of
+from shapegcode.io.frequency_response import FrequencyResponse, checked_lines, frequency_factor, scale_of
 from shapegcode.io.record import FloatArray, Quantity, ReadOptions, Record, per_volt, stated_unit, volts_of
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.units import find_unit, units_of
@@ -424,16 +424,11 @@ def _response(
 
 
 def _frequency(where: str, data: dict[str, Any]) -> FloatArray:
-    frequency = np.asarray(data["x"], dtype=np.float64)
-    label = str(data.get("abscissa_axis_units_lab", "")).strip().lower()
-    if "rad" in label:
-        return frequency / (2.0 * np.pi)
-    if "khz" in label:
-        return frequency * 1000.0
+    label = str(data.get("abscissa_axis_units_lab", ""))
     unit = find_unit(label)
     if unit is not None and unit.measures == "time":
         raise RecordError(f"{where}: its abscissa is in {unit.name}: a frequency response has its frequency there")
-    return frequency
+    return np.asarray(data["x"], dtype=np.float64) * frequency_factor(label)
 
 
 def _scale(

@@ -124,7 +124,8 @@ def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
         if stops or not machine.controller.holds_macros:
             lines.append(f"M00(CHECK D{number} RADIUS {radius:.4g} WITH WEAR)")
             continue
-        value = _offset_expression(number, machine.controller.offset_memory)
+        geometry, wear = {"A": (10000, 0), "B": (11000, 10000), "C": (13000, 12000)}[machine.controller.offset_memory]
+        value = f"[#{geometry + number}+#{wear + number}]" if wear else f"#{geometry + number}"
         # The variable counts mm or inch as the control is set when the guard runs: either will do.
         checks = [
             f"[ABS[{value}-{size:.6f}]GT{slack:.6f}]"
@@ -132,13 +133,6 @@ def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
         ]
         lines.append(f"IF[{'AND'.join(checks)}]THEN#3000=1(D{number} CHANGED)")
     return lines
-
-
-def _offset_expression(number: int, memory: str) -> str:
-    if memory == "A":
-        return f"#{10000 + number}"
-    geometry, wear = (13000, 12000) if memory == "C" else (11000, 10000)
-    return f"[#{geometry + number}+#{wear + number}]"
 
 
 _SAME_PLACE_MM = 0.005

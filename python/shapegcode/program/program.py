@@ -15,8 +15,7 @@ from shapegcode.errors import ProgramError, located_error
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.foreign.plain import ForeignProgram
-from shapegcode.program.foreign.read import foreign_program
-from shapegcode.program.foreign.recognize import CONTROLS, LOOKED_AT_BYTES, doubtful_word
+from shapegcode.program.foreign.read import CONTROLS, LOOKED_AT_BYTES, doubtful_word, foreign_program
 from shapegcode.program.reading import Reading, given_text, signs_of_turning
 from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
@@ -170,7 +169,7 @@ class Program:
         """
         reading = Reading(machine, emitted=True, keeps_calls=True, probe_lines=tuple(probe_lines))
         try:
-            core = _core.read_parts(parts, reading.options([]))
+            core = _core.read_parts(parts, reading.options(None))
         except ProgramError as error:
             raise located_error(error.file or source, error.line, error.column, str(error), error.alarm) from None
         return cls(core, source, reading, core.unexpanded if core.expanded else None)
@@ -395,7 +394,7 @@ class Program:
 def _options(
     data: bytes, source: str, reading: Reading, folder: Path | None, number: int | str | None
 ) -> _core.ReaderOptions:
-    options = reading.options([folder] if folder is not None else [])
+    options = reading.options(folder)
     if number is not None:
         index = index_of(data, number, source)
         options.program_index = -1 if index is None else index
@@ -430,9 +429,9 @@ def _read(
 
 def _read_foreign(data: bytes, source: str, reading: Reading, folder: Path | None, foreign: ForeignProgram) -> Program:
     """A program in another control's words: its plain program is read, and its lines lead back."""
-    folders = [folder] if folder is not None and foreign.settings.called_text is not None else []
+    beside = folder if foreign.settings.called_text is not None else None
     try:
-        core = _core.read_program(foreign.text.encode("latin-1", "replace"), reading.options(folders, foreign.settings))
+        core = _core.read_program(foreign.text.encode("latin-1", "replace"), reading.options(beside, foreign.settings))
     except ProgramError as error:
         if error.file:
             raise located_error(error.file, error.line, error.column, str(error), error.alarm) from None

@@ -16,12 +16,13 @@ from shapegcode import _core
 from shapegcode.io.atomic import named_errors
 from shapegcode.io.data_file import open_file
 from shapegcode.program.computer import require_memory
-from shapegcode.program.foreign.read import refuse_words_behind_semicolon
+from shapegcode.program.foreign.plain import program_folders
+from shapegcode.program.foreign.read import COMMENT, LOOKED_AT_BYTES, refuse_words_behind_semicolon
 from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
-    from shapegcode.program.foreign import ForeignSettings
+    from shapegcode.program.foreign.plain import ForeignSettings
 
 _NO_LIMIT = 2**63
 _ANY_PROGRAM = (0, 99_999_999)
@@ -43,6 +44,10 @@ _NOT_READ = ("compensation", "material_side")
 """Of `input`: what is decided of a program that was read."""
 
 
+Finder = Callable[[int], tuple[str, bytes] | None]
+"""Name and text of a program that another one calls, by its O number."""
+
+
 @dataclass(frozen=True)
 class Reading:
     """How a program was read."""
@@ -56,28 +61,31 @@ class Reading:
     # name and text of programs in other files that it calls, by O number; found when it was read
     called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
-    def options(self, folders: Sequence[Path], foreign: ForeignSettings | None = None) -> _core.ReaderOptions:
+    def options(self, folder: Path | None, foreign: ForeignSettings | None = None) -> _core.ReaderOptions:
         """Settings with which the core reads a text so; `foreign`: it is the plain program of another control's."""
-        options = reader_options(
-            self.machine,
-            emitted=self.emitted,
-            probe_lines=self.probe_lines,
-            expand_compensation=self.expand_compensation,
-            collect_alarms=self.collect_alarms,
-        )
+        options = reader_options(self.machine, emitted=self.emitted)
+        options.probe_lines = list(self.probe_lines)
+        options.expand_compensation = self.expand_compensation
+        options.collect_alarms = self.collect_alarms
         if foreign is not None:
             _apply(foreign, options)
         if self.keeps_calls:
             options.opaque_programs = list(_ANY_PROGRAM)
-        folders = [*folders, *(Path(name).expanduser() for name in self.machine.input.program_folders)]
-        if folders:
-            load = program_loader(folders, self.machine.controller.max_program_bytes)
-            if foreign is not None and foreign.called_text is not None:
-                load = partial(_in_fanuc_words, load, foreign.called_text)
-            elif foreign is None and not self.emitted:
-                load = partial(_without_doubt, load)
-            options.load_program = partial(_called, self.called, load)
+        if folders := program_folders(self.machine, folder):
+            find = program_loader(folders, self.machine.controller.max_program_bytes)
+            options.load_program = partial(self._called, find, foreign)
         return options
+
+    def _called(self, find: Finder, foreign: ForeignSettings | None, number: int) -> tuple[str, bytes] | None:
+        """A program of another file, kept with the reading: it is read again where these files are not."""
+        if number not in self.called and (found := find(number)) is not None:
+            file, text = found
+            if foreign is not None and foreign.called_text is not None:
+                text = foreign.called_text(text.decode("latin-1"), file).encode("latin-1")
+            elif foreign is None and not self.emitted:
+                refuse_words_behind_semicolon(text, file)
+            self.called[number] = file, text
+        return self.called.get(number)
 
     def differences(self, machine: Machine) -> list[str]:
         """Settings by which another machine would read the text differently."""
@@ -91,31 +99,6 @@ class Reading:
             for key, value in mine.items()
             if value != other[key] and key not in unused
         ]
-
-
-def _called(
-    known: dict[int, tuple[str, bytes]], load: Callable[[int], tuple[str, bytes] | None], number: int
-) -> tuple[str, bytes] | None:
-    """A program of another file, kept with the reading: it is read again where these files are not."""
-    if number not in known and (found := load(number)) is not None:
-        known[number] = found
-    return known.get(number)
-
-
-def _in_fanuc_words(
-    load: Callable[[int], tuple[str, bytes] | None], write: Callable[[str, str], str], number: int
-) -> tuple[str, bytes] | None:
-    """A program of another file that one in another control's words calls."""
-    found = load(number)
-    return None if found is None else (found[0], write(found[1].decode("latin-1"), found[0]).encode("latin-1"))
-
-
-def _without_doubt(load: Callable[[int], tuple[str, bytes] | None], number: int) -> tuple[str, bytes] | None:
-    """A program of another file that one in FANUC's words calls."""
-    found = load(number)
-    if found is not None:
-        refuse_words_behind_semicolon(found[1], found[0])
-    return found
 
 
 def _settings_of_reading(machine: Machine) -> dict[str, object]:
@@ -147,8 +130,6 @@ def _apply(foreign: ForeignSettings, options: _core.ReaderOptions) -> None:
     options.tool_offsets = tools  # type: ignore[assignment]
     if foreign.peck_clearance_mm is not None:
         options.peck_clearance_mm = foreign.peck_clearance_mm
-    if foreign.arc_radius_tolerance_mm is not None:
-        options.arc_tolerance_mm = max(options.arc_tolerance_mm, foreign.arc_radius_tolerance_mm)
 
 
 def is_program_text(given: object) -> bool:
@@ -156,14 +137,7 @@ def is_program_text(given: object) -> bool:
     return isinstance(given, str) and ("\n" in given or "\r" in given)
 
 
-def reader_options(
-    machine: Machine,
-    *,
-    emitted: bool = False,
-    probe_lines: Sequence[int] = (),
-    expand_compensation: bool = True,
-    collect_alarms: bool = False,
-) -> _core.ReaderOptions:
+def reader_options(machine: Machine, *, emitted: bool = False) -> _core.ReaderOptions:
     """Settings with which the core reads a program of this machine."""
     options = _core.ReaderOptions()
     options.calculator_decimal_point = machine.controller.calculator_decimal_point
@@ -188,22 +162,14 @@ def reader_options(
     options.subprogram_nesting = machine.controller.nesting_limit_subprogram
     options.limits = _limits(machine, emitted=emitted)
     options.block_skip = [{"unknown": None, "on": True, "off": False}[machine.input.block_skip]] * 9
-    options.expand_compensation = expand_compensation
     options.compensation_start_up = machine.input.compensation_start_up
     options.peck_clearance_mm = machine.input.peck_clearance_mm
     options.scale_unit = machine.input.scale_unit
-    options.collect_alarms = collect_alarms
     state = _core.ModalState()
-    state.motion = int(machine.power_on.motion[1:])
-    state.plane = int(machine.power_on.plane[1:])
-    state.distance = int(machine.power_on.distance[1:])
-    state.units = int(machine.power_on.units[1:])
-    state.feed_mode = int(machine.power_on.feed_mode[1:])
-    state.exact_stop = int(machine.power_on.path_mode[1:])
-    state.coordinate_system = int(machine.power_on.work_offset[1:])
-    state.cycle_return = int(machine.power_on.cycle_return[1:])
+    names = {"path_mode": "exact_stop", "work_offset": "coordinate_system"}
+    for name, code in vars(machine.power_on).items():
+        setattr(state, names.get(name, name), int(code[1:]))
     options.power_on = state
-    options.probe_lines = list(probe_lines)
     return options
 
 
@@ -266,7 +232,7 @@ def given_text(program: str | Path, machine: Machine) -> tuple[bytes, str, Path 
     return program_bytes(program, machine.controller.max_program_bytes), str(program), Path(program).parent
 
 
-def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[str, bytes] | None]:
+def program_loader(folders: Sequence[Path], most: int) -> Finder:
     """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix."""
 
     def load(number: int) -> tuple[str, bytes] | None:
@@ -281,8 +247,6 @@ def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[
     return load
 
 
-_LOOKED_AT_BYTES = 65536
-_COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
 _OF_A_MILL = re.compile(rb"Y\s*[-+.\d#\[]|M0*6(?!\d)")
 _SURE = (
     (re.compile(rb"G(?:50|0*92)(?=\s*S\s*\d)\s*S\s*\d+"), "spindle speed limit"),
@@ -299,7 +263,7 @@ _LIKELY = (
 
 def signs_of_turning(text: bytes) -> tuple[int, str] | None:
     """What shows that a program is one of a lathe; a program with Y words or a tool change M06 is none."""
-    code = _COMMENT.sub(b"", text[:_LOOKED_AT_BYTES].upper())
+    code = COMMENT.sub(b"", text[:LOOKED_AT_BYTES].upper())
     sure = [(found, meaning) for sign, meaning in _SURE if (found := sign.search(code))]
     likely = [(found, meaning) for sign, meaning in _LIKELY if (found := sign.search(code))]
     if not sure or len(sure) + len(likely) < 2 or _OF_A_MILL.search(code):

@@ -40,7 +40,7 @@ def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
     """The programs of a text, in the order in which they stand."""
     entries = _core.list_programs(text)
     short = [_own_name(entry) for entry in entries]
-    long = [_with_folder(entry) for entry in entries]
+    long = [f"{entry.folder.rstrip('/')}/{own}" for entry, own in zip(entries, short, strict=True)]
     plain, full = Counter(short), Counter(long)
     # A line that ends with LF CR CR ends behind both.
     begins = [entry.text_begin + _carriage_returns(text, entry.text_begin) for entry in entries]
@@ -123,10 +123,6 @@ def _carriage_returns(text: bytes, at: int) -> int:
 
 def _own_name(entry: _core.ProgramEntry) -> str:
     return f"O{entry.number:04d}" if entry.number >= 0 else entry.name
-
-
-def _with_folder(entry: _core.ProgramEntry) -> str:
-    return f"{entry.folder.rstrip('/')}/{_own_name(entry)}"
 
 
 def _listed(addresses: list[str], most: int = 20) -> str:

@@ -31,7 +31,6 @@ _REFUSED: Mapping[str, str] = {
 }  # fmt: skip
 _CYCLES = frozenset(("73", "74", "81", "82", "83", "84", "85", "86", "89"))
 _CALL_BASE = 90_000_000  # O numbers of the subprograms that M97 calls, by their N number
-_EXTRA_OFFSETS = range(110, 130)
 
 _NOT_THE_SAME = re.compile(
     r"[;GMFP](?:(?<=;)|(?<=G)[ \t]*(?:0*4(?![\d.])"
@@ -47,7 +46,7 @@ _P = re.compile(r"P[ \t]*([#\[]|[-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
 _INTEGER_F = re.compile(r"F[ \t]*([-+]?\d+)(?![\d.])", re.IGNORECASE)
 _LEFT_OUT = re.compile(r"G[ \t]*(103|187)(?![\d.])((?:[ \t]*[PE][ \t]*[\d.]+)*)", re.IGNORECASE)
 _OFFSET = re.compile(r"G[ \t]*154[ \t]*P[ \t]*(\d+)", re.IGNORECASE)
-_OLD_OFFSET = re.compile(r"G[ \t]*(1[12]\d)(?![\d.])", re.IGNORECASE)
+_OLD_OFFSET = re.compile(r"G[ \t]*(1[12]\d)(?![\d.])", re.IGNORECASE)  # G110 ... G129 are G154 P1 ... P20
 _M97 = re.compile(r"M[ \t]*0*97[ \t]*P[ \t]*(\d+)((?:[ \t]*L[ \t]*\d+)?)", re.IGNORECASE)
 _M98 = re.compile(r"M[ \t]*0*98(?!\d)", re.IGNORECASE)
 _PROGRAM = re.compile(r"P[ \t]*(?:\d{5,}(?![ \t]*\d)|#\d+|\[[^\]]*\])", re.IGNORECASE)
@@ -62,20 +61,7 @@ _MACRO = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?(?:#|IF|WHILE|END|GOTO|DPRNT|PO
 
 
 def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
-    """The program in FANUC's words: what means another thing on a Haas is written anew, everything else stays.
-
-    Args:
-        source: the program.
-        file: its name, for messages.
-        machine: `controller.calculator_decimal_point` says what a number without a point is (setting 162).
-        folder: not used: programs that it calls are looked for as those of FANUC's.
-
-    Returns:
-        The program; its text is the source's to the letter where nothing differs.
-
-    Raises:
-        ProgramError: a word is refused.
-    """
+    """The program in FANUC's words: what means another thing on a Haas is written anew, everything else stays."""
     notes: dict[str, Note] = {}
     lines, called = _lines(source, file, notes)
     numbers = [*range(1, max(len(lines), 1) + 1)]
@@ -87,18 +73,7 @@ def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None =
 
 
 def called_haas_text(source: str, file: str) -> str:
-    """A program of another file that one for a Haas calls, in FANUC's words, line by line.
-
-    Args:
-        source: the program.
-        file: its name, for messages.
-
-    Returns:
-        The text.
-
-    Raises:
-        ProgramError: a word is refused.
-    """
+    """A program of another file that one for a Haas calls, in FANUC's words, line by line."""
     lines, called = _lines(source, file, {})
     if called:
         line = min(called.values())
@@ -147,17 +122,11 @@ def _refuse_in_cycles(code: str, file: str) -> None:
         if not cycle or {"10", "65"} & {*codes}:
             continue
         if cycle in {"73", "74", "83", "84"} and (word := _PECKS.search(line)):
-            raise refusal(
-                file,
-                number,
-                f"{word[0][0]} in a drilling cycle changes the pecks or the retract of a Haas, and K counts the holes "
-                "on FANUC: it is not read",
-            )
+            what = "changes the pecks or the retract of a Haas, and K counts the holes on FANUC"
+            raise refusal(file, number, f"{word[0][0]} in a drilling cycle {what}: it is not read")
         if _VARIABLE_P.search(line) and re.search(r"M[ \t]*0*9[789](?!\d)", line) is None:
-            raise refusal(
-                file, number, f"the dwell of G{cycle} by a variable is seconds or milliseconds, as the point of its "
-                "value says"
-            )  # fmt: skip
+            what = f"the dwell of G{cycle} by a variable"
+            raise refusal(file, number, f"{what} is seconds or milliseconds, as the point of its value says")
 
 
 def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
@@ -178,7 +147,7 @@ def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
         note(f"G{match[1]}", f"G{match[1]} {what}: no path, and left out here; no model of it acts on the time")
     words = _LEFT_OUT.sub("", words)
     words = _OFFSET.sub(r"G54.1P\1", words)
-    words = _OLD_OFFSET.sub(lambda match: _old_offset(match[1], match[0]), words)
+    words = _OLD_OFFSET.sub(lambda match: f"G54.1P{int(match[1]) - 109}", words)
     words = _M97.sub(lambda match: f"M98P{_CALL_BASE + int(match[1])}{match[2].strip() or 'L1'}", words)
     if (unread := _UNREAD_M97.search(words)) is not None:
         raise ValueError(f"{unread[0]} takes an N number right behind it (M97 P1000): it is not read otherwise")
@@ -202,7 +171,7 @@ def _refuse(codes: list[str], code: str) -> None:
     for name in codes:
         if name in _REFUSED:
             raise ValueError(f"G{name} is {_REFUSED[name]} on a Haas: it is not read")
-        if name not in _AS_FANUC and name not in {"103", "154", "187"} and not _is_old_offset(name):
+        if name not in _AS_FANUC and not re.fullmatch(r"103|154|187|1[12]\d", name):
             raise ValueError(f"G{name}: no text was found that says what it is on a Haas: it is not read")
     if (feed := _INTEGER_F.search(code)) is not None:
         value = int(feed[1])
@@ -221,39 +190,27 @@ def _refuse(codes: list[str], code: str) -> None:
         raise ValueError("G10 L2 P0 sets the origin of G52 on a Haas, and an external offset on FANUC: it is not read")
 
 
-def _is_old_offset(name: str) -> bool:
-    return name.isdigit() and int(name) in _EXTRA_OFFSETS
-
-
-def _old_offset(number: str, otherwise: str) -> str:
-    """G110 ... G129 are G154 P1 ... P20."""
-    return f"G54.1P{int(number) - 109}" if int(number) in _EXTRA_OFFSETS else otherwise
-
-
 def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) -> str:
     """P of a dwell: seconds with a point, milliseconds without."""
     others = {"10", "54.1", "65", "154"} & {*codes} or re.search(r"M[ \t]*0*(?:19|9[789])(?!\d)", words, re.IGNORECASE)
     match = _P.search(words)
     if match is None or (others and "4" not in codes):
         return words
-    if match[1] in {"#", "["}:
-        if "4" in codes:
-            raise ValueError("a dwell by a variable is seconds or milliseconds, as the point of its value says")
-        return words
+    if "4" in codes and match[1] in {"#", "["}:
+        raise ValueError("a dwell by a variable is seconds or milliseconds, as the point of its value says")
     if "." not in match[1]:
-        return words  # milliseconds, as FANUC's
+        return words  # milliseconds, as FANUC's, or a variable
     seconds = float(match[1])
     note(
         "dwell",
         f"P{match[1]} with a point is a dwell of {seconds:g} s on a Haas, without one milliseconds; FANUC's P is "
         "milliseconds and has no point",
     )
-    if "4" in codes:
-        return words[: match.start()] + f"X{number_text(seconds)}" + words[match.end() :]
     milliseconds = round(seconds * 1e3)
-    if abs(milliseconds - seconds * 1e3) > 1e-6:
+    if "4" not in codes and abs(milliseconds - seconds * 1e3) > 1e-6:
         raise ValueError(f"P{match[1]} is no whole number of milliseconds, in which FANUC's cycles wait")
-    return words[: match.start()] + f"P{milliseconds}" + words[match.end() :]
+    word = f"X{number_text(seconds)}" if "4" in codes else f"P{milliseconds}"
+    return words[: match.start()] + word + words[match.end() :]
 
 
 def _with_subprograms(lines: list[str], called: Mapping[int, int], file: str) -> tuple[list[str], list[int]]:

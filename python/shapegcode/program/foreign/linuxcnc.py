@@ -9,33 +9,30 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING
 
-from shapegcode.io.units import MM_PER_INCH
+from shapegcode.io.ini import UNITS_MM
 from shapegcode.program.foreign.linuxcnc_blocks import BlockRunner
 from shapegcode.program.foreign.linuxcnc_cycles import PECK_CLEARANCE_MM
-from shapegcode.program.foreign.linuxcnc_expression import (
-    Block,
-    Scanner,
-    evaluate,
-    read_block,
-    without_comments,
-)
-from shapegcode.program.foreign.linuxcnc_parameters import ParameterTable
+from shapegcode.program.foreign.linuxcnc_expression import Block, Scanner, evaluate, read_block, without_comments
+from shapegcode.program.foreign.linuxcnc_parameters import MAX_ARGUMENTS, Frame, ParameterTable
 from shapegcode.program.foreign.linuxcnc_source import KEYWORDS, OLine, SourceFile, subroutine_file
-from shapegcode.program.foreign.linuxcnc_state import Modes, State, normal_axis
-from shapegcode.program.foreign.linuxcnc_tools import find_tool_table
-from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram, refusal
+from shapegcode.program.foreign.linuxcnc_state import Modes, State, find_tool_table, normal_axis
+from shapegcode.program.foreign.plain import (
+    ForeignProgram,
+    ForeignSettings,
+    PlainProgram,
+    called_source,
+    program_folders,
+    refusal,
+)
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 _MAX_NESTING = 10  # INTERP_SUB_ROUTINE_LEVELS
-_MAX_ARGUMENTS = 30
-_MAX_FILE_BYTES = 10_000_000
 
 # No word that means another thing on FANUC, and no number with more digits than FANUC's reader takes.
 _NUMBER = r"[-+]?(?=[\d.]{1,9}(?![\d.]))\d*\.?\d*"
@@ -56,39 +53,8 @@ _N_WORD = re.compile(r"^[ \t]*/?[ \t]*N[ \t]*0*([1-9]\d{0,4})(?![\d.])", re.IGNO
 
 
 def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
-    """The plain program that a program in LinuxCNC's words comes to.
-
-    Args:
-        source: the program.
-        file: its name, for messages.
-        machine: its offsets and tools, and how much a program may ask.
-        folder: where subroutines and the tool table are looked for; None: nowhere but in the machine's folders.
-
-    Returns:
-        The plain program.
-
-    Raises:
-        ProgramError: a line cannot be read, or is refused.
-        OSError: a stated tool table cannot be read.
-    """
+    """The plain program that a program in LinuxCNC's words comes to."""
     return _Interpreter(source, file, machine, folder).run()
-
-
-@dataclass
-class _Frame:
-    """A call that runs."""
-
-    file: SourceFile
-    back: int  # line behind the call
-    caller: SourceFile
-    locals: list[float] = field(default_factory=lambda: [0.0] * (_MAX_ARGUMENTS + 1))
-    names: dict[str, float] = field(default_factory=dict)
-    repeats: dict[tuple[int, int], int] = field(default_factory=dict)
-    saved: Modes | None = None
-    restores: bool = False
-    again: int = 0  # repetitions of M98 that are left
-    begin: int = 0
-    by_m98: bool = False
 
 
 class _Interpreter:
@@ -98,17 +64,14 @@ class _Interpreter:
         self._machine = machine
         self._main = SourceFile(file, source, 0)
         self._file = self._main
-        self._folders = [
-            *([folder] if folder is not None else []),
-            *(Path(name).expanduser() for name in machine.input.program_folders),
-        ]
+        self._folders = program_folders(machine, folder)
         self._files: dict[str, SourceFile] = {}
         self._blocks: dict[tuple[int, int], Block] = {}
         self._plain = PlainProgram()
         self._state = _first_state(machine, folder)
         self._runner = BlockRunner(self._state, self._plain)
-        self._frames = [_Frame(self._main, 0, self._main)]
-        self._parameters = ParameterTable(self._state, self._frames[-1])
+        self._frames = [Frame(0, self._main)]
+        self._parameters = ParameterTable(self._state, self._frames)
         self._n_words = Counter(_N_WORD.findall(source))
         self._next = 0
         self._steps = 0
@@ -130,7 +93,7 @@ class _Interpreter:
         except RecursionError:
             message = "the values of this line are nested too deep to be worked out"
             raise refusal(self._file.name, here + 1, message + self._call_stack()) from None
-        if not self._runner.ended and not self._framed():
+        if not self._runner.ended and not self._main.text.lstrip().startswith("%"):
             raise refusal(
                 self._main.name,
                 self._main.count,
@@ -138,12 +101,11 @@ class _Interpreter:
             )
         if not self._runner.ended:
             self._plain.put("M30", self._main.count)
-        self._note_table()
-        settings = ForeignSettings(
-            tool_length_mm=self._known_tools(lengths=True),
-            tool_radius_mm=self._known_tools(lengths=False),
-            peck_clearance_mm=PECK_CLEARANCE_MM,
-        )
+        settings = ForeignSettings(peck_clearance_mm=PECK_CLEARANCE_MM)
+        if (table := self._state.table) is not None:
+            unit = f"lengths and diameters in {table.units} (input.machine_unit, or the INI file)"
+            self._plain.note(1, f"{table.file}: {len(table.tools)} tools, {unit}")
+            settings = replace(settings, tool_length_mm=table.lengths_mm, tool_radius_mm=table.radii_mm)
         return self._plain.finish("linuxcnc", self._main.count, settings)
 
     # ---- lines -----------------------------------------------------------------------------------------------
@@ -166,9 +128,6 @@ class _Interpreter:
         own = ("G17", "G90", "G94", "G64")
         if codes := [code for code, other in zip(own, given, strict=True) if code != other]:
             self._runner.put("".join(codes))
-
-    def _framed(self) -> bool:
-        return self._main.text.lstrip().startswith("%")
 
     def _fast(self) -> bool:
         """Take lines in which nothing differs as they are."""
@@ -202,14 +161,15 @@ class _Interpreter:
         if codes := _G_CODE.findall(text):
             modes.motion = int(codes[-1]) * 10
         self._runner.written_motion = modes.motion
-        modes.feed = _last_number(text, "F", modes.feed)
+        feed = _last_number(text, "F")
+        modes.feed = modes.feed if feed is None else feed
         self._runner.written_feed = modes.feed
         self._state.cycle = None
         position, unit = self._state.position, self._state.unit_mm
         for axis, letter in enumerate("XYZ"):
             here = position[axis]
             if modes.distance == 900:
-                last = _last_number(text, letter, None)
+                last = _last_number(text, letter)
                 position[axis] = here if last is None else last * unit
             elif here is not None:
                 position[axis] = here + unit * sum(map(float, _EVERY_WORD[letter].findall(text)))
@@ -292,7 +252,6 @@ class _Interpreter:
             return  # the head of a program that M98 calls
         if line.keyword not in KEYWORDS:
             raise ValueError(f"O{line.label} {line.keyword.upper()} is no keyword of LinuxCNC")
-        self._parameters.frame = self._frames[-1]
         getattr(self, f"_on_{line.keyword}")(index, line)
 
     def _values(self, line: OLine) -> list[float]:
@@ -325,8 +284,8 @@ class _Interpreter:
         if label.startswith("["):
             label = str(round(evaluate(Scanner("".join(label.split()).lower()).value(), self._parameters)))
         arguments = self._values(line)
-        if len(arguments) > _MAX_ARGUMENTS:
-            raise ValueError(f"{len(arguments)} arguments; a subroutine takes {_MAX_ARGUMENTS}")
+        if len(arguments) > MAX_ARGUMENTS:
+            raise ValueError(f"{len(arguments)} arguments; a subroutine takes {MAX_ARGUMENTS}")
         file, begin = self._subroutine(label, "sub")
         frame = self._enter(file, begin + 1, index)
         frame.locals[1 : len(arguments) + 1] = arguments
@@ -340,30 +299,28 @@ class _Interpreter:
         if (line := self._main.find(label, keyword)) is not None:
             return self._main, line
         if label not in self._files:
-            read = partial(_file_text, most=min(_MAX_FILE_BYTES, self._machine.controller.max_program_bytes))
-            found = subroutine_file(label, self._folders, read)
-            if found is None:
+            path = subroutine_file(label, self._folders)
+            if path is None:
                 name = label.strip("<>")
                 raise ValueError(
                     f"subroutine O{label} is neither in the file nor is there {name}.ngc beside it or in "
                     "input.program_folders"
                 )
-            self._plain.names.append(str(found[0]))
-            self._files[label] = SourceFile(str(found[0]), found[1], len(self._plain.names))
+            text = called_source(path, self._machine)
+            self._plain.names.append(str(path))
+            self._files[label] = SourceFile(str(path), text, len(self._plain.names))
             self._read_lines += self._files[label].count
         file = self._files[label]
         if (line := file.find(label, keyword)) is None:
             raise ValueError(f"{file.name} holds no O{label} {keyword.upper()}")
         return file, line
 
-    def _enter(self, file: SourceFile, begin: int, index: int) -> _Frame:
+    def _enter(self, file: SourceFile, begin: int, index: int) -> Frame:
         if len(self._frames) > _MAX_NESTING:
             raise ValueError(f"subroutines are nested more than {_MAX_NESTING} deep")
-        frame = _Frame(file, index + 1, self._file, begin=begin)
+        frame = Frame(index + 1, self._file, begin=begin)
         self._frames.append(frame)
         self._file, self._next = file, begin
-        self._parameters.frame = frame
-        self._parameters.call_level = len(self._frames) - 1
         return frame
 
     def _leave(self) -> None:
@@ -371,10 +328,8 @@ class _Interpreter:
         if frame.restores and frame.saved is not None:
             self._runner.restore(frame.saved)
         self._file, self._next = frame.caller, frame.back
-        self._parameters.frame = self._frames[-1]
-        self._parameters.call_level = len(self._frames) - 1
 
-    def _return(self, line: OLine) -> None:
+    def _on_return(self, _: int, line: OLine) -> None:
         if len(self._frames) == 1 or self._frames[-1].by_m98:
             raise ValueError(f"O{line.label} {line.keyword.upper()} outside of a subroutine")
         values = self._values(line)
@@ -385,11 +340,7 @@ class _Interpreter:
             self._parameters.set("_value_returned", 1.0)
         self._leave()
 
-    def _on_endsub(self, _: int, line: OLine) -> None:
-        self._return(line)
-
-    def _on_return(self, _: int, line: OLine) -> None:
-        self._return(line)
+    _on_endsub = _on_return
 
     def _on_if(self, index: int, line: OLine) -> None:
         while not self._condition(line):
@@ -428,8 +379,7 @@ class _Interpreter:
             raise ValueError(f"O{line.label} ENDWHILE without WHILE")
         self._next = opening
 
-    def _on_do(self, _: int, __: OLine) -> None:
-        pass
+    _on_do = _on_endif
 
     def _on_repeat(self, index: int, line: OLine) -> None:
         count = round(self._condition(line))  # 2.7 is 3, 2.5 is 2: as rs274 2.9 repeats
@@ -514,20 +464,6 @@ class _Interpreter:
         calls = [f"{frame.caller.name} line {frame.back}" for frame in reversed(self._frames[1:])]
         return f"; called from {', '.join(calls[:3])}" if calls else ""
 
-    def _known_tools(self, *, lengths: bool) -> dict[int, float]:
-        table = self._state.table
-        if table is None:
-            return {}
-        return {
-            number: tool.offset_mm[2] if lengths else tool.diameter_mm / 2.0 for number, tool in table.tools.items()
-        }
-
-    def _note_table(self) -> None:
-        table = self._state.table
-        if table is not None:
-            unit = f"lengths and diameters in {table.units} (input.machine_unit, or the INI file)"
-            self._plain.note(1, f"{table.file}: {len(table.tools)} tools, {unit}")
-
 
 def _first_state(machine: Machine, folder: Path | None) -> State:
     """At the first line: what the machine file says of modes, offsets and tools."""
@@ -538,31 +474,17 @@ def _first_state(machine: Machine, folder: Path | None) -> State:
         number = int(name[6:]) + 6 if name.startswith("G54.1P") else int(name[1:]) - 53
         state.work[number] = [*offsets]
     state.table = find_tool_table(machine.input.tool_table, machine.input.machine_unit, folder)
+    state.machine_unit_mm = UNITS_MM[machine.input.machine_unit]
     if state.table is not None:
-        state.lengths = {number: tool.offset_mm[2] for number, tool in state.table.tools.items()}
-        state.radii = {number: tool.diameter_mm / 2.0 for number, tool in state.table.tools.items()}
-    state.machine_unit_mm = MM_PER_INCH if machine.input.machine_unit == "inch" else 1.0
-    if state.table is not None:
+        state.lengths, state.radii = state.table.lengths_mm, state.table.radii_mm
         state.machine_unit_mm = state.table.unit_mm
     state.lengths.update({int(number): length for number, length in machine.input.tool_length_mm.items()})
     state.radii.update({int(number): radius for number, radius in machine.input.tool_radius_mm.items()})
     return state
 
 
-@overload
-def _last_number(text: str, letter: str, otherwise: float) -> float: ...
-@overload
-def _last_number(text: str, letter: str, otherwise: None) -> float | None: ...
-def _last_number(text: str, letter: str, otherwise: float | None) -> float | None:
+def _last_number(text: str, letter: str) -> float | None:
     """The number of the last word of a letter."""
     at = max(text.rfind(letter), text.rfind(letter.lower()))
-    if at < 0:
-        return otherwise
-    match = _LAST_WORD[letter].match(text, at)
-    return otherwise if match is None else float(match[1])
-
-
-def _file_text(path: Path, most: int) -> str:
-    from shapegcode.io.data_file import read_file
-
-    return read_file(path, most).decode("utf-8-sig", "replace")
+    match = _LAST_WORD[letter].match(text, at) if at >= 0 else None
+    return None if match is None else float(match[1])

@@ -5,20 +5,16 @@ Order of execution: LinuxCNC's G-code overview, "G-Code Order of Execution".
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from shapegcode.program.foreign.linuxcnc_codes import (
-    SYSTEMS,
-    by_group_of,
-    refuse_codes,
-    refuse_unused,
-    sorted_words,
-)
+from shapegcode.program.foreign.arcs import centre_by_radius, sweep_of
+from shapegcode.program.foreign.linuxcnc_codes import SYSTEMS, by_group_of, refuse_unused, sorted_words
 from shapegcode.program.foreign.linuxcnc_cycles import drill
 from shapegcode.program.foreign.linuxcnc_offsets import Offsets
-from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, plane_axes, system_words
-from shapegcode.program.foreign.plain import PlainProgram, number_text
+from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, given_axes, plane_axes, system_words
+from shapegcode.program.foreign.plain import PlainProgram, number_text, words_of
 
 _BEFORE_MOTION = (6, 19, 3, 4, 5, 7, 8, 9, 48, 49)
 _STOPS = (0, 1, 2, 30, 60)
@@ -26,7 +22,6 @@ _KEPT_OUTPUTS = {
     50: "feed override", 51: "spindle override", 52: "adaptive feed", 53: "feed hold switch", 62: "digital output",
     63: "digital output", 64: "digital output", 65: "digital output", 67: "analog output", 68: "analog output",
 }  # fmt: skip
-_FULL_TURN = 1e-9  # rad
 
 
 class BlockRunner:
@@ -57,27 +52,15 @@ class BlockRunner:
         self.plain.note(self.line if not self.file else 1, where + text, key)
 
     def run(self, words: Sequence[tuple[str, float]], comments: Sequence[str]) -> None:
-        """Execute a block.
-
-        Args:
-            words: in order, with their values.
-            comments: of its line.
-
-        Raises:
-            ValueError: it cannot be read, or is refused.
-        """
+        """Execute a block."""
         codes, functions, values = sorted_words(words)
-        refuse_codes(codes, functions, values)
-        by_group = by_group_of(codes)
+        by_group = by_group_of(codes, functions, values)
         refuse_unused(self.state.modes, by_group, functions, values)
         for text in filter(None, map(_plain_comment, comments)):
             self.put(f"({text})")
         if not words:
             return
-        modes = self.state.modes
-        before = modes.feed_mode
-        modes.feed_mode = by_group.get("feed", before)
-        self._feed(values, changed=modes.feed_mode != before)
+        self._feed(by_group.get("feed"), values)
         self._functions(functions, values)
         if "dwell" in by_group:
             self._dwell(values)
@@ -88,11 +71,16 @@ class BlockRunner:
     def sync(self) -> None:
         """Before lines that are taken as they are: G90 or G91 and F are in force in the plain program too."""
         modes = self.state.modes
-        if self.written_distance != modes.distance:
-            self.put(f"G{modes.distance // 10}")
-            self.written_distance = modes.distance
+        if code := self._distance(modes.distance):
+            self.put(code)
         if self.written_feed != modes.feed and modes.feed > 0.0 and modes.feed_mode != 930:
             self.put(self._written_f())
+
+    def _distance(self, code: int) -> str:
+        """G90 or G91, where the plain program has the other one; it has this from then on."""
+        changes = self.written_distance != code
+        self.written_distance = code
+        return f"G{code // 10}" if changes else ""
 
     def _written_f(self) -> str:
         """F of the mode in force, which the plain program has from then on."""
@@ -101,10 +89,10 @@ class BlockRunner:
 
     # ---- what comes before the move --------------------------------------------------------------------------
 
-    def _feed(self, values: Mapping[str, float], *, changed: bool) -> None:
+    def _feed(self, mode: int | None, values: Mapping[str, float]) -> None:
         modes = self.state.modes
-        if changed:
-            modes.feed = self.written_feed = 0.0
+        if mode not in {None, modes.feed_mode}:
+            modes.feed_mode, modes.feed, self.written_feed = mode or 0, 0.0, 0.0
         if "f" in values:
             if values["f"] < 0.0:
                 raise ValueError(f"F{values['f']:g} is negative")
@@ -137,10 +125,8 @@ class BlockRunner:
             elif function in _KEPT_OUTPUTS:
                 self.note(f"M{function} ({_KEPT_OUTPUTS[function]}) moves nothing and is left out", f"M{function}")
             elif 100 <= function <= 199:
-                self.note(
-                    f"M{function} runs a program of the machine's own: it is kept without P and Q", f"M{function}"
-                )
                 line.append(f"M{function}")
+                self.note(f"{line[-1]} runs a program of the machine's own: it is kept without P and Q", line[-1])
         for start in range(0, len(line), 3):  # no more M codes in a block than every FANUC control takes
             self.put("".join(line[start : start + 3]))
 
@@ -267,18 +253,17 @@ class BlockRunner:
             raise ValueError("a drilling cycle in G93")
         feed = self._written_f() if modes.feed > 0.0 else ""
         self.written_motion = None
-        lines = [*self._holes(values, fresh=fresh)]
-        if self.written_distance != 900:
-            self.put("G90")
-            self.written_distance = 900
+        lines = list(self._holes(values, fresh=fresh))
+        if code := self._distance(900):
+            self.put(code)
         for index, line in enumerate(lines):
             self.put(line + (feed if index == 0 or line.startswith("G01") else ""))
 
     def _holes(self, values: Mapping[str, float], *, fresh: bool) -> Iterator[str]:
         """The lines of a block of a cycle; with polar words each repetition goes on from the hole before it."""
-        polar = "@" in values or "^" in values
-        times = int(values.get("l", 1.0)) if polar else 1
-        if polar:
+        times = 1
+        if "@" in values or "^" in values:
+            times = int(values.get("l", 1.0))
             values = {letter: value for letter, value in values.items() if letter != "l"}
         for time in range(times):
             yield from drill(self.state, self.state.modes.motion, self._cartesian(values), fresh and time == 0)
@@ -299,24 +284,17 @@ class BlockRunner:
                 return
         incremental = modes.distance == 910 and not machine
         start = [*state.position]
-        for axis in range(3):
-            if (given := values.get(AXES[axis])) is not None:
-                here = state.position[axis]
-                state.position[axis] = (
-                    given * state.unit_mm if not incremental else None if here is None else here + given * state.unit_mm
-                )
-        head = [*codes]
-        wanted = 910 if incremental else 900
-        if self.written_distance != wanted:
-            head.append(f"G{wanted // 10}")
-            self.written_distance = wanted
-        head.append(f"G{modes.motion // 10:02d}")
+        for axis in given_axes(values):
+            here, given = state.position[axis], values[AXES[axis]] * state.unit_mm
+            state.position[axis] = given if not incremental else None if here is None else here + given
+        head = f"{''.join(codes)}{self._distance(910 if incremental else 900)}G{modes.motion // 10:02d}"
         self.written_motion = modes.motion
         if modes.motion < 20:
-            self.put("".join(head) + _words(values, "xyzabc") + self._feed_word(values))
+            self.put(head + words_of(values, "xyzabc") + self._feed_word(values))
         else:
-            for number, (axes, feed) in enumerate(self._arc(values, start, incremental=incremental)):
-                self.put(("".join(head) if number == 0 else "") + axes + feed)
+            first, *others = self._arc(values, start, incremental=incremental)
+            for block in (head + first, *others):
+                self.put(block)
 
     def _feed_word(self, values: Mapping[str, float]) -> str:
         modes = self.state.modes
@@ -339,21 +317,19 @@ class BlockRunner:
         if x is None or y is None:
             raise ValueError("the position of X and Y is not known, from which @ and ^ go on")
         unit = state.unit_mm
-        radius, angle = math.hypot(x, y) / unit, math.degrees(math.atan2(y, x))
+        here, incremental = complex(x, y) / unit, state.modes.distance == 910
+        radius, angle = abs(here), math.degrees(cmath.phase(here))
         if radius == 0.0 and "^" not in values:
             raise ValueError("a polar radius @ without an angle ^ at the origin")
-        if state.modes.distance == 910:
+        if incremental:
             radius, angle = radius + values.get("@", 0.0), angle + values.get("^", 0.0)
         else:
             radius, angle = values.get("@", radius), values.get("^", angle)
-        to = radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle))
-        if state.modes.distance == 910:
-            to = to[0] - x / unit, to[1] - y / unit
-        return {**{letter: value for letter, value in values.items() if letter not in "@^"}, "x": to[0], "y": to[1]}
+        to = cmath.rect(radius, math.radians(angle)) - (here if incremental else 0.0)
+        others = {letter: value for letter, value in values.items() if letter not in "@^"}
+        return {**others, "x": to.real, "y": to.imag}
 
-    def _arc(
-        self, values: Mapping[str, float], start: Sequence[float | None], *, incremental: bool
-    ) -> list[tuple[str, str]]:
+    def _arc(self, values: Mapping[str, float], start: Sequence[float | None], *, incremental: bool) -> list[str]:
         """Words of an arc and its F: one block, and one more for each further full turn."""
         state, modes, unit = self.state, self.state.modes, self.state.unit_mm
         first, second = plane_axes(modes.plane)
@@ -369,32 +345,27 @@ class BlockRunner:
         if not known:
             if turns > 1 or modes.centres == 901 or modes.feed_mode == 930:
                 raise ValueError("the position is not known, which this arc needs (P turns, G90.1, G93)")
-            return [(_words(values, "xyzabcijkr"), self._feed_word(values))]
-        here = start[first] or 0.0, start[second] or 0.0
-        to = state.position[first] or 0.0, state.position[second] or 0.0
-        sense = 1.0 if modes.motion == 30 else -1.0
+            return [words_of(values, "xyzabcijkr") + self._feed_word(values)]
+        here = complex(start[first] or 0.0, start[second] or 0.0)
+        to = complex(state.position[first] or 0.0, state.position[second] or 0.0)
+        turn = 1 if modes.motion == 30 else -1
+        given = complex(values.get(names[0], 0.0), values.get(names[1], 0.0)) * unit
         if "r" in values:
-            centre = _centre_of_radius(here, to, values["r"] * unit, sense)
-        elif modes.centres == 901:
-            if any(name not in values for name in names):
-                raise ValueError(f"G90.1 needs {names[0].upper()} and {names[1].upper()}")
-            centre = values[names[0]] * unit, values[names[1]] * unit
+            centre = _centre_of_radius(here, to, values["r"] * unit, turn)
+        elif modes.centres == 901 and any(name not in values for name in names):
+            raise ValueError(f"G90.1 needs {names[0].upper()} and {names[1].upper()}")
         else:
-            centre = here[0] + values.get(names[0], 0.0) * unit, here[1] + values.get(names[1], 0.0) * unit
-        words = "".join(
-            f"{name.upper()}{number_text((middle - begin) / unit)}"
-            for name, middle, begin in zip(names, centre, here, strict=True)
-        )
-        sweep = _sweep(here, to, centre, sense)
-        radius = math.hypot(here[0] - centre[0], here[1] - centre[1])
-        feed = self._arc_feed(values, sweep + (turns - 1.0) * math.tau, radius, start)
-        blocks: list[tuple[str, str]] = []
+            centre = given if modes.centres == 901 else here + given
+        spoke = (centre - here) / unit
+        words = words_of({names[0]: spoke.real, names[1]: spoke.imag}, "".join(names))
+        total = abs(sweep_of(here, to, centre, turn)) + (turns - 1.0) * math.tau
+        feed = self._arc_feed(values, total, abs(here - centre), start)
+        blocks: list[str] = []
         normal = 3 - first - second
-        total = sweep + (turns - 1.0) * math.tau
         rise = values.get(AXES[normal])
         name = AXES[normal].upper()
         last = {letter: value for letter, value in values.items() if letter in "xyzabc"}
-        for turn in range(1, int(turns)):
+        for time in range(1, int(turns)):
             axial = ""
             if rise is not None:
                 if start[normal] is None and not incremental:
@@ -402,12 +373,12 @@ class BlockRunner:
                 share = math.tau / total
                 begin = (start[normal] or 0.0) / unit
                 step = rise * share if incremental else (rise - begin) * share
-                axial = f"{name}{number_text(step if incremental else begin + turn * step)}"
+                axial = f"{name}{number_text(step if incremental else begin + time * step)}"
                 if incremental:
-                    last[AXES[normal]] = rise * (1.0 - turn * share)
-            blocks.append((axial + words, feed if turn == 1 else ""))
-        blocks.append((_words(last, "xyzabc") + words, feed if turns < 2 else ""))
-        return blocks
+                    last[AXES[normal]] = rise * (1.0 - time * share)
+            blocks.append(axial + words)
+        blocks.append(words_of(last, "xyzabc") + words)
+        return [blocks[0] + feed, *blocks[1:]]
 
     def _arc_feed(self, values: Mapping[str, float], sweep: float, radius: float, start: Sequence[float | None]) -> str:
         """F of an arc: in G93 LinuxCNC's counts the whole block, FANUC's the radius."""
@@ -455,10 +426,6 @@ class BlockRunner:
         state.modes = kept
 
 
-def _words(values: Mapping[str, float], letters: str) -> str:
-    return "".join(f"{letter.upper()}{number_text(values[letter])}" for letter in letters if letter in values)
-
-
 def _plain_comment(text: str) -> str:
     """A comment that FANUC's reader takes; those that LinuxCNC executes are left out."""
     if text.lower().startswith(("msg,", "debug,", "print,", "log", "probe")):
@@ -466,26 +433,11 @@ def _plain_comment(text: str) -> str:
     return "".join(c for c in text.upper() if " " <= c <= "~" and c not in "()%;").strip()
 
 
-def _centre_of_radius(
-    here: tuple[float, float], to: tuple[float, float], radius: float, sense: float
-) -> tuple[float, float]:
-    """The centre of an arc with R; negative: more than half a turn."""
-    chord = math.hypot(to[0] - here[0], to[1] - here[1])
+def _centre_of_radius(here: complex, to: complex, radius: float, turn: int) -> complex:
+    """The centre of an arc with R."""
+    chord = abs(to - here)
     if chord == 0.0 or radius == 0.0:
         raise ValueError("an arc with R ends where it begins, or its R is 0")
-    half = chord / 2.0
-    if half - abs(radius) > 0.00127:
+    if chord / 2.0 - abs(radius) > 0.00127:
         raise ValueError(f"R{abs(radius):g} mm is too small for a chord of {chord:g} mm")
-    height = math.sqrt(max(0.0, radius * radius - half * half))
-    side = sense * (1.0 if radius > 0.0 else -1.0) * height / chord
-    middle = (here[0] + to[0]) / 2.0, (here[1] + to[1]) / 2.0
-    return middle[0] - side * (to[1] - here[1]), middle[1] + side * (to[0] - here[0])
-
-
-def _sweep(here: tuple[float, float], to: tuple[float, float], centre: tuple[float, float], sense: float) -> float:
-    """The angle of an arc's last turn, rad; a full circle where it ends as it begins."""
-    begin = math.atan2(here[1] - centre[1], here[0] - centre[0])
-    end = math.atan2(to[1] - centre[1], to[0] - centre[0])
-    sweep = math.fmod(sense * (end - begin), math.tau)
-    sweep += math.tau if sweep < 0.0 else 0.0
-    return math.tau if sweep < _FULL_TURN else sweep
+    return centre_by_radius(here, to, radius, turn)

@@ -81,28 +81,8 @@ def sorted_words(words: Sequence[tuple[str, float]]) -> tuple[list[int], list[in
     return codes, functions, values
 
 
-def by_group_of(codes: Sequence[int]) -> dict[str, int]:
-    """The G codes of a block by their groups."""
-    found: dict[str, int] = {}
-    for code in codes:
-        group = _GROUPS[code]
-        if group in found:
-            raise ValueError(f"{code_text(found[group])} and {code_text(code)} in one block")
-        found[group] = code
-    return found
-
-
-def refuse_codes(codes: Sequence[int], functions: Sequence[int], values: Mapping[str, float]) -> None:
-    """Codes and words that are not read.
-
-    Args:
-        codes: G codes of a block, in tenths.
-        functions: its M codes.
-        values: its other words.
-
-    Raises:
-        ValueError: one of them is not.
-    """
+def by_group_of(codes: Sequence[int], functions: Sequence[int], values: Mapping[str, float]) -> dict[str, int]:
+    """The G codes of a block by their groups; what is not read is refused."""
     for code in codes:
         if code in REFUSED:
             raise ValueError(f"{code_text(code)} is {REFUSED[code]}: it is not read")
@@ -115,22 +95,17 @@ def refuse_codes(codes: Sequence[int], functions: Sequence[int], values: Mapping
         raise ValueError(f"{letter.upper()} is an axis beside X, Y, Z, and another thing on FANUC: it is not read")
     if "$" in values and values["$"] != 0.0:
         raise ValueError("$ selects another spindle: it is not read")
+    found: dict[str, int] = {}
+    for code in codes:
+        if (other := found.setdefault(_GROUPS[code], code)) != code or codes.count(code) > 1:
+            raise ValueError(f"{code_text(other)} and {code_text(code)} in one block")
+    return found
 
 
 def refuse_unused(
     modes: Modes, by_group: Mapping[str, int], functions: Sequence[int], values: Mapping[str, float]
 ) -> None:
-    """Words that no code of the block uses, as LinuxCNC refuses them: X1e3 is X1 and E3, not 1000.
-
-    Args:
-        modes: in force before the block.
-        by_group: its G codes, in tenths, by their groups.
-        functions: its M codes.
-        values: its other words.
-
-    Raises:
-        ValueError: there is one, or two M codes of one group.
-    """
+    """Words that no code of the block uses, as LinuxCNC refuses them: X1e3 is X1 and E3, not 1000."""
     codes = {*by_group.values()}
     goes_on = any(letter in values for letter in "xyzabcijk@^") and not codes & (_ONE_SHOT - {530})
     motion = by_group.get("motion", modes.motion if goes_on else None)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from shapegcode.program.foreign.linuxcnc_state import AXES, CycleWords, State, normal_axis, plane_axes
-from shapegcode.program.foreign.plain import number_text
+from shapegcode.program.foreign.plain import number_text, words_of
 
 PECK_CLEARANCE_MM = 0.254
 _NEEDS_DWELL = {820: "G82", 860: "G86", 890: "G89"}
@@ -19,20 +19,7 @@ _REVERSED = {3: 4, 4: 3}
 
 
 def drill(state: State, code: int, words: Mapping[str, float], fresh: bool) -> Iterator[str]:
-    """The lines of one block of a drilling cycle; the state is behind it then.
-
-    Args:
-        state: before the block; its position of the drilling axis must be known where R asks for it.
-        code: of the cycle, in tenths.
-        words: of the block.
-        fresh: the cycle begins with this block, or another one was in force.
-
-    Yields:
-        Lines in FANUC's words, with G90.
-
-    Raises:
-        ValueError: a word is missing, or the position is not known.
-    """
+    """The lines of one block of a drilling cycle; the state is behind it then."""
     modes, unit = state.modes, state.unit_mm
     normal = normal_axis(modes.plane)
     first, second = sorted(plane_axes(modes.plane))
@@ -72,11 +59,8 @@ def drill(state: State, code: int, words: Mapping[str, float], fresh: bool) -> I
             if incremental and here is None:
                 raise ValueError(f"the position of {AXES[axis].upper()} is not known, from which G91 counts")
             state.position[axis] = given * unit + ((here or 0.0) if incremental else 0.0)
-        place = "".join(
-            f"{AXES[axis].upper()}{number_text(value / unit)}"
-            for axis in (first, second)
-            if (value := state.position[axis]) is not None
-        )
+        known = ((axis, state.position[axis]) for axis in (first, second))
+        place = words_of({AXES[axis]: value / unit for axis, value in known if value is not None})
         if lift is not None:
             yield f"G00{place}{AXES[normal].upper()}{number_text(lift / unit)}"
             state.position[normal], row.entered, lift = lift, None, None

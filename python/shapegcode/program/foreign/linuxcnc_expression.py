@@ -10,24 +10,14 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from shapegcode.program.foreign.linuxcnc_parameters import ParameterTable
 
 _EQUAL = 1e-4  # EQ, NE: values nearer to each other are equal; in later versions than 2.9.0~pre1 for LE and GE too
 
-Value = Callable[["Parameters"], float]
-
-
-class Parameters(Protocol):
-    """Where expressions find the values of parameters."""
-
-    def numbered(self, number: int) -> float:
-        """The value of `#number`."""
-
-    def named(self, name: str) -> float:
-        """The value of `#<name>`."""
-
-    def exists(self, name: str) -> bool:
-        """Whether `#<name>` has a value."""
+Value = Callable[["ParameterTable"], float]
 
 
 @dataclass(frozen=True)
@@ -86,39 +76,30 @@ _OPERATORS: dict[str, tuple[int, Callable[[float, float], float]]] = {
 }
 
 
-def _inverse(name: str, function: Callable[[float], float]) -> Callable[[float], float]:
+def _of_some(name: str, must: str, function: Callable[[float], float]) -> Callable[[float], float]:
+    """A function that has no value for every number: then Python's raises."""
+
     def checked(value: float) -> float:
-        if not -1.0 <= value <= 1.0:
-            raise ValueError(f"{name} of {value:g}: it must be -1 to 1")
-        return math.degrees(function(value))
+        try:
+            return function(value)
+        except ValueError:
+            raise ValueError(f"{name} of {value:g}: it must {must}") from None
 
     return checked
 
 
-def _logarithm(value: float) -> float:
-    if value <= 0.0:
-        raise ValueError(f"LN of {value:g}: it must be positive")
-    return math.log(value)
-
-
-def _root(value: float) -> float:
-    if value < 0.0:
-        raise ValueError(f"SQRT of {value:g}: it must not be negative")
-    return math.sqrt(value)
-
-
 _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "abs": abs,
-    "acos": _inverse("ACOS", math.acos),
-    "asin": _inverse("ASIN", math.asin),
+    "acos": _of_some("ACOS", "be -1 to 1", lambda value: math.degrees(math.acos(value))),
+    "asin": _of_some("ASIN", "be -1 to 1", lambda value: math.degrees(math.asin(value))),
     "cos": lambda value: math.cos(value * math.pi / 180.0),
     "exp": math.exp,
     "fix": lambda value: float(math.floor(value)),
     "fup": lambda value: float(math.ceil(value)),
-    "ln": _logarithm,
+    "ln": _of_some("LN", "be positive", math.log),
     "round": lambda value: float(int(value + (0.5 if value >= 0.0 else -0.5))),
     "sin": lambda value: math.sin(value * math.pi / 180.0),
-    "sqrt": _root,
+    "sqrt": _of_some("SQRT", "not be negative", math.sqrt),
     "tan": lambda value: math.tan(value * math.pi / 180.0),
 }
 
@@ -216,26 +197,22 @@ class Scanner:
 
     def _expression(self) -> Value:
         """Up to the bracket that closes it; operators of one precedence from left to right."""
-        values = [_worked_out(self.value())]
-        pending: list[tuple[int, Callable[[float, float], float]]] = []
-        while not self.take("]"):
-            found = _OPERATOR.match(self.text, self.at)
-            if found is None:
-                raise ValueError(f"an operator or ] is expected at {self.left[:12]!r}")
+        value = self._operation(0)
+        if not self.take("]"):
+            raise ValueError(f"an operator or ] is expected at {self.left[:12]!r}")
+        return value
+
+    def _operation(self, above: int) -> Value:
+        """Values and the operators of a higher rank between them."""
+        left = _worked_out(self.value())
+        while (found := _OPERATOR.match(self.text, self.at)) and (rank := _OPERATORS[found[0]][0]) > above:
             self.at = found.end()
-            rank, operator = _OPERATORS[found[0]]
-            while pending and pending[-1][0] >= rank:
-                _join(values, pending.pop()[1])
-            pending.append((rank, operator))
-            values.append(_worked_out(self.value()))
-        while pending:
-            _join(values, pending.pop()[1])
-        return values[0]
+            left = _joined(_OPERATORS[found[0]][1], left, self._operation(rank))
+        return left
 
 
-def _join(values: list[Value], operator: Callable[[float, float], float]) -> None:
-    right, left = values.pop(), values.pop()
-    values.append(lambda parameters: operator(left(parameters), right(parameters)))
+def _joined(operator: Callable[[float, float], float], left: Value, right: Value) -> Value:
+    return lambda parameters: operator(left(parameters), right(parameters))
 
 
 def _worked_out(value: float | Value) -> Value:
@@ -252,19 +229,8 @@ def _whole(value: float) -> int:
     return number
 
 
-def evaluate(value: float | Value, parameters: Parameters) -> float:
-    """The value of a word when its line runs.
-
-    Args:
-        value: the word's.
-        parameters: the values of parameters.
-
-    Returns:
-        The number.
-
-    Raises:
-        ValueError: it has none.
-    """
+def evaluate(value: float | Value, parameters: ParameterTable) -> float:
+    """The value of a word when its line runs."""
     try:
         result = value if isinstance(value, float) else value(parameters)
     except OverflowError:
@@ -275,14 +241,7 @@ def evaluate(value: float | Value, parameters: Parameters) -> float:
 
 
 def without_comments(line: str) -> tuple[str, tuple[str, ...]]:
-    """A line without comments and blanks, its letters small, and the comments.
-
-    Args:
-        line: as it is written.
-
-    Returns:
-        The line and the texts of its comments.
-    """
+    """A line without comments and blanks, its letters small, and the comments."""
     if "(" not in line and ";" not in line:
         return line.translate(_BLANKS).lower(), ()
     comments: list[str] = []
@@ -301,17 +260,7 @@ def without_comments(line: str) -> tuple[str, tuple[str, ...]]:
 
 
 def read_block(line: str) -> Block:
-    """The words of a line that is no O line.
-
-    Args:
-        line: as it is written.
-
-    Returns:
-        Its words, in order, their values still expressions.
-
-    Raises:
-        ValueError: it cannot be read.
-    """
+    """The words of a line that is no O line."""
     code, comments = without_comments(line)
     skips = code.startswith("/")
     if code.startswith("/o"):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
-from shapegcode.program.foreign.linuxcnc_state import AXES, State, system_words
-from shapegcode.program.foreign.plain import number_text
+from shapegcode.program.foreign.linuxcnc_state import AXES, State, given_axes, system_words
+from shapegcode.program.foreign.plain import number_text, words_of
 
 _DYNAMIC_NUMBER = 999  # H number under which the plain program holds the length of G43.1
 
@@ -21,26 +21,21 @@ class Offsets:
     def length(self, code: int, values: Mapping[str, float]) -> None:
         """G43, G43.1, G49."""
         state = self.state
-        if code == 490:
+        number = int(values.get("h", state.tool))
+        if code == 490 or (code == 430 and number == 0):
             state.set_length(0.0, 0)
             self._put("G49")
         elif code == 431:
-            if values.get("x", 0.0) or values.get("y", 0.0):
-                raise ValueError("G43.1 with an offset of X or Y: only that of Z is read")
-            length = values.get("z", 0.0) * state.unit_mm
+            _refuse_x_and_y("G43.1", values)
+            length = values.get("z", 0.0)
             # Its number is free in the plain program; G49 first, so that the reader knows the change.
             self._put("G49")
-            self._put(f"G90G10L10P{_DYNAMIC_NUMBER}R{number_text(length / state.unit_mm)}")
+            self._put(f"G90G10L10P{_DYNAMIC_NUMBER}R{number_text(length)}")
             if state.modes.distance == 910:
                 self._put("G91")
             self._put(f"G43H{_DYNAMIC_NUMBER}")
-            state.set_length(length, _DYNAMIC_NUMBER)
+            state.set_length(length * state.unit_mm, _DYNAMIC_NUMBER)
         else:
-            number = int(values["h"]) if "h" in values else state.tool
-            if number == 0:
-                state.set_length(0.0, 0)
-                self._put("G49")
-                return
             if state.table is not None and number not in state.lengths:
                 raise ValueError(f"G43 H{number}: {state.table.file} has no tool {number}")
             if state.table is not None and (tool := state.table.tools.get(number)) and any(tool.offset_mm[:2]):
@@ -65,9 +60,7 @@ class Offsets:
         """Axis words of G53 in the program's coordinates; empty: written as FANUC's G53, as no offset is known."""
         state = self.state
         found: dict[str, float] = {letter: value for letter, value in values.items() if letter not in "xyz"}
-        for axis in range(3):
-            if AXES[axis] not in values:
-                continue
+        for axis in given_axes(values):
             parts = [state.offsets(state.modes.system)[axis], state.g92[axis]]
             if axis == 2:
                 parts.append(state.length)
@@ -82,12 +75,12 @@ class Offsets:
         return found
 
     def _machine(self, values: Mapping[str, float]) -> None:
-        words = ""
-        for axis in range(3):
-            if AXES[axis] in values:
-                words += f"{AXES[axis].upper()}{number_text(values[AXES[axis]])}"
-                self.state.position[axis] = None
-        self._in_absolute(f"G53G00{words}")
+        self._in_absolute(f"G53G00{words_of(values)}")
+        self._forget(given_axes(values))
+
+    def _forget(self, axes: Sequence[int]) -> None:
+        for axis in axes:
+            self.state.position[axis] = None
 
     def _in_absolute(self, text: str) -> None:
         """A line in G90, whatever is in force."""
@@ -99,36 +92,27 @@ class Offsets:
             self._put(f"G90{text}")
 
     def _reference(self, code: int, values: Mapping[str, float]) -> None:
-        state = self.state
-        axes = [axis for axis in range(3) if AXES[axis] in values]
-        if axes:
-            words = "".join(f"{AXES[axis].upper()}{number_text(values[AXES[axis]])}" for axis in axes)
-            mode = "G91" if state.modes.distance == 910 else "G90"
-            self._put(f"{mode}G{code // 10}{words}")
+        distance = self.state.modes.distance
+        if axes := given_axes(values):
+            self._put(f"G{distance // 10}G{code // 10}{words_of(values)}")
         else:
-            axes = [0, 1, 2]
             self._put(f"G91G{code // 10}X0.Y0.Z0.")
-            if state.modes.distance == 900:
+            if distance == 900:
                 self._put("G90")
-        for axis in axes:
-            state.position[axis] = None
+        self._forget(axes or range(3))
 
     def _local(self, values: Mapping[str, float]) -> None:
         """G52: the offset of G92 is what it says."""
         state = self.state
-        words = ""
-        for axis in range(3):
-            if AXES[axis] not in values:
-                continue
+        for axis in (axes := given_axes(values)):
             offset = values[AXES[axis]] * state.unit_mm
             if state.g92[axis] != 0.0 and not state.g52:
                 raise ValueError("G52 behind G92: both set one offset on LinuxCNC, and two on FANUC")
             state.shift(axis, state.g92[axis], offset)
             state.g92[axis] = offset
-            words += f"{AXES[axis].upper()}{number_text(values[AXES[axis]])}"
-        if words:
+        if axes:
             state.g52 = any(state.g92)
-            self._put(f"G52{words}")
+            self._put(f"G52{words_of(values)}")
 
     def _setting(self, code: int, values: Mapping[str, float]) -> None:
         """G92, G92.1, G92.2, G92.3."""
@@ -136,18 +120,14 @@ class Offsets:
         if code == 920:
             if state.g52:
                 raise ValueError("G92 behind G52: both set one offset on LinuxCNC, and two on FANUC")
-            words = ""
-            for axis in range(3):
-                if AXES[axis] not in values:
-                    continue
+            for axis in (axes := given_axes(values)):
                 to, here, offset = values[AXES[axis]] * unit, state.position[axis], state.g92[axis]
                 state.g92[axis] = None if here is None or offset is None else here + offset - to
                 state.position[axis] = to
-                words += f"{AXES[axis].upper()}{number_text(values[AXES[axis]])}"
-            if not words:
+            if not axes:
                 raise ValueError("G92 without an axis")
             state.saved_g92 = [*state.g92]
-            self._put(f"G92{words}")
+            self._put(f"G92{words_of(values)}")
             return
         wanted: list[float | None] = [*state.saved_g92] if code == 923 else [0.0, 0.0, 0.0]
         if code == 921:
@@ -167,7 +147,7 @@ class Offsets:
     def _to_offsets(self, code: int, wanted: list[float | None]) -> str:
         """The axis words of the G92 that sets these offsets."""
         state = self.state
-        words = ""
+        to: dict[str, float] = {}
         for axis in range(3):
             before, after, here = state.g92[axis], wanted[axis], state.position[axis]
             if before == after and before is not None:
@@ -177,8 +157,8 @@ class Offsets:
                     f"G92.{code % 10}: the position of {AXES[axis].upper()} was not known at G92 or is not known here, "
                     "so that the offset is not"
                 )
-            words += f"{AXES[axis].upper()}{number_text((here + before - after) / state.unit_mm)}"
-        return words
+            to[AXES[axis]] = (here + before - after) / state.unit_mm
+        return words_of(to)
 
     def _data(self, values: Mapping[str, float]) -> None:
         """G10."""
@@ -187,14 +167,11 @@ class Offsets:
         if kind == 1:
             if number <= 0:
                 raise ValueError("G10 L1 needs P, the number of a tool")
-            if values.get("x", 0.0) or values.get("y", 0.0):
-                raise ValueError("G10 L1 with an offset of X or Y: only that of Z is read")
-            if "z" in values:
-                state.lengths[number] = values["z"] * unit
-                self._in_absolute(f"G10L10P{number}R{number_text(values['z'])}")
-            if "r" in values:
-                state.radii[number] = values["r"] * unit
-                self._in_absolute(f"G10L12P{number}R{number_text(values['r'])}")
+            _refuse_x_and_y("G10 L1", values)
+            for letter, table, place in (("z", state.lengths, 10), ("r", state.radii, 12)):
+                if letter in values:
+                    table[number] = values[letter] * unit
+                    self._in_absolute(f"G10L{place}P{number}R{number_text(values[letter])}")
             return
         if kind not in {2, 20}:
             raise ValueError(f"G10 L{kind:g} is not read; L1, L2 and L20 are")
@@ -203,21 +180,16 @@ class Offsets:
             raise ValueError(f"G10 L{kind:g} P{number}: P is 1 to 9, or 0 for the system in force")
         if kind == 2 and values.get("r", 0.0) != 0.0:
             raise ValueError("G10 L2 R turns the work coordinate system: it is not read")
-        offsets = state.offsets(system)
-        words = ""
-        for axis in range(3):
-            if AXES[axis] not in values:
-                continue
+        offsets, written = state.offsets(system), {}
+        for axis in given_axes(values):
             value = values[AXES[axis]] * unit
             if kind == 20:
                 value = self._so_that(axis, value)
             if system == state.modes.system:
                 state.shift(axis, offsets[axis], value)
-            offsets[axis] = value
-            words += f"{AXES[axis].upper()}{number_text(value / unit)}"
-        place = f"L2P{system}" if system <= 6 else f"L20P{system - 6}"
-        if words:
-            self._in_absolute(f"G10{place}{words}")
+            offsets[axis], written[AXES[axis]] = value, value / unit
+        if written:
+            self._in_absolute(f"G10{f'L2P{system}' if system <= 6 else f'L20P{system - 6}'}{words_of(written)}")
 
     def _so_that(self, axis: int, value: float) -> float:
         """The offset with which the position has this value."""
@@ -229,3 +201,8 @@ class Offsets:
                 "not known (input.work_offsets)"
             )
         return own + here - value
+
+
+def _refuse_x_and_y(code: str, values: Mapping[str, float]) -> None:
+    if values.get("x", 0.0) or values.get("y", 0.0):
+        raise ValueError(f"{code} with an offset of X or Y: only that of Z is read")

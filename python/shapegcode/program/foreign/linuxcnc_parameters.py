@@ -2,40 +2,44 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import dataclass, field
 
-from shapegcode.program.foreign.linuxcnc_state import AXES, State
+from shapegcode.program.foreign.linuxcnc_source import SourceFile
+from shapegcode.program.foreign.linuxcnc_state import AXES, Modes, State
 
-_LAST_LOCAL = 30
+MAX_ARGUMENTS = 30
 _LAST_USER = 5000
 
 
-class Frame(Protocol):
-    """What a subroutine that runs has of its own."""
+@dataclass
+class Frame:
+    """A call that runs."""
 
-    locals: list[float]
-    names: dict[str, float]
+    back: int  # line behind the call
+    caller: SourceFile
+    locals: list[float] = field(default_factory=lambda: [0.0] * (MAX_ARGUMENTS + 1))
+    names: dict[str, float] = field(default_factory=dict)
+    repeats: dict[tuple[int, int], int] = field(default_factory=dict)
+    saved: Modes | None = None
+    restores: bool = False
+    again: int = 0  # repetitions of M98 that are left
+    begin: int = 0
+    by_m98: bool = False
 
 
 class ParameterTable:
     """Values of parameters while a program runs."""
 
-    def __init__(self, state: State, frame: Frame) -> None:
+    def __init__(self, state: State, frames: list[Frame]) -> None:
         """No parameter has a value yet: the numbered ones are 0."""
-        self.frame = frame
-        self.call_level = 0
-        self._state = state
+        self._state, self._frames = state, frames
         self._numbered: dict[int, float] = {}
         self._global: dict[str, float] = {}
 
     def numbered(self, number: int) -> float:
-        """The value of `#number`; #1 to #30 are the subroutine's own.
-
-        Raises:
-            ValueError: only the machine knows it.
-        """
-        if 1 <= number <= _LAST_LOCAL:
-            return self.frame.locals[number]
+        """The value of `#number`; #1 to #30 are the subroutine's own."""
+        if 1 <= number <= MAX_ARGUMENTS:
+            return self._frames[-1].locals[number]
         if 1 <= number <= _LAST_USER:
             return self._numbered.get(number, 0.0)
         value = self._of_state(number)
@@ -46,12 +50,8 @@ class ParameterTable:
         return value
 
     def named(self, name: str) -> float:
-        """The value of `#<name>`; those that begin with _ are known everywhere.
-
-        Raises:
-            ValueError: it has none.
-        """
-        own = self._global if name.startswith("_") else self.frame.names
+        """The value of `#<name>`; those that begin with _ are known everywhere."""
+        own = self._global if name.startswith("_") else self._frames[-1].names
         if name in own:
             return own[name]
         value = self._predefined(name) if name.startswith("_") else None
@@ -68,17 +68,13 @@ class ParameterTable:
         return True
 
     def set(self, name: str | float, value: float) -> None:
-        """Give a parameter a value.
-
-        Raises:
-            ValueError: a program may not set it.
-        """
+        """Give a parameter a value."""
         if isinstance(name, str):
-            (self._global if name.startswith("_") else self.frame.names)[name] = value
+            (self._global if name.startswith("_") else self._frames[-1].names)[name] = value
             return
         number = round(name)
-        if 1 <= number <= _LAST_LOCAL:
-            self.frame.locals[number] = value
+        if 1 <= number <= MAX_ARGUMENTS:
+            self._frames[-1].locals[number] = value
         elif 1 <= number <= _LAST_USER:
             self._numbered[number] = value
         elif number != 5599:  # whether (DEBUG,) comments are shown
@@ -132,7 +128,7 @@ class ParameterTable:
             "_units_per_rev": float(modes.feed_mode == 950), "_spindle_on": float(modes.spindle in {3, 4}),
             "_spindle_cw": float(modes.spindle == 3), "_mist": float(modes.mist), "_flood": float(modes.flood),
             "_feed": modes.feed, "_rpm": modes.speed, "_current_tool": float(state.tool),
-            "_selected_tool": float(state.selected), "_call_level": float(self.call_level), "_value": 0.0,
+            "_selected_tool": float(state.selected), "_call_level": len(self._frames) - 1.0, "_value": 0.0,
             "_value_returned": 0.0, "_ccomp": 400.0, "_tool_offset": float(state.length_number != 0),
         }  # fmt: skip
         return values.get(name)

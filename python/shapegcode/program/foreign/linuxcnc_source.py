@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 KEYWORDS = (
@@ -28,31 +28,18 @@ class OLine:
     rest: str
 
 
-@dataclass(eq=False)
 class SourceFile:
-    """One file of a program.
+    """One file of a program."""
 
-    Attributes:
-        name: for messages.
-        text: its lines, each with its line end.
-        index: 0: the main program; n: the n-th of the files that were read besides.
-        starts: offset of each line, and of the text's end.
-        o_lines: by line, from 0.
-    """
-
-    name: str
-    text: str
-    index: int
-    starts: list[int] = field(default_factory=list)
-    o_lines: dict[int, OLine] = field(default_factory=dict)
-    _places: dict[str, list[int]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Find its lines and O words."""
-        self.text = self.text.replace("\r\n", "\n").replace("\r", " ")  # alone it is a blank to LinuxCNC
+    def __init__(self, name: str, text: str, index: int) -> None:
+        """Find its lines and O words; `index`: 0: the main program, n: the n-th of the files that were read besides."""
+        self.name, self.index = name, index
+        self.text = text.replace("\r\n", "\n").replace("\r", " ")  # alone it is a blank to LinuxCNC
         if not self.text.endswith("\n"):
             self.text += "\n"
-        self.starts = [0, *(match.end() for match in re.finditer("\n", self.text))]
+        self.starts = [0, *(match.end() for match in re.finditer("\n", self.text))]  # of each line; the text's end
+        self.o_lines: dict[int, OLine] = {}  # by line, from 0
+        self._places: dict[str, list[int]] = {}
         for match in _O_LINE.finditer(self.text):
             line = bisect_right(self.starts, match.start(1)) - 1
             label = "".join(match[1].split()).lower()
@@ -92,17 +79,8 @@ class SourceFile:
         return opening is not None and self.o_lines[opening].keyword == "do"
 
 
-def subroutine_file(label: str, folders: Sequence[Path], read: Callable[[Path], str]) -> tuple[Path, str] | None:
-    """The file that holds a subroutine: `name.ngc` in one of the folders.
-
-    Args:
-        label: of the call, "<name>" or "123".
-        folders: where to look.
-        read: gives a file's text.
-
-    Returns:
-        File and text; None: there is none.
-    """
+def subroutine_file(label: str, folders: Sequence[Path]) -> Path | None:
+    """The file that holds a subroutine: `name.ngc` in one of the folders."""
     stem = label.strip("<>")
     if not re.fullmatch(r"[\w.+-]+", stem):
         return None
@@ -110,5 +88,5 @@ def subroutine_file(label: str, folders: Sequence[Path], read: Callable[[Path], 
         for suffix in (".ngc", ".NGC", ".nc"):
             path = folder / (stem + suffix)
             if path.is_file():
-                return path, read(path)
+                return path
     return None

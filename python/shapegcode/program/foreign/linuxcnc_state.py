@@ -1,13 +1,20 @@
-"""What LinuxCNC's interpreter carries from block to block: modes, position, offsets; None where it is not known."""
+"""What LinuxCNC's interpreter carries from block to block: modes, position, offsets, tools; None: not known."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
+from shapegcode.io.data_file import read_file
+from shapegcode.io.ini import UNITS_MM, ini_entries
 from shapegcode.io.units import MM_PER_INCH
-from shapegcode.program.foreign.linuxcnc_tools import ToolTable
+from shapegcode.program.foreign.plain import refusal
 
 AXES = "xyz"
+_MAX_BYTES = 10_000_000
+_WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
 CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
 """Drilling cycles that are read, in tenths of their G numbers."""
 
@@ -40,42 +47,24 @@ class Modes:
 
 @dataclass
 class State:
-    """Modes, position and offsets. Lengths are mm; the position is that of the program's coordinates.
-
-    Attributes:
-        modes: modal groups.
-        position: of X, Y, Z.
-        work: offsets of the nine work coordinate systems.
-        g92: offset of G92 and G52.
-        g52: the offset stands in the plain program as G52.
-        saved_g92: what G92.3 restores.
-        length: tool length offset of Z that is in force.
-        length_number: its H number, 0: none.
-        tool: in the spindle; selected: by T.
-        lengths: of tools, as far as they are known.
-        radii: likewise.
-        table: the tool table, if there is one.
-        cycle_dwell: the last P of a drilling cycle, s: G74 and G84 without P take it, even from before G80.
-        machine_unit_mm: length of the machine's own unit.
-        cycle: what a row of drilling cycles keeps.
-    """
+    """Modes, position and offsets. Lengths are mm; the position is that of the program's coordinates."""
 
     modes: Modes = field(default_factory=Modes)
-    position: Triple = field(default_factory=lambda: [None, None, None])
-    work: dict[int, Triple] = field(default_factory=dict)
-    g92: Triple = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    g52: bool = False
-    saved_g92: Triple = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    length: float | None = 0.0
-    length_number: int = 0
-    tool: int = 0
-    selected: int = 0
-    lengths: dict[int, float] = field(default_factory=dict)
-    radii: dict[int, float] = field(default_factory=dict)
+    position: Triple = field(default_factory=lambda: [None, None, None])  # of X, Y, Z
+    work: dict[int, Triple] = field(default_factory=dict)  # offsets of the nine work coordinate systems
+    g92: Triple = field(default_factory=lambda: [0.0, 0.0, 0.0])  # offset of G92 and G52
+    g52: bool = False  # the offset stands in the plain program as G52
+    saved_g92: Triple = field(default_factory=lambda: [0.0, 0.0, 0.0])  # what G92.3 restores
+    length: float | None = 0.0  # tool length offset of Z that is in force
+    length_number: int = 0  # its H number, 0: none
+    tool: int = 0  # in the spindle
+    selected: int = 0  # by T
+    lengths: dict[int, float] = field(default_factory=dict)  # of tools, as far as they are known
+    radii: dict[int, float] = field(default_factory=dict)  # likewise
     table: ToolTable | None = None
-    cycle: CycleWords | None = None
-    cycle_dwell: float = 0.0
-    machine_unit_mm: float = 1.0
+    cycle: CycleWords | None = None  # what a row of drilling cycles keeps
+    cycle_dwell: float = 0.0  # the last P of a drilling cycle, s: G74 and G84 without P take it, even from before G80
+    machine_unit_mm: float = 1.0  # length of the machine's own unit
 
     @property
     def unit_mm(self) -> float:
@@ -136,3 +125,78 @@ def plane_axes(plane: int) -> tuple[int, int]:
 def system_words(system: int) -> str:
     """A work coordinate system in FANUC's words."""
     return f"G{53 + system}" if system <= 6 else f"G54.1 P{system - 6}"
+
+
+def given_axes(values: Mapping[str, float]) -> list[int]:
+    """Indices of the linear axes among words."""
+    return [axis for axis in range(3) if AXES[axis] in values]
+
+
+@dataclass(frozen=True)
+class ToolRow:
+    """A row of the tool table."""
+
+    offset_mm: tuple[float, float, float]  # X, Y, Z
+    diameter_mm: float  # 0: none is given
+
+
+@dataclass(frozen=True)
+class ToolTable:
+    """The tools by number, and the file from which they come."""
+
+    tools: dict[int, ToolRow]
+    file: str
+    units: str
+
+    @property
+    def unit_mm(self) -> float:
+        """Length of its unit."""
+        return UNITS_MM[self.units]
+
+    @property
+    def lengths_mm(self) -> dict[int, float]:
+        """By tool."""
+        return {number: tool.offset_mm[2] for number, tool in self.tools.items()}
+
+    @property
+    def radii_mm(self) -> dict[int, float]:
+        """Likewise."""
+        return {number: tool.diameter_mm / 2.0 for number, tool in self.tools.items()}
+
+
+def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | None:
+    """The tool table that `input.tool_table` (or an INI file there) states, else `tool.tbl` of the folder; or None."""
+    if not stated:
+        beside = folder / "tool.tbl" if folder is not None else None
+        if beside is None or not beside.is_file():
+            return None
+        return read_tool_table(beside, unit)
+    path = Path(stated).expanduser()
+    if path.suffix.lower() != ".ini":
+        return read_tool_table(path, unit)
+    entries = ini_entries(read_file(path, _MAX_BYTES).decode("utf-8", "replace"))
+    table, _ = entries.get(("EMCIO", "TOOL_TABLE"), ("", 0))
+    if not table:
+        raise refusal(str(path), 1, "it has no [EMCIO] TOOL_TABLE")
+    linear, line = entries.get(("TRAJ", "LINEAR_UNITS"), ("mm", 1))
+    unit_mm = UNITS_MM.get(linear.lower())
+    if unit_mm is None:
+        raise refusal(str(path), line, f"[TRAJ] LINEAR_UNITS = {linear.lower()} is neither mm nor inch")
+    return read_tool_table(path.parent / Path(table).expanduser(), "inch" if unit_mm > 1.0 else "mm")
+
+
+def read_tool_table(path: Path, unit: str) -> ToolTable:
+    """Read a tool table: lines `T1 P1 X0 Y0 Z12.5 D6 ;comment`."""
+    factor = UNITS_MM[unit]
+    tools: dict[int, ToolRow] = {}
+    text = read_file(path, _MAX_BYTES).decode("utf-8", "replace")
+    for number, line in enumerate(text.splitlines(), start=1):
+        code = line.split(";")[0].strip()
+        if not code:
+            continue
+        words = {letter.upper(): float(value) for letter, value in _WORD.findall(code)}
+        if "T" not in words or _WORD.sub("", code).strip():
+            raise refusal(str(path), number, f"{code[:40]!r} is no row of a tool table (T1 P1 Z12.5 D6)")
+        x, y, z = (words.get(axis, 0.0) * factor for axis in "XYZ")
+        tools[int(words["T"])] = ToolRow((x, y, z), words.get("D", 0.0) * factor)
+    return ToolTable(tools, str(path), unit)

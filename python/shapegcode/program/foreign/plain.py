@@ -4,47 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shapegcode.errors import ProgramError, located_error
+from shapegcode.io.data_file import read_file
 
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+
+_MAX_CALLED_BYTES = 10_000_000
 MAX_DIGITS = 8
 """Digits of a word in FANUC's words (alarm 0003)."""
 
 
 @dataclass(frozen=True)
 class Note:
-    """Something to tell about a line of the source.
+    """Something to tell about a line of the source."""
 
-    Attributes:
-        line: of the source, from 1.
-        text: one sentence, with both meanings where a word means another thing on FANUC.
-    """
-
-    line: int
-    text: str
+    line: int  # of the source, from 1
+    text: str  # one sentence, with both meanings where a word means another thing on FANUC
 
 
 @dataclass(frozen=True)
 class ForeignSettings:
-    """How the plain program must be read, where the control differs from what the machine file says.
+    """How the plain program must be read, where the control differs from what the machine file says."""
 
-    Attributes:
-        tool_length_mm: by H number; the machine file's own values come first.
-        tool_radius_mm: by D number, likewise.
-        peck_clearance_mm: distance to which a peck of G73 and G83 returns; None: the machine file's.
-        arc_radius_tolerance_mm: largest difference of start and end radius; None: the machine file's.
-        calculator_decimal_point: whether X10 is 10 mm; None: as the machine file says.
-        called_text: writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none.
-        names: words of the plain program that stand for others of the source, for who writes for that control again:
-            {"T901": 'T="MILL"'}.
-    """
-
+    # by H number; the machine file's own values come first
     tool_length_mm: Mapping[int, float] = field(default_factory=dict)
-    tool_radius_mm: Mapping[int, float] = field(default_factory=dict)
-    peck_clearance_mm: float | None = None
-    arc_radius_tolerance_mm: float | None = None
-    calculator_decimal_point: bool | None = True
+    tool_radius_mm: Mapping[int, float] = field(default_factory=dict)  # by D number, likewise
+    peck_clearance_mm: float | None = None  # distance to which a peck of G73 and G83 returns; None: the machine file's
+    calculator_decimal_point: bool | None = True  # whether X10 is 10 mm; None: as the machine file says
+    # writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none
     called_text: Callable[[str, str], str] | None = None
+    # words that stand for others of the source, for who writes for that control again: {"T901": 'T="MILL"'}
     names: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -54,26 +47,17 @@ class ForeignProgram:
 
     Its numbers have a point where a unit hangs on it (`X10.`), I J K are distances from the start, dwells are
     `G04 X` in seconds; it begins and ends with a line `%`. One that calls programs of its own may keep these calls.
-
-    Attributes:
-        dialect: "linuxcnc", "haas", "siemens".
-        reason: why it was read so, in words.
-        text: the plain program.
-        lines: for each line of `text`, from 0, the line of the source, from 1.
-        notes: what to tell.
-        files: names of other files whose lines are in it (subprograms).
-        line_files: for each line of `text` its file: 0 the source, n the n-th of `files`; empty: all of the source.
-        settings: how to read it.
     """
 
-    dialect: str
-    text: str
-    lines: Sequence[int]
-    reason: str = ""
-    notes: tuple[Note, ...] = ()
-    files: tuple[str, ...] = ()
+    dialect: str  # "linuxcnc", "haas", "siemens"
+    text: str  # the plain program
+    lines: Sequence[int]  # for each line of `text`, from 0, the line of the source, from 1
+    reason: str = ""  # why it was read so, in words
+    notes: tuple[Note, ...] = ()  # what to tell
+    files: tuple[str, ...] = ()  # names of other files whose lines are in it (subprograms)
+    # for each line of `text` its file: 0 the source, n the n-th of `files`; empty: all of the source
     line_files: Sequence[int] = ()
-    settings: ForeignSettings = ForeignSettings()
+    settings: ForeignSettings = ForeignSettings()  # how to read it
 
 
 class PlainProgram:
@@ -89,64 +73,29 @@ class PlainProgram:
         self.size = 2  # characters
 
     def put(self, text: str, line: int, file: int = 0) -> None:
-        """Add one line.
-
-        Args:
-            text: without its line end.
-            line: of the source, from 1.
-            file: 0 the source, n the n-th of `names`.
-        """
-        self._keep_up(line, file)
-        self._parts.append(text + "\n")
-        self.size += len(text) + 1
-        self._lines.append(line)
-        self._files.append(file)
+        """Add one line; `file`: 0 the source, n the n-th of `names`."""
+        self.put_lines(text + "\n", line, file)
 
     def put_lines(self, text: str, first_line: int, file: int = 0) -> None:
-        """Add lines of the source as they are.
+        """Add lines of the source as they are, each with its line end."""
+        missing = first_line - 1 - len(self._lines)
+        if file == 0 and missing > 0:  # blank ones, so that a line keeps its number as long as that is possible
+            self._add("\n" * missing, len(self._lines) + 1, file)
+        self._add(text, first_line, file)
 
-        Args:
-            text: whole lines, each with its line end.
-            first_line: the line of the source with which they begin.
-            file: as `put` takes it.
-        """
-        self._keep_up(first_line, file)
+    def _add(self, text: str, first_line: int, file: int) -> None:
         count = text.count("\n")
         self._parts.append(text)
         self.size += len(text)
         self._lines.extend(range(first_line, first_line + count))
         self._files.extend([file] * count)
 
-    def _keep_up(self, line: int, file: int) -> None:
-        """Blank lines, so that a line has the number that it has in the source, as long as that is possible."""
-        missing = line - 1 - len(self._lines)
-        if file == 0 and missing > 0:
-            self._parts.append("\n" * missing)
-            self.size += missing
-            self._files.extend([0] * missing)
-            self._lines.extend(range(len(self._lines) + 1, line))
-
     def note(self, line: int, text: str, key: str = "") -> None:
-        """Tell something once.
-
-        Args:
-            line: of the source.
-            text: the sentence.
-            key: of two notes with one key the first counts; empty: the sentence itself.
-        """
+        """Tell something once: of two notes with one key (empty: the text itself) the first counts."""
         self.notes.setdefault(key or text, Note(line, text))
 
     def finish(self, dialect: str, last_line: int, settings: ForeignSettings | None = None) -> ForeignProgram:
-        """Close it with the line `%`.
-
-        Args:
-            dialect: as `ForeignProgram` has it.
-            last_line: of the source.
-            settings: how to read it.
-
-        Returns:
-            The program.
-        """
+        """Close it with the line `%`."""
         self.put("%", last_line)
         return ForeignProgram(
             dialect,
@@ -159,6 +108,18 @@ class PlainProgram:
         )
 
 
+def program_folders(machine: Machine, folder: Path | None) -> list[Path]:
+    """Where programs that another one calls are looked for: its own folder first."""
+    own = [] if folder is None else [folder]
+    return own + [Path(name).expanduser() for name in machine.input.program_folders]
+
+
+def called_source(path: Path, machine: Machine) -> str:
+    """The text of a program that another one calls, as long as it may be."""
+    most = min(_MAX_CALLED_BYTES, machine.controller.max_program_bytes)
+    return read_file(path, most).decode("utf-8-sig", "replace")
+
+
 def number_text(value: float) -> str:
     """A number as a word of the plain program has it: with a point, and no more digits than FANUC's reader takes."""
     decimals = MAX_DIGITS - len(str(int(abs(value)))) if abs(value) >= 1.0 else MAX_DIGITS
@@ -168,15 +129,11 @@ def number_text(value: float) -> str:
     return "0." if text in {"0.", "-0."} else text
 
 
+def words_of(values: Mapping[str, float], letters: str = "xyz") -> str:
+    """Values of these letters as words of the plain program, in the order of the letters."""
+    return "".join(f"{letter.upper()}{number_text(values[letter])}" for letter in letters if letter in values)
+
+
 def refusal(file: str, line: int, message: str) -> ProgramError:
-    """The error that refuses a line of the source.
-
-    Args:
-        file: its name.
-        line: from 1.
-        message: what is wrong there, and what would help.
-
-    Returns:
-        The error, to be raised; its message starts with ``file:line:column``.
-    """
+    """The error that refuses a line of the source, from 1; what is wrong there, and what would help."""
     return located_error(file, line, 1, message)

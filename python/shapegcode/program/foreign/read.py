@@ -2,18 +2,167 @@
 
 from __future__ import annotations
 
+import re
 from codecs import BOM_UTF8
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from shapegcode.program.foreign.plain import ForeignProgram, refusal
-from shapegcode.program.foreign.recognize import CONTROLS, recognize, words_behind_semicolon
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
+
+InputDialect = Literal["fanuc", "linuxcnc", "haas", "siemens"]
+
+CONTROLS: dict[str, str] = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "haas": "Haas", "siemens": "a Sinumerik"}
+"""Names of the controls for people."""
+
+LOOKED_AT_BYTES = 65536
+_SHORT_DWELL = re.compile(rb"G0*4[ \t]*P[ \t]*0*([1-9])(?![\d.])")
+_BEHIND_SEMICOLON = re.compile(rb"\([^)\n]*+\)?+|(;)[; \t\r]*+[^;%( \t\r\n]")
+_TURNS = re.compile(
+    rb"G0*[23](?![\d.])[ \t]*+(?:[FIJKRXYZ][ \t]*+[-+\d.]++[ \t]*+)++P[ \t]*0*([2-9]|[1-9]\d+)(?![\d.])"
+)
+_PERCENT = re.compile(rb"(?m)^[ \t]*%[ \t\r]*$")
+COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
+
+_SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ...] = (
+    (
+        "linuxcnc",
+        (b"SUB", b"CALL", b"IF", b"WHILE", b"DO", b"REPEAT"),
+        re.compile(
+            rb"(?m)^[ \t]*O[ \t]*(?:<[^>\n]+>|\d+|\[[^\]\n]+\])[ \t]*"
+            rb"(?:SUB|ENDSUB|CALL|RETURN|IF|ELSEIF|ELSE|ENDIF|WHILE|ENDWHILE|DO|REPEAT|ENDREPEAT|BREAK|CONTINUE)\b"
+        ),
+        "O word of control flow",
+    ),
+    ("linuxcnc", (b"#<",), re.compile(rb"#<[^>\n]+>"), "named parameter"),
+    ("linuxcnc", (b"G90.1", b"G91.1"), re.compile(rb"G9[01]\.1(?!\d)"), "centres of arcs"),
+    (
+        "linuxcnc",
+        (b"G64", b"G064"),
+        re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"),
+        "tolerance of the path; FANUC's G64 has no P",
+    ),
+    ("linuxcnc", (b"G59.",), re.compile(rb"G59\.[123](?!\d)"), "work coordinate system 7 to 9"),
+    ("linuxcnc", (b"G38.",), re.compile(rb"G38\.[2-5](?!\d)"), "straight probe"),
+    ("haas", (b"G154",), re.compile(rb"G154[ \t]*P[ \t]*\d+"), "additional work offset"),
+    ("haas", (b"G187",), re.compile(rb"G187(?!\d)[ \t]*(?:[PE][ \t]*[\d.]+)?"), "smoothness"),
+    ("haas", (b"G103",), re.compile(rb"G103[ \t]*(?:P[ \t]*\d+)?(?![\d.])"), "limit of the look-ahead"),
+    ("haas", (b"M97",), re.compile(rb"M97[ \t]*P[ \t]*\d+"), "call of a subprogram by its N number"),
+    ("haas", (b"G150",), re.compile(rb"G150(?!\d)"), "general pocket milling"),
+    ("siemens", (b"CR",), re.compile(rb"(?<![A-Z])CR[ \t]*="), "radius of an arc"),
+    ("siemens", (b"MSG",), re.compile(rb"(?<![A-Z])MSG(?=\s|\()"), "message"),
+    (
+        "siemens",
+        (b"G4F", b"G04F", b"G4 ", b"G04 "),
+        re.compile(rb"G0*4[ \t]*F[ \t]*[\d.]+"),
+        "dwell in seconds; FANUC's F is a feed",
+    ),
+    ("siemens", (b"%_N_",), re.compile(rb"%_N_\w+"), "name of a program"),
+    ("siemens", (b"=",), re.compile(rb"(?<![A-Z])R\d+[ \t]*="), "R parameter"),
+    ("siemens", (b"AC", b"IC"), re.compile(rb"=[ \t]*[AI]C(?![A-Z])"), "absolute or incremental word"),
+    ("siemens", (b"GOTOF", b"GOTOB"), re.compile(rb"GOTO[FB](?![A-Z])"), "jump to a label"),
+    ("siemens", (b"CYCLE",), re.compile(rb"(?<![A-Z_])CYCLE\d+"), "cycle"),
+    ("siemens", (b"TRANS", b"AROT"), re.compile(rb"(?<![A-Z_])(?:A?TRANS|AROT)(?![A-Z_])"), "frame"),
+    ("siemens", (b"G700", b"G710"), re.compile(rb"G7[01]0(?![\d.])"), "inch or mm"),
+)
+"""Words that no FANUC control knows: one of the short texts is in a program that has the word."""
+
+_Sign = tuple[InputDialect, re.Pattern[bytes], str]
+_OF_FANUC: tuple[_Sign, ...] = (
+    ("fanuc", re.compile(rb"(?<![A-Z])(?:GOTO(?=[ \t]*[\d#\[])|THEN(?![A-Z]))"), "jump of a macro"),
+    ("fanuc", re.compile(rb"(?<![A-Z])WHILE[ \t]*\[[^\n]*\][ \t]*DO[ \t]*\d"), "loop of a macro"),
+    ("fanuc", re.compile(rb"G0*5\.1(?![\d])[ \t]*Q[ \t]*\d"), "look-ahead mode"),
+    ("fanuc", re.compile(rb"G0*8[ \t]*P[ \t]*[01](?!\d)"), "look-ahead mode"),
+    ("fanuc", re.compile(rb"G6[56](?![\d.])[ \t]*P[ \t]*\d+"), "call of a macro"),
+    ("fanuc", re.compile(rb"G54\.1[ \t]*P[ \t]*\d+"), "additional work offset"),
+    ("fanuc", re.compile(rb",[ \t]*[RC][ \t]*[\d.]+"), "corner word"),
+    ("fanuc", re.compile(rb"\A\s*%?\s*[O:]\d{1,8}[ \t]*$", re.MULTILINE), "program number"),
+)
+"""Words that LinuxCNC and a Sinumerik in DIN mode do not know; a Haas may."""
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """What shows for which control a program is written."""
+
+    dialect: InputDialect
+    line: int  # of the first sign, from 1
+    words: str
+    meaning: str  # what it is there
+
+    @property
+    def reason(self) -> str:
+        """In words: "line 12: `O100 WHILE` (O word of control flow): LinuxCNC"."""
+        return f"line {self.line}: `{self.words}` ({self.meaning}): {CONTROLS[self.dialect]}"
+
+
+def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]:
+    """The first sign of every control for which a program may be written.
+
+    Only words that a control alone knows count; the first 64 KiB are looked at, comments left out.
+    """
+    code = re.sub(rb";[^\n]*", b"", COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
+    code = code[: _end(code)]
+    signs = [(each[0], *each[2:]) for each in _SIGNS if any(hint in code for hint in each[1])]
+    found = _first_signs(code, signs)
+    if found or of_fanuc:
+        found = _first_signs(code, [*signs, *_OF_FANUC])
+        if "haas" in found:
+            found.pop("fanuc", None)  # macros, additional offsets and corner words are Haas' own too
+    return tuple(found.values())
+
+
+def _first_signs(code: bytes, signs: Iterable[_Sign]) -> dict[InputDialect, Recognition]:
+    """The first sign of each dialect, in the order of their lines."""
+    matches = [(*each, match) for each in signs if (match := each[1].search(code)) is not None]
+    found: dict[InputDialect, Recognition] = {}
+    for dialect, _, meaning, match in sorted(matches, key=lambda each: each[3].start()):
+        words = " ".join(match[0].decode("latin-1").split())
+        found.setdefault(dialect, Recognition(dialect, code.count(b"\n", 0, match.start()) + 1, words, meaning))
+    return found
+
+
+def doubtful_word(text: bytes) -> tuple[int, str] | None:
+    """The first dwell or arc of a program that is allowed on FANUC, and usual with another meaning on LinuxCNC.
+
+    A dwell of P1 to P9 is next to nothing in milliseconds, P of an arc are turns there.
+    """
+    capitals = text[:LOOKED_AT_BYTES].upper()
+    if b"P" not in capitals:
+        return None
+    code = COMMENT.sub(b" ", capitals)
+    found = [match for match in (_SHORT_DWELL.search(code), _TURNS.search(code)) if match is not None]
+    if not found:
+        return None
+    match = min(found, key=lambda each: each.start())
+    value = int(match[1])
+    dwells = match.re is _SHORT_DWELL
+    sentence = (
+        f"G04 P{value} is read as {value} ms (FANUC, Haas); on LinuxCNC it is {value} s"
+        if dwells
+        else f"P{value} of an arc is not read, as FANUC knows none; on LinuxCNC the arc has {value} turns"
+    )
+    return code.count(b"\n", 0, match.start()) + 1, f"{sentence}: controller.dialect says which"
+
+
+def words_behind_semicolon(text: bytes) -> int | None:
+    """The first line with words behind a semicolon, which is a comment for other controls and a block for FANUC."""
+    if b";" not in text:
+        return None
+    match = next((each for each in _BEHIND_SEMICOLON.finditer(text) if each[1]), None)
+    return None if match is None else text.count(b"\n", 0, match.start()) + 1
+
+
+def _end(code: bytes) -> int:
+    """Where a program ends: no control reads what stands behind its second line `%`."""
+    ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
+    return ends[1] if len(ends) > 1 else len(code)
+
 
 Reader = Callable[..., ForeignProgram]
 
@@ -23,40 +172,20 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
 
     The dialect is that of `controller.dialect`; "auto": as words tell that only one control knows, and where none
     does, that of a control whose planner is LinuxCNC's (`controller.kind`).
-
-    Args:
-        data: the program.
-        machine: on which it is to run.
-        source: its name, for messages.
-        folder: where programs that it calls and tables that it needs are looked for; None: nowhere.
-
-    Returns:
-        The plain program, with the reason why it was read so.
-
-    Raises:
-        ProgramError: it is of another dialect than `controller.dialect` says, mixes dialects, or cannot be read; the
-            message starts with ``source:line:column``.
     """
     dialect, reason = input_dialect(data, machine, source)
     if dialect == "fanuc":
         refuse_words_behind_semicolon(data, source)
         return None
     text = data.removeprefix(BOM_UTF8).decode("latin-1")
-    read = _reader(dialect)
+    # Loaded when a program of its dialect is read: most are FANUC's.
+    read: Reader = getattr(import_module(f"shapegcode.program.foreign.{dialect}"), f"read_{dialect}")
     program = read(text, file=source, machine=machine, folder=folder)
     return replace(program, reason=reason)
 
 
 def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
-    """A semicolon ends a block for FANUC, and begins a comment for other controls.
-
-    Args:
-        data: a program in FANUC's words.
-        source: its name, for messages.
-
-    Raises:
-        ProgramError: words stand behind one.
-    """
+    """A semicolon ends a block for FANUC, and begins a comment for other controls."""
     line = words_behind_semicolon(data)
     if line is not None:
         raise refusal(
@@ -68,19 +197,7 @@ def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
 
 
 def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]:
-    """In whose words a program is.
-
-    Args:
-        data: the program.
-        machine: on which it is to run.
-        source: its name, for messages.
-
-    Returns:
-        The dialect, and the reason in words.
-
-    Raises:
-        ProgramError: it is of another dialect than `controller.dialect` says, or mixes dialects.
-    """
+    """In whose words a program is."""
     stated = machine.controller.dialect
     # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
     expected = stated if stated != "auto" else machine.controller.kind
@@ -110,10 +227,3 @@ def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]
     if machine.controller.kind == "linuxcnc":
         return "linuxcnc", "controller.kind = linuxcnc"
     return "fanuc", ""
-
-
-def _reader(dialect: str) -> Reader:
-    """Loaded when a program of its dialect is read: most are FANUC's."""
-    module = import_module(f"shapegcode.program.foreign.{dialect}")
-    reader: Reader = getattr(module, f"read_{dialect}")
-    return reader

@@ -10,11 +10,18 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 from shapegcode.errors import ProgramError, located_error
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, PlainProgram
+from shapegcode.program.foreign.plain import (
+    ForeignProgram,
+    ForeignSettings,
+    PlainProgram,
+    called_source,
+    program_folders,
+)
 from shapegcode.program.foreign.siemens_blocks import (
     Jump,
     ProgramLines,
@@ -48,19 +55,6 @@ def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | Non
     """Read a SINUMERIK program in DIN words.
 
     Subprograms are looked for in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
-
-    Args:
-        source: its text.
-        file: its name, for messages.
-        machine: on which it runs: limits, tolerance of arcs, work offsets, block skip.
-        folder: that of the file; None: nowhere.
-
-    Returns:
-        The plain program, with the line of the source for each of its lines.
-
-    Raises:
-        ProgramError: a word is not read, or means nothing there; the message starts with ``file:line:column`` and says
-            what would have to stand there.
     """
     run = _Run(source, file, machine, folder)
     return run.program()
@@ -73,11 +67,7 @@ class _Run:
         self.machine, self.file = machine, file
         self.out = PlainProgram()
         self.path = SiemensPath(machine, self.out)
-        folders = [
-            *([folder] if folder else []),
-            *(Path(name).expanduser() for name in machine.input.program_folders),
-        ]
-        self._store = _Store(programs_of_source(source, file), folders)
+        self._store = _Store(programs_of_source(source, file), machine, folder)
         self.words = BlockWords(self.path, self, uses_m6=_CHANGES_TOOL.search(source) is not None)
         self._r: dict[int, float] = {}
         self._locals: list[dict[str, Variable]] = []
@@ -124,7 +114,10 @@ class _Run:
             variable.write(word.name, index, value, word.column)
             return
         parameter = self._r_number(word.name, index, word.column)
-        assert parameter is not None  # `knows` was asked
+        if parameter is None:
+            raise word.error(
+                f"{word.name} alone: its number would have to follow (R1= or R[1]=); the radius of an arc is CR="
+            )
         self._r[parameter] = float(number(value, word.column))
 
     def _r_number(self, name: str, index: tuple[Value, ...], column: int) -> int | None:
@@ -137,14 +130,13 @@ class _Run:
 
     def _run(self, program: ProgramLines, variables: dict[str, Variable]) -> str:
         """Execute a program to its end; says which word ended it."""
-        where = f"{program.file}"
         try:
             program.find_structure()
         except StructureError as error:
             raise self._error(program, error.index, 1, str(error)) from None
         self._locals.append(variables)
         flow = _Flow(program)
-        file = 0 if program.file == self.file else self.out.names.index(where) + 1
+        file = 0 if program.file == self.file else self.out.names.index(program.file) + 1
         index = 0
         while index < len(program.lines):
             self.path.line, self.path.file = program.first + index, file
@@ -156,15 +148,10 @@ class _Run:
                     index += 1
                     continue
                 block = program.block(index)
-                if not self._is_skipped(block):
-                    if block.kind == "WORDS":
-                        if ended := self._words(block):
-                            self._locals.pop()
-                            return ended
-                        index += 1
-                        continue
-                    index = self._control(flow, block, index)
-                    continue
+                if block.kind == "WORDS" and not self._is_skipped(block) and (ended := self._words(block)):
+                    self._locals.pop()
+                    return ended
+                index = index + 1 if block.kind == "WORDS" else self._control(flow, block, index)
             except WordError as error:
                 raise self._error(program, index, error.column, str(error)) from None
             except RecursionError:
@@ -172,7 +159,6 @@ class _Run:
                 raise self._error(program, index, 1, message) from None
             except (OverflowError, ValueError):
                 raise self._error(program, index, 1, "a value is too large to be computed") from None
-            index += 1
         self._locals.pop()
         return ""
 
@@ -284,6 +270,8 @@ class _Run:
     def _control(self, flow: _Flow, block: SiemensBlock, index: int) -> int:
         """A statement of control flow; gives the line that follows."""
         program, kind = flow.program, block.kind
+        if self._is_skipped(block):
+            return index + 1
         self.words.comment(block.comment)
         if kind in ("IF", "WHILE"):
             return index + 1 if self._is_true(block.condition) else program.partners[index] + 1
@@ -300,8 +288,7 @@ class _Run:
         if kind == "ENDFOR":
             begin = program.starts[index]
             head = program.block(begin)
-            counter = self.value_of(head.name, tuple(each(self) for each in head.index), head.column)
-            self._set_counter(head, number(counter, head.column) + 1)
+            self._set_counter(head, self._counter(head) + 1)
             return begin + 1 if self._counts_on(head) else index + 1
         if kind == "JUMPS":
             for jump in block.jumps:
@@ -328,10 +315,12 @@ class _Run:
             raise block.error(f"{block.name} of FOR is no variable of this program: DEF would have to define it before")
         self.assign(Word(block.name, block.column, None, "", block.index), value)
 
+    def _counter(self, block: SiemensBlock) -> float | int:
+        return number(self.value_of(block.name, tuple(each(self) for each in block.index), block.column), block.column)
+
     def _counts_on(self, block: SiemensBlock) -> bool:
         assert block.condition is not None
-        now = number(self.value_of(block.name, tuple(each(self) for each in block.index), block.column), block.column)
-        end = number(block.condition(self), block.column)
+        now, end = self._counter(block), number(block.condition(self), block.column)
         return is_equal(now, end) or now < end
 
     def _define(self, block: SiemensBlock) -> None:
@@ -370,12 +359,11 @@ class _Flow:
         ahead, behind = range(index + 1, count), range(index, -1, -1)
         ways = {"GOTOF": [ahead], "GOTOB": [behind]}.get(jump.command, [ahead, behind])
         around = self.program.depth_path(index)
-        for way in ways:
-            for line in way:
-                if self._is_at(line, jump.target):
-                    inside = self.program.depth_path(line)
-                    if inside == around[: len(inside)]:
-                        return line
+        for line in chain(*ways):
+            if self._is_at(line, jump.target):
+                inside = self.program.depth_path(line)
+                if inside == around[: len(inside)]:
+                    return line
         if jump.command == "GOTOC":
             return index + 1
         where = {"GOTOF": "behind", "GOTOB": "before"}.get(jump.command, "anywhere near")
@@ -406,10 +394,10 @@ class _Flow:
 class _Store:
     """Programs of the text, and of files beside it."""
 
-    def __init__(self, programs: list[ProgramLines], folders: list[Path]) -> None:
-        self.main = programs[0]
+    def __init__(self, programs: list[ProgramLines], machine: Machine, folder: Path | None) -> None:
+        self.main, self._machine = programs[0], machine
         self._known: dict[str, ProgramLines | None] = {each.name: each for each in programs}
-        self._folders = folders
+        self._folders = program_folders(machine, folder)
         self._files: Mapping[str, Path] | None = None
 
     def find(self, name: str) -> ProgramLines | None:
@@ -428,6 +416,5 @@ class _Store:
         for known in (f"{name}.SPF", f"{name}.MPF", f"_N_{name}_SPF", f"_N_{name}_MPF"):
             if known in self._files:
                 path = self._files[known]
-                found = programs_of_source(path.read_bytes().decode("utf-8-sig", "replace"), str(path))
-                return replace(found[0], name=name)
+                return replace(programs_of_source(called_source(path, self._machine), str(path))[0], name=name)
         return None

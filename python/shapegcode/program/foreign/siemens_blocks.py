@@ -24,23 +24,14 @@ from shapegcode.program.foreign.siemens_expressions import (
 
 @dataclass(frozen=True)
 class Word(AtColumn):
-    """One word of a block.
+    """One word of a block."""
 
-    Attributes:
-        name: "X", "CR", "M"; of a G code with its number, "G1"; of a call or a bare word its name.
-        column: where it stands, from 1.
-        value: what stands behind the address; None: nothing.
-        mode: "AC" or "IC" of `=AC(...)` and `=IC(...)`.
-        index: of `NAME[...]=`.
-        given: of a call `NAME(...)`; None: no brackets.
-    """
-
-    name: str
-    column: int
-    value: Expression | None = None
-    mode: str = ""
-    index: tuple[Expression, ...] = ()
-    given: tuple[Expression | None, ...] | None = None
+    name: str  # "X", "CR", "M"; of a G code with its number, "G1"; of a call or a bare word its name
+    column: int  # where it stands, from 1
+    value: Expression | None = None  # what stands behind the address; None: nothing
+    mode: str = ""  # "AC" or "IC" of `=AC(...)` and `=IC(...)`
+    index: tuple[Expression, ...] = ()  # of `NAME[...]=`
+    given: tuple[Expression | None, ...] | None = None  # of a call `NAME(...)`; None: no brackets
 
 
 @dataclass(frozen=True)
@@ -122,11 +113,7 @@ def split_comment(line: str) -> tuple[str, str]:
 
 @lru_cache(maxsize=4096)
 def block_of(line: str) -> SiemensBlock:
-    """Read a line.
-
-    Raises:
-        WordError: with what would have to stand there.
-    """
+    """Read a line."""
     code, comment = split_comment(line.rstrip())
     scan = SiemensScanner(in_capitals(code))
     head = _HEAD.match(scan.text)
@@ -171,24 +158,15 @@ def _statement(scan: SiemensScanner, name: str, block: SiemensBlock) -> SiemensB
     if _JUMP.fullmatch(name):
         scan.at = begin
         return replace(block, kind="JUMPS", jumps=_jumps(scan, None))
-    if name == "CASE":
-        return _case(scan, block)
-    if name == "FOR":
-        return _for(scan, block)
-    if name == "REPEAT":
-        return _repeat(scan, block)
     if name == "DEF":
         return replace(block, kind="DEF", definitions=_definitions(scan))
-    if name == "PROC":
-        return _procedure(scan, block)
-    if name in _SYNCHRONOUS:
-        scan.at = len(scan.text)
-        return replace(block, words=(Word(name, begin + 1),))
-    if name == "EXTERN":
-        scan.at = len(scan.text)
-        return replace(block, kind="EXTERN")
-    scan.at = begin
-    return None
+    if (read := _READERS.get(name)) is not None:
+        return read(scan, block)
+    if name not in {"EXTERN", *_SYNCHRONOUS}:
+        scan.at = begin
+        return None
+    scan.at = len(scan.text)
+    return replace(block, kind="EXTERN") if name == "EXTERN" else replace(block, words=(Word(name, begin + 1),))
 
 
 def _jumps(scan: SiemensScanner, condition: Expression | None) -> tuple[Jump, ...]:
@@ -295,6 +273,9 @@ def _procedure(scan: SiemensScanner, block: SiemensBlock) -> SiemensBlock:
     return replace(block, kind="PROC", name=name, definitions=tuple(found), saves=saves)
 
 
+_READERS = {"CASE": _case, "FOR": _for, "REPEAT": _repeat, "PROC": _procedure}
+
+
 def _words(scan: SiemensScanner) -> tuple[Word, ...]:
     found = []
     while not scan.is_done:
@@ -309,11 +290,11 @@ def _word(scan: SiemensScanner) -> Word:
         raise scan.error(f"{scan.rest} where a word would have to begin: an address, a name or a code")
     scan.at = name.end()
     index = indices(scan) if scan.text[scan.at : scan.at + 1] == "[" else ()
-    if _ASSIGNED.match(scan.text, scan.at):
+    address = _ADDRESS.match(scan.text, begin)
+    if _ASSIGNED.match(scan.text, scan.at) and not (address and _ends_before_a_word(address, name, scan.at)):
         return _assigned(scan, name[0], index, begin)
     if index:
         raise scan.error(f"{name[0]}[...] without a value: = and a value would have to follow")
-    address = _ADDRESS.match(scan.text, begin)
     if address is not None and (address.end() >= name.end() or not _is_name(name[0])):
         scan.at = address.end()
         letter, digits = address[1], address[2]
@@ -340,17 +321,13 @@ def _is_name(name: str) -> bool:
     return len(name) > 1 and (name[1].isalpha() or name[1] == "_")
 
 
+def _ends_before_a_word(address: re.Match[str], name: re.Match[str], at: int) -> bool:
+    """Whether the next word begins within what looks like a name: `X10Y=5`."""
+    begins = address.end() < name.end() == at and name.string[address.end()].isalpha()
+    return begins and address[1] in "GMXYZFS" and not _is_name(name[0])
+
+
 def _assigned(scan: SiemensScanner, name: str, index: tuple[Expression, ...], begin: int) -> Word:
-    # `X10Y=5`: an address with its number, and the next word behind it
-    address = _ADDRESS.match(scan.text, begin)
-    if address is not None and not index and address.end() < begin + len(name) and not _is_name(name):
-        letter, digits = address[1], address[2]
-        if letter in "GMXYZFS" and scan.text[address.end()].isalpha():
-            scan.at = address.end()
-            if letter == "G":
-                return Word(f"G{int(digits)}", begin + 1)
-            constant = float(digits)
-            return Word(letter, begin + 1, lambda _scope: constant)
     scan.require("=", "=")
     scan.skip()
     mode = _MODE.match(scan.text, scan.at)
@@ -366,19 +343,12 @@ def _assigned(scan: SiemensScanner, name: str, index: tuple[Expression, ...], be
 
 @dataclass(frozen=True)
 class ProgramLines:
-    """One program: its lines, and where it stands.
+    """One program: its lines, and where it stands."""
 
-    Attributes:
-        name: in capitals, without _N_ and _SPF.
-        file: that holds it.
-        first: line of the file at which `lines` begins, from 1.
-        lines: as they stand there.
-    """
-
-    name: str
-    file: str
-    first: int
-    lines: tuple[str, ...]
+    name: str  # in capitals, without _N_ and _SPF
+    file: str  # that holds it
+    first: int  # line of the file at which `lines` begins, from 1
+    lines: tuple[str, ...]  # as they stand there
     partners: dict[int, int] = field(default_factory=dict, compare=False)  # of IF, ELSE and loops: the next of them
     starts: dict[int, int] = field(default_factory=dict, compare=False)  # of the end of a loop: its begin
 
@@ -387,11 +357,7 @@ class ProgramLines:
         return block_of(self.lines[index])
 
     def find_structure(self) -> None:
-        """Find what belongs together, once.
-
-        Raises:
-            StructureError: something is not closed, or closed without being open.
-        """
+        """Find what belongs together, once."""
         if self.partners:
             return
         open_ones: list[tuple[str, int, int]] = []  # word, first line, last line that it led to

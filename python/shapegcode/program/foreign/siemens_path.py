@@ -6,6 +6,7 @@ p. 139; polar coordinates 1265481 pp. 174, 175; FLIN 662833 p. 458; chamfers 679
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,9 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from shapegcode.machine import Machine
-from shapegcode.program.foreign import siemens_arcs as arcs
+from shapegcode.program.foreign import arcs
+from shapegcode.program.foreign.arcs import PLANES, Element, Vector, flat
 from shapegcode.program.foreign.plain import PlainProgram, number_text
-from shapegcode.program.foreign.siemens_arcs import PLANES, Element, Vector
 from shapegcode.program.foreign.siemens_expressions import AtColumn, WordError
 
 _FLIN_ERROR_MM = 0.0005  # of blocks of constant feed in the place of one whose feed is linear
@@ -75,13 +76,13 @@ class SiemensModes:
 class Given(AtColumn):
     """Words of one block that say where to go; lengths in mm."""
 
-    axes: dict[int, tuple[float, str, int]] = field(default_factory=dict)  # value, AC or IC, column
-    centre: dict[int, tuple[float, str, int]] = field(default_factory=dict)
-    middle: dict[int, tuple[float, str, int]] = field(default_factory=dict)
+    axes: dict[int, tuple[float, bool, int]] = field(default_factory=dict)  # value, whether from the start, column
+    centre: dict[int, tuple[float, bool, int]] = field(default_factory=dict)
+    middle: dict[int, tuple[float, bool, int]] = field(default_factory=dict)
     radius: float | None = None
     angle: float | None = None
     turns: int = 0
-    polar: dict[str, tuple[float, str, int]] = field(default_factory=dict)  # AP, RP
+    polar: dict[str, tuple[float, str, int]] = field(default_factory=dict)  # AP, RP: value, AC or IC, column
     corner: tuple[str, float] | None = None  # RND, CHR, CHF
     start_feed: float | None = None  # that was in force before the block
     has_feed: bool = False
@@ -129,8 +130,9 @@ class SiemensPath:
             self.out.put(text, self.line, self.file)
 
     def note(self, text: str, key: str = "") -> None:
-        """Tell something once."""
-        self.out.note(self.line, text, key)
+        """Tell something once; nothing of an empty text."""
+        if text:
+            self.out.note(self.line, text, key)
 
     # ---- frames and offsets ------------------------------------------------------------------------------------------
 
@@ -153,17 +155,17 @@ class SiemensPath:
             self._plane = plane
             self.put(f"G{plane}")
 
-    def set_offset(self, name: str, written: str) -> None:
+    def set_offset(self, name: str) -> None:
         """Another work offset."""
         if name == self.modes.offset:
             return
         table, before = self.machine.input.work_offsets, self.modes.offset
         self.modes.offset = name
         self.shifted = [True] * 3
-        self.put(written)
+        self.put(offset_word(name))
         if table and before:
             zero = (0.0, 0.0, 0.0)
-            self.at = self.at + np.array(table.get(_table_name(before), zero)) - table.get(_table_name(name), zero)
+            self.at = self.at + np.array(table.get(offset_word(before), zero)) - table.get(offset_word(name), zero)
         else:
             self.at = np.full(3, math.nan)
 
@@ -180,17 +182,15 @@ class SiemensPath:
         if given.polar:
             if set(given.polar) != {"AP", "RP"}:
                 raise given.error(f"G{code} with {' and '.join(given.polar)} alone: AP= and RP= would have to be given")
-            angle = math.radians(given.polar["AP"][0])
-            step = given.polar["RP"][0] * np.array([math.cos(angle), math.sin(angle)])
+            step = cmath.rect(given.polar["RP"][0], math.radians(given.polar["AP"][0]))
         elif {first, second} <= given.axes.keys():
-            step = np.array([given.axes[first][0], given.axes[second][0]])
+            step = complex(given.axes[first][0], given.axes[second][0])
         else:
             raise given.error(f"G{code}: both axes of the plane would have to be given, or AP= and RP=")
         origin = {110: self.modes.frame.undo(self.at), 111: np.zeros(3), 112: self.pole}[code]
         if not np.all(np.isfinite(origin[[first, second]])):
             raise given.error(f"G{code}: the position is not known here: the axes would have to be programmed before")
-        self.pole = origin.copy()
-        self.pole[[first, second]] = origin[[first, second]] + step
+        self.pole = arcs.moved_to(origin, self.modes.plane, flat(origin, self.modes.plane) + step)
         self.polar.pop("AP", None)
 
     def quick_move(self, code: str, words: list[tuple[str, str]], feed: str) -> bool:
@@ -238,8 +238,7 @@ class SiemensPath:
             self._polar_end(given)
         here = modes.frame.undo(self.at)
         target = here.copy()
-        for axis, (value, mode, column) in given.axes.items():
-            incremental = mode == "IC" or (mode == "" and modes.incremental)
+        for axis, (value, incremental, column) in given.axes.items():
             if incremental and self.shifted[axis]:
                 setting = "a setting (SD42440, SD42442) says whether the control adds that"
                 wanted = "it would have to be programmed absolutely before"
@@ -271,16 +270,15 @@ class SiemensPath:
             raise given.error("AP= and RP=: both would have to be given, here or before")
         angle = math.radians(self.polar["AP"])
         for axis, share in ((first, math.cos(angle)), (second, math.sin(angle))):
-            given.axes[axis] = (self.pole[axis] + self.polar["RP"] * share, "AC", given.column)
+            given.axes[axis] = (self.pole[axis] + self.polar["RP"] * share, False, given.column)
         if self.modes.motion in ("G2", "G3") and not given.centre and given.radius is None:
-            given.centre = {axis: (float(self.pole[axis]), "AC", given.column) for axis in (first, second)}
+            given.centre = {axis: (float(self.pole[axis]), False, given.column) for axis in (first, second)}
 
     def _straight(self, given: Given, target: Vector) -> None:
         frame = self.modes.frame
         end = frame.apply(target)
         moved = [bool(np.any(np.abs(frame.linear[k, list(given.axes)]) > 1e-12)) for k in range(3)]
-        unknown = [k for k in range(3) if moved[k] and math.isnan(end[k])]
-        if unknown:
+        if any(moved[k] and math.isnan(end[k]) for k in range(3)):
             self._by_distance(given, end, moved)
             return
         still = np.nan_to_num(self.at)  # axes at rest count for nothing
@@ -309,7 +307,7 @@ class SiemensPath:
             words += f"{'XYZ'[k]}{self._length(step)}"
         feed = "" if self.modes.motion == "G0" else self._feed_word(self._constant_feed(given, math.nan))
         self.put("G91")
-        self.put(f"{_code(self.modes.motion)}{words}{feed}")
+        self.put(f"{'G00' if self.modes.motion == 'G0' else 'G01'}{words}{feed}")
         self.put("G90")
         self._step = None
         self.moves += 1
@@ -343,21 +341,22 @@ class SiemensPath:
                 raise ValueError("CT needs the direction of a move before it, whose start is known")
             return arcs.tangential(here, target, modes.frame.linear.T @ self.direction, modes.plane)
         turn = 1 if modes.motion == "G3" else -1
-        centre = here.copy()
-        for axis, (value, mode, column) in given.centre.items():
+        about = here.copy()
+        for axis, (value, incremental, column) in given.centre.items():
             if axis not in (first, second):
                 raise WordError(
                     f"{'IJK'[axis]} lies across the plane G{modes.plane}: it would have to be left out", column
                 )
-            centre[axis] = value if mode == "AC" else here[axis] + value
+            about[axis] = here[axis] + value if incremental else value
+        start, centre = flat(here, modes.plane), flat(about, modes.plane)
         if given.radius is not None:
             return arcs.by_radius(here, target, given.radius, modes.plane, turn, tolerance)
         if given.angle is not None:
             if not 0.0 < given.angle < 360.0:
                 raise ValueError(f"AR={given.angle:g}: it would have to lie between 0 and 360 degrees")
             if given.centre:
-                end = arcs.turned(here, centre, given.angle, modes.plane, turn)
-                target[[first, second]] = end[[first, second]]
+                end = centre + (start - centre) * cmath.rect(1.0, turn * math.radians(given.angle))
+                target = arcs.moved_to(target, modes.plane, end)
                 return arcs.by_centre(here, target, centre, modes.plane, turn, tolerance)
             return arcs.by_angle(here, target, given.angle, modes.plane, turn)
         if not given.centre:
@@ -366,8 +365,7 @@ class SiemensPath:
 
     def _middle(self, given: Given, here: Vector) -> Vector:
         middle = here.copy()
-        for axis, (value, mode, _) in given.middle.items():
-            incremental = mode == "IC" or (mode == "" and self.modes.incremental)
+        for axis, (value, incremental, _) in given.middle.items():
             middle[axis] = here[axis] + value if incremental else value
         if len(given.middle) < 2:
             raise ValueError("CIP: the intermediate point would have to be given by two or three of I1=, J1=, K1=")
@@ -427,10 +425,7 @@ class SiemensPath:
 
     def _write_part(self, part: Element, moved: list[bool], exact: str, feed: float, time_min: float) -> None:
         """One block of constant feed; with a time its feed is that which takes it between the rounded ends."""
-        first, second, _ = PLANES[part.plane]
-        count = 1
-        if part.centre is not None:
-            count = 1 if abs(part.sweep_rad) <= _MAX_SWEEP else math.ceil(abs(part.sweep_rad) / math.pi)
+        count = 1 if abs(part.sweep_rad) <= _MAX_SWEEP else math.ceil(abs(part.sweep_rad) / math.pi)
         for k in range(count):
             piece = part if count == 1 else part.part(k / count, (k + 1) / count)
             start, end = self._grid(piece.start), self._grid(piece.end)
@@ -439,15 +434,15 @@ class SiemensPath:
                 if length == 0.0:
                     continue
                 feed = length * count / time_min
-            radius = math.inf if piece.centre is None else math.hypot(*(piece.start - piece.centre)[[first, second]])
-            if piece.centre is None or radius * abs(piece.sweep_rad) < 3.0 * self._increment:
-                self.put(f"{exact}G01{self._axes(piece.end, moved)}{self._feed_word(feed)}")
-                continue
-            centre = _between(piece.centre, start, end, first, second)
-            words = "".join(
-                f"{'IJK'[k]}{number_text(round(float(centre[k] - start[k]), 5))}" for k in sorted((first, second))
-            )
-            code = "G03" if piece.sweep_rad > 0.0 else "G02"
+            words, code = "", "G01"
+            if piece.centre is not None:
+                begin, centre = flat(piece.start, piece.plane), flat(piece.centre, piece.plane)
+                if abs(begin - centre) * abs(piece.sweep_rad) >= 3.0 * self._increment:
+                    code = "G03" if piece.sweep_rad > 0.0 else "G02"
+                    begin = flat(start, piece.plane)
+                    spoke = _between(centre, begin, flat(end, piece.plane)) - begin
+                    parts = sorted(zip(PLANES[piece.plane], (spoke.real, spoke.imag), strict=False))
+                    words = "".join(f"{'IJK'[k]}{number_text(round(part, 5))}" for k, part in parts)
             self.put(f"{exact}{code}{self._axes(piece.end, moved)}{words}{self._feed_word(feed)}")
 
     def _pieces(self, element: Element, given: Given, known: bool) -> list[tuple[float, float, float, float]]:
@@ -508,11 +503,10 @@ class SiemensPath:
 
     def _corner_of(self, element: Element, given: Given, known: bool) -> _HeldCorner | None:
         kind, size = given.corner or ("RND", self.modes.rounding_mm)
-        if size == 0.0:
+        is_possible = self.modes.motion != "G0" and known and size > 0.0
+        if size == 0.0 or (given.corner is None and size > 0.0 and not is_possible):
             return None
-        if self.modes.motion == "G0" or not known or size < 0.0:
-            if given.corner is None and size > 0.0:
-                return None
+        if not is_possible:
             raise given.error(
                 f"{kind}={size:g}: it would have to be more than 0, in a block with a feed whose start is known"
             )
@@ -554,27 +548,16 @@ class SiemensPath:
             self.out.put(text, line, file)
 
 
-def _between(centre: Vector, start: Vector, end: Vector, first: int, second: int) -> Vector:
+def _between(centre: complex, start: complex, end: complex) -> complex:
     """The centre as near as possible that has both rounded ends at one radius; itself where that is far."""
-    plane = [first, second]
-    chord = end[plane] - start[plane]
-    size = float(np.hypot(*chord))
-    if size < 0.01:
+    if abs(end - start) < 0.01:
         return centre
-    along = chord / size
-    off = float((centre[plane] - 0.5 * (start[plane] + end[plane])) @ along)
-    if abs(off) > 0.002:
-        return centre
-    moved = centre.copy()
-    moved[plane] = centre[plane] - off * along
-    return moved
+    along = (end - start) / abs(end - start)
+    off = ((centre - 0.5 * (start + end)) * along.conjugate()).real
+    return centre if abs(off) > 0.002 else centre - off * along
 
 
-def _code(motion: str) -> str:
-    return f"{motion[0]}{int(motion[1:]):02d}"
-
-
-def _table_name(offset: str) -> str:
-    """How the table of the machine file calls a work offset."""
-    number = int(offset[1:])
-    return offset if number < 500 else f"G54.1P{number - 500 or 300}"
+def offset_word(name: str) -> str:
+    """A settable frame as FANUC's work offset: G505 is G54.1P5, G500 (no offset of its own) G54.1P300."""
+    code = int(name[1:])
+    return name if code < 500 else f"G54.1P{code - 500 or 300}"

@@ -11,19 +11,16 @@ import re
 import tomllib
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from shapegcode.io.units import MM_PER_INCH
-from shapegcode.program.foreign.plain import number_text
+from shapegcode.program.foreign.plain import number_text, words_of
 from shapegcode.program.foreign.siemens_blocks import SiemensBlock, Word
-from shapegcode.program.foreign.siemens_expressions import Value, WordError, number, whole
-from shapegcode.program.foreign.siemens_path import Given, SiemensFrame, SiemensModes, SiemensPath
+from shapegcode.program.foreign.siemens_expressions import Scope, Value, WordError, number, whole
+from shapegcode.program.foreign.siemens_path import Given, SiemensFrame, SiemensModes, SiemensPath, offset_word
 from shapegcode.program.stamp import plain_comment
-
-if TYPE_CHECKING:
-    from shapegcode.program.foreign.siemens_expressions import Scope
 
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _CENTRES = {"I": 0, "J": 1, "K": 2}
@@ -32,9 +29,10 @@ _ROTARY = {"A", "B", "C", "U", "V", "W"}
 _FRAMES = {"TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR", "AMIRROR"}
 _ONE_OF = (("CR", "AR"), ("RND", "CHF", "CHR"))  # words that exclude each other
 _BEHIND = {0, 1, 2, 5, 9, 30}  # M functions behind the motion of their block
+_OF_THE_MACHINE = ("G53", "G153", "SUPA")  # coordinates
 _ENDS = {"M2": "M2", "M30": "M30", "M17": "M17"}
 
-_LEFT_OUT_BLOCKS = {"G25", "G26"}
+_BLOCKS_OF_THEIR_OWN = ("G4", "G110", "G111", "G112", "G74", "G75", "G25", "G26")
 _GROUPS = (
     {"G0", "G1", "G2", "G3", "CIP", "CT"}, {"G17", "G18", "G19"}, {"G90", "G91"}, {"G70", "G71", "G700", "G710"},
     {"G93", "G94", "G95"}, {"FLIN", "FNORM"}, {"G60", "G64", "G641", "G642", "G643", "G644", "G645"},
@@ -54,11 +52,8 @@ def _tables() -> tuple[dict[str, str], dict[str, str], dict[re.Pattern[str], str
     return words, addresses, {re.compile(pattern): reason for pattern, reason in tables["refused"].items()}
 
 
-class Run(Protocol):
+class Run(Scope, Protocol):
     """What words need of the program that holds them."""
-
-    def value_of(self, name: str, index: tuple[Value, ...], column: int) -> Value:
-        """As a scope has it."""
 
     def knows(self, name: str) -> bool:
         """Whether something can be set by this name."""
@@ -76,7 +71,6 @@ class BlockWords:
     def __init__(self, path: SiemensPath, run: Run, *, uses_m6: bool) -> None:
         """Begin without a tool."""
         self.path, self._run = path, run
-        self._scope: Scope = run
         self._uses_m6 = uses_m6
         self._tool, self._next_tool, self._edge, self._next_edge = 0, 0, -1, -1
         self._tools: dict[str, int] = {}
@@ -103,7 +97,7 @@ class BlockWords:
         now = self.path.modes
         self.path.set_plane(modes.plane)
         if modes.offset and modes.offset != now.offset:
-            self.path.set_offset(modes.offset, _offset_word(modes.offset))
+            self.path.set_offset(modes.offset)
         self.path.set_frame(modes.frame)
         self.path.modes = modes
 
@@ -115,25 +109,21 @@ class BlockWords:
         if words[0].name in _FRAMES:
             self._frame(words)
             return ""
-        for name in ("G4", "G110", "G111", "G112", "G74", "G75", *_LEFT_OUT_BLOCKS):
-            if name in names:
-                self._special(name, words)
-                return ""
+        if name := next((name for name in _BLOCKS_OF_THEIR_OWN if name in names), ""):
+            self._special(name, words)
+            return ""
         if words[0].name in ("CALL", "EXTCALL"):
             self._called(words)
             return ""
         given = Given(column=block.column, start_feed=self.path.modes.feed)
-        own_frame = ""
+        own_frame = next((word.name for word in reversed(words) if word.name in _OF_THE_MACHINE), "")
         for group in _GROUPS:
             if len(group & names) > 1:
                 one, other = sorted(group & names)[:2]
                 raise block.error(f"{one} and {other} in one block: one of them would have to be left out")
         for word in words:
-            if word.value is None:
-                if word.name in ("G53", "G153", "SUPA"):
-                    own_frame = word.name
-                else:
-                    self._code(word, given)
+            if word.value is None and word.name not in _OF_THE_MACHINE:
+                self._code(word, given)
         rotary: dict[str, float] = {}
         functions: list[Word] = []
         for word in words:
@@ -170,14 +160,17 @@ class BlockWords:
 
     def _number(self, word: Word) -> float:
         assert word.value is not None
-        return float(number(word.value(self._scope), word.column))
+        return float(number(word.value(self._run), word.column))
 
     def _length(self, word: Word) -> float:
         return self._number(word) * self.path.modes.unit
 
+    def _is_incremental(self, word: Word) -> bool:
+        return word.mode == "IC" or (word.mode == "" and self.path.modes.incremental)
+
     def _whole(self, word: Word) -> int:
         assert word.value is not None
-        return whole(word.value(self._scope), word.name, word.column)
+        return whole(word.value(self._run), word.name, word.column)
 
     # ---- codes -------------------------------------------------------------------------------------------------------
 
@@ -204,13 +197,13 @@ class BlockWords:
         elif name in ("G60", "G64", "G641", "G642", "G643", "G644", "G645"):
             self._path_control(name)
         elif re.fullmatch(r"G5[4-7]|G500|G50[5-9]|G5[1-9]\d", name):
-            self.path.set_offset(name, _offset_word(name))
+            self.path.set_offset(name)
             if int(name[1:]) >= 500:
-                self.path.names[_offset_word(name)] = name
-                self.path.note(f"{name} is written as {_offset_word(name)}", name)
+                self.path.names[offset_word(name)] = name
+                self.path.note(f"{name} is written as {offset_word(name)}", name)
         elif name in _tables()[0]:
-            self._leave_out(_tables()[0][name])
-        elif name not in ("RET",):
+            self.path.note(_tables()[0][name])
+        elif name != "RET":
             raise self._refusal(word)
 
     def _path_control(self, name: str) -> None:
@@ -221,16 +214,16 @@ class BlockWords:
         if name not in ("G60", "G64"):
             self.path.note("G641 to G645 are read as G64: by how much the control rounds corners is its own", "G641")
 
-    def _leave_out(self, told: str) -> None:
-        if told:
-            self.path.note(told)
-
     def _refusal(self, word: Word) -> WordError:
         for pattern, reason in _tables()[2].items():
             if pattern.fullmatch(word.name):
                 return word.error(f"{word.name}: {reason}")
         if re.fullmatch(r"G\d+", word.name):
             return word.error(f"{word.name} is no code that is read: another one would have to stand there")
+        if word.value is not None:
+            return word.error(
+                f"{word.name}= is neither an address that is read nor a variable: DEF would have to stand before"
+            )
         wanted = f"{word.name}.SPF would have to be beside this one"
         return word.error(f"{word.name} is neither a word that is read nor a program: {wanted}")
 
@@ -241,9 +234,9 @@ class BlockWords:
         name, modes = word.name, self.path.modes
         assert word.value is not None
         if self._run.knows(name):
-            self._run.assign(word, word.value(self._scope))
+            self._run.assign(word, word.value(self._run))
         elif name in _AXES:
-            given.axes[_AXES[name]] = (self._length(word), word.mode, word.column)
+            given.axes[_AXES[name]] = (self._length(word), self._is_incremental(word), word.column)
         elif name in _CENTRES or name in _MIDDLES:
             self._centre(word, given)
         elif name in ("CR", "AR", "TURN", "AP", "RP"):
@@ -262,17 +255,9 @@ class BlockWords:
         elif name in _ROTARY:
             rotary[name] = self._number(word)
         elif name in _tables()[1]:
-            self._leave_out(_tables()[1][name])
+            self.path.note(_tables()[1][name])
         else:
-            raise self._unknown(word)
-
-    def _unknown(self, word: Word) -> WordError:
-        error = self._refusal(word)
-        if "neither" not in str(error):
-            return error
-        return word.error(
-            f"{word.name}= is neither an address that is read nor a variable: DEF would have to stand before"
-        )
+            raise self._refusal(word)
 
     def _centre(self, word: Word, given: Given) -> None:
         motion = self.path.modes.motion
@@ -280,8 +265,10 @@ class BlockWords:
         if motion != "CIP" if is_middle else motion not in ("G2", "G3"):
             wanted = "CIP" if is_middle else "G2 or G3"
             raise word.error(f"{word.name} with {motion or 'no G code'}: {wanted} would have to be in force")
-        table, axes = (given.middle, _MIDDLES) if is_middle else (given.centre, _CENTRES)
-        table[axes[word.name]] = (self._length(word), word.mode, word.column)
+        if is_middle:
+            given.middle[_MIDDLES[word.name]] = (self._length(word), self._is_incremental(word), word.column)
+        else:
+            given.centre[_CENTRES[word.name]] = (self._length(word), word.mode != "AC", word.column)
 
     def _round_word(self, word: Word, given: Given) -> None:
         name = word.name
@@ -309,7 +296,7 @@ class BlockWords:
             if given.axes or given.polar or self.path.modes.motion != "G0":
                 name = next(iter(rotary))
                 raise given.error(f"{name}: moves of rotary axes are read with G0 alone, in a block of their own")
-            self.path.put("G00" + "".join(f"{name}{number_text(value)}" for name, value in rotary.items()))
+            self.path.put("G00" + words_of(rotary, "".join(rotary)))
         if own_frame:
             self._in_machine(given, own_frame)
         elif given.axes or given.polar or (given.centre and self.path.modes.motion in ("G2", "G3")):
@@ -323,14 +310,13 @@ class BlockWords:
             return
         if self.path.modes.motion != "G0" or given.polar:
             raise given.error(f"{code} with {self.path.modes.motion or 'no G code'}: it is read with G0 and axes alone")
-        words, axes = "", ""
-        for axis, (value, mode, column) in sorted(given.axes.items()):
-            if mode == "IC" or (mode == "" and self.path.modes.incremental):
+        to: dict[str, float] = {}
+        for axis, (value, is_incremental, column) in given.axes.items():
+            if is_incremental:
                 raise WordError(f"{code} incrementally: the axis would have to be programmed absolutely", column)
-            words += f"{'XYZ'[axis]}{number_text(round(value, 5))}"
-            axes += "XYZ"[axis]
-        self.path.put(f"G53G00{words}")
-        self.path.forget(axes)
+            to["XYZ"[axis]] = round(value, 5)
+        self.path.put(f"G53G00{words_of(to, 'XYZ')}")
+        self.path.forget("".join(to))
         self.path.note(f"{code} is written as G53: which offsets it suppresses is set by the machine builder", "SUPA")
 
     # ---- functions ---------------------------------------------------------------------------------------------------
@@ -359,7 +345,13 @@ class BlockWords:
             self._change_tool()
         for word in functions:
             if word.name == "D":
-                self._select_edge(self._whole(word), word, now=bool(changes) or not (self._uses_m6 and self._next_tool))
+                edge = self._whole(word)
+                if not 0 <= edge <= 9:
+                    raise word.error(f"D{edge}: it would have to be 0 to 9")
+                if changes or not (self._uses_m6 and self._next_tool):
+                    self._offset(edge, word.column)
+                else:
+                    self._next_edge = edge
         if changes and self._edge < 0:
             self._offset(self._next_edge if self._next_edge >= 0 else 1, changes[0].column)
         for code in codes:
@@ -369,7 +361,7 @@ class BlockWords:
 
     def _select_tool(self, word: Word) -> None:
         assert word.value is not None
-        value = word.value(self._scope)
+        value = word.value(self._run)
         if isinstance(value, str):
             if value not in self._tools:
                 self._tools[value] = 901 + len(self._tools)
@@ -391,14 +383,6 @@ class BlockWords:
             self.path.forget(self.path.machine.input.tool_change_unknown_axes)
         self._tool = self._next_tool or self._tool
         self._next_tool, self._edge = 0, -1
-
-    def _select_edge(self, edge: int, word: Word, *, now: bool) -> None:
-        if not 0 <= edge <= 9:
-            raise word.error(f"D{edge}: it would have to be 0 to 9")
-        if now:
-            self._offset(edge, word.column)
-        else:
-            self._next_edge = edge
 
     def _offset(self, edge: int, column: int) -> None:
         """The length offset of an edge of the tool."""
@@ -436,15 +420,14 @@ class BlockWords:
                 raise word.error(f"{word.name}={word.mode}( ) in a block of {name}: a value would have to stand there")
             values[word.name] = self._length(word) if name.endswith("TRANS") else self._number(word)
         kind = name.removeprefix("A")
-        if (kind == "ROT") != ("RPL" in values) and values and kind != "ROT":
+        if "RPL" in values and kind != "ROT":
             raise words[0].error(f"RPL= is an angle: ROT or AROT would have to stand before it, not {name}")
         frame = _frame_of(kind, values, path.modes.plane, words[0].column) if values else SiemensFrame()
-        is_additive = name.startswith("A") and name != kind
-        path.set_frame(path.modes.frame.then(frame) if is_additive else frame)
+        path.set_frame(path.modes.frame.then(frame) if name != kind else frame)
 
     def _special(self, name: str, words: tuple[Word, ...]) -> None:
         others = [word for word in words if word.name != name]
-        if name in _LEFT_OUT_BLOCKS:
+        if name in ("G25", "G26"):
             self.path.note(
                 f"{name} is left out: limits of the working area and the spindle change no programmed path", name
             )
@@ -456,13 +439,10 @@ class BlockWords:
             given = Given(column=words[0].column)
             for word in others:
                 if word.name in _AXES and word.value is not None and word.mode != "IC":
-                    given.axes[_AXES[word.name]] = (self._length(word), word.mode, word.column)
+                    given.axes[_AXES[word.name]] = (self._length(word), False, word.column)
                 elif word.name in ("AP", "RP"):
-                    given.polar[word.name] = (
-                        self._length(word) if word.name == "RP" else self._number(word),
-                        "",
-                        word.column,
-                    )
+                    value = self._length(word) if word.name == "RP" else self._number(word)
+                    given.polar[word.name] = (value, "", word.column)
                 elif word.name not in ("G17", "G18", "G19", "G90", "G91"):
                     raise word.error(
                         f"{word.name} beside {name}: axes of the plane or AP= and RP= would have to stand there"
@@ -505,19 +485,13 @@ class BlockWords:
     def _called(self, words: tuple[Word, ...]) -> None:
         word = words[0]
         if word.given and word.given[0] is not None and len(words) == 1:
-            name = word.given[0](self._scope)
+            name = word.given[0](self._run)
             if isinstance(name, str):
                 self._run.call_named(name, word)
                 return
         raise word.error(
             f'{word.name}: the name of a program in quotes and brackets would have to follow: {word.name}("NAME")'
         )
-
-
-def _offset_word(name: str) -> str:
-    """A settable frame as FANUC's work offset: G505 is G54.1P5, G500 (no offset of its own) G54.1P300."""
-    code = int(name[1:])
-    return name if code < 500 else f"G54.1P{code - 500 or 300}"
 
 
 def _frame_of(kind: str, values: dict[str, float], plane: int, column: int) -> SiemensFrame:
