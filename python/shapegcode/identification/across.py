@@ -67,31 +67,21 @@ def measured_across(
     sources: Sequence[Any], across: bool | str | Path | Measured | Sequence[str | Path | Measured], options: ReadOptions
 ) -> list[Measured]:
     """What the files (those of the taps themselves, or others) hold, of all axes."""
-    given: Sequence[Any]
-    if isinstance(across, bool):
-        given = sources
-    else:
-        given = [across] if isinstance(across, str | Path | Record | FrequencyResponse) else across
-    options = replace(options, axis=None, response_columns=())
-    return [
-        one
-        for each in given
-        for one in ([each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options))
-    ]
+    single = isinstance(across, str | Path | Record | FrequencyResponse)
+    given: Sequence[Any] = sources if isinstance(across, bool) else [across] if single else across  # type: ignore[assignment]
+    return measured(given, replace(options, axis=None, response_columns=()))
+
+
+def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
+    """Records and frequency responses, those of files read."""
+    read = (
+        [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options) for each in sources
+    )
+    return [one for several in read for one in several]
 
 
 def with_moves(found: Identification, others: Sequence[Measured], window_s: float | None = None) -> Identification:
-    """The identification with what its supported modes move of the other axes.
-
-    Args:
-        found: with modes, and the axis along which they were found.
-        others: records or responses that state their axes; those of the axis itself are left out. Of the same file
-            they count as recorded together.
-        window_s: time constant of an exponential window that the analyser applied to all of them.
-
-    Raises:
-        RecordError: no axis, or no response of another one; a free decay that was not recorded together.
-    """
+    """The identification with what its modes move of the other axes; `window_s`: exponential window of all `others`."""
     if found.axis is None:
         raise RecordError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
     others = [each for each in others if not _is_of_refused(each, found)]

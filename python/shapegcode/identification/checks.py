@@ -16,28 +16,17 @@ from shapegcode.io.record import UNITS, FloatArray, Quantity, Record
 
 @dataclass(frozen=True)
 class RecordUse:
-    """What became of one tap or decay.
+    """What became of one tap or decay."""
 
-    Attributes:
-        source: file, and which hit or channel of it.
-        used: whether the modes come from it too.
-        reason: why it is not used; empty: it is.
-        samples: that were recorded; null where it is not used, as for the others.
-        period_s: time between two samples.
-        start_s: time of the first sample in the file.
-        quantity: what the sensor measured.
-        excited_hz: up to where the hit excites (-20 dB); null for a decay.
-        resolution_hz: distance of two lines of a frequency response without time record, whose lines are its samples.
-    """
-
-    source: str
-    used: bool
-    reason: str = ""
-    samples: int | None = None
-    period_s: float | None = None
-    start_s: float | None = None
-    quantity: Quantity | None = None
-    excited_hz: float | None = None
+    source: str  # file, and which hit or channel of it.
+    used: bool  # whether the modes come from it too.
+    reason: str = ""  # why it is not used; empty: it is.
+    samples: int | None = None  # that were recorded; null where it is not used, as for the others.
+    period_s: float | None = None  # time between two samples.
+    start_s: float | None = None  # time of the first sample in the file.
+    quantity: Quantity | None = None  # what the sensor measured.
+    excited_hz: float | None = None  # up to where the hit excites (-20 dB); null for a decay.
+    # distance of two lines of a frequency response without time record, whose lines are its samples.
     resolution_hz: float | None = None
 
     @property
@@ -71,6 +60,12 @@ class Prepared:
     def records(self) -> tuple[Record, ...]:
         """Those that can be used."""
         return tuple(each.record for each in self.usable)
+
+    def without(self, unused: Sequence[Usable], why: str) -> Prepared:
+        """The same with some of the records refused."""
+        refused = tuple(RecordUse(each.record.source, False, why) for each in unused)
+        usable = tuple(each for each in self.usable if each not in unused)
+        return replace(self, usable=usable, refused=(*self.refused, *refused))
 
 
 #: A second pulse above this share of the first is refused: the momentum, and so the mass, would be off by as much.

@@ -103,10 +103,7 @@ class _Scales:
 
 
 def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_samples: float) -> _Scales:
-    """What a decay tells of its modes: the slowest from its tail, where no command is left, the strongest from all.
-
-    A tail that has died away tells nothing: all its modes are about as fast as the one already found.
-    """
+    """What a decay tells of its modes: the slowest from its tail, where no command is left, the strongest from all."""
     rate = 1.0 / record.period_s
     tail = quiet[start + int(_TAIL * (end - start)) : end]
     peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _MIN_TAIL else ()
@@ -145,10 +142,7 @@ def _refuse_still(record: Record) -> None:
 
 
 def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
-    """One record for each stop of an ordinary run behind which the machine rests, those with least motion first.
-
-    Of many the strongest ones. `lowest_hz`: no mode lies below; what is slower is motion of the axis.
-    """
+    """One record for each stop of a run behind which the machine rests, those with least motion first, 20 at most."""
     _refuse_still(record)
     quiet = np.asarray(record.response - np.median(record.response), dtype=np.float64)
     period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
@@ -166,14 +160,12 @@ def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
         return float(np.sum(slow[inside] ** 2) / np.sum(quiet[inside] ** 2))
 
     parts = sorted(sorted(parts, key=lambda part: -envelope[part[0]])[:_MOST_STOPS], key=moved)
+    times = ((begin, stop, record.start_s + begin * record.period_s) for begin, stop in parts)
     return [
         replace(
-            record,
-            source=f"{record.source} stop at {record.start_s + begin * record.period_s:.2f} s",
-            response=record.response[begin:stop],
-            start_s=record.start_s + begin * record.period_s,
+            record, source=f"{record.source} stop at {at_s:.2f} s", response=record.response[begin:stop], start_s=at_s
         )
-        for begin, stop in parts
+        for begin, stop, at_s in times
     ]
 
 

@@ -14,9 +14,9 @@ from threadpoolctl import threadpool_limits
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
-from shapegcode.identification.across import left_by, measured_across, with_moves
+from shapegcode.identification.across import left_by, measured, measured_across, with_moves
 from shapegcode.identification.capture import find_modes_of_captures, is_capture
-from shapegcode.identification.checks import Prepared, RecordUse, prepare
+from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.decay import split_stops
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
 from shapegcode.identification.model_search import (
@@ -25,23 +25,22 @@ from shapegcode.identification.model_search import (
     OPPOSED,
     TURNED,
     Doubts,
-    Fit,
     Search,
     Sought,
+    chart_modes,
+    chart_of,
     estimates_of,
     evidence_of,
     judged_modes,
     rival_of,
     search,
-    stabilisation_chart,
     starts_of,
 )
-from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Taps, are_blows, problem_of
+from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Fit, FitProblem, Taps, are_blows, problem_of
 from shapegcode.identification.result import Identification, MassCheck, by_support
 from shapegcode.identification.sweep import find_swept_modes
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse
-from shapegcode.io.read import read_measurement
 from shapegcode.io.record import FloatArray, Quantity, ReadOptions, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.taps import is_klipper, read_sweep
@@ -162,8 +161,9 @@ def _identified(
                 from shapegcode.identification.known_command import find_modes_of_command, known_command
 
                 return find_modes_of_command(known_command(sweep, machine), sources, options, sought, across=across)
-            captures = _captures(sources, options)
-            if captures:
+            # A column that is named as a sensor's makes a capture the record of that sensor.
+            files = [] if options.response_columns else [Path(each) for each in sources if isinstance(each, str | Path)]
+            if captures := [each for each in files if is_capture(each)]:
                 _refuse_of_sensors(captures[0], options, start_s, stops=stops, across=across)
                 if len(captures) < len(sources):
                     raise RecordError(f"{captures[0]}: a capture of command and encoder: other files go apart")
@@ -187,13 +187,6 @@ def _identified(
             raise
         told: dict[str, Any] = {} if ready is None else {"warnings": ready.warnings, "notes": ready.notes}
         return Identification(files=names, prepared=ready, reason=str(error), **told)
-
-
-def _captures(sources: Sequence[Any], options: ReadOptions) -> list[Path]:
-    """Captures of command and encoder; a column that is named as a sensor's makes the file a record of that sensor."""
-    if options.response_columns:
-        return []
-    return [Path(each) for each in sources if isinstance(each, str | Path) and is_capture(Path(each))]
 
 
 def _refuse_of_sensors(
@@ -220,10 +213,7 @@ def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: 
 
 
 def _turned_if_opposed(ready: Prepared, found: Identification, sought: Sought) -> Identification:
-    """What was found; with the sign of the responses turned where all that stands out goes against the push.
-
-    The first moment of the response tells the sign of one mode (`checks`), not that of several.
-    """
+    """What was found; with the sign of the responses turned where all that stands out goes against the push."""
     if found.modes or not any(mode.refusal == OPPOSED for mode in found.refused):
         return found
     text = f"{ready.records[0].source}: {TURNED}"
@@ -237,14 +227,9 @@ def _turned_if_opposed(ready: Prepared, found: Identification, sought: Sought) -
 
 def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record], list[FrequencyResponse]]:
     """Records over time or frequency responses: either of both is empty."""
-    records: list[Record] = []
-    responses: list[FrequencyResponse] = []
-    for each in sources:
-        for one in [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options):
-            if isinstance(one, Record):
-                records.append(one)
-            else:
-                responses.append(one)
+    found = measured(sources, options)
+    records = [each for each in found if isinstance(each, Record)]
+    responses = [each for each in found if isinstance(each, FrequencyResponse)]
     if responses and records:
         raise RecordError(
             f"{responses[0].source} is a frequency response, {records[0].source} a record over time: identify them "
@@ -274,12 +259,11 @@ def _modes_of_stops(records: list[Record], files: tuple[str, ...], sought: Sough
     found = find_modes(replace(ready, usable=first), files, sought)
     if not found.modes:
         return found
-    kept = tuple(use for use in ready.usable if left_by(found.modes, use.record) <= _STOP_LEFT)
-    if not kept:
+    moving = [use for use in ready.usable if left_by(found.modes, use.record) > _STOP_LEFT]
+    if len(moving) == len(ready.usable):
         return found
     why = "the modes of the stillest stops do not explain it: something moved"
-    refused = tuple(RecordUse(use.record.source, False, why) for use in ready.usable if use not in kept)
-    return find_modes(replace(ready, usable=kept, refused=(*ready.refused, *refused)), files, sought)
+    return find_modes(ready.without(moving, why), files, sought)
 
 
 def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:
@@ -384,10 +368,7 @@ def _of_similar_length(ready: Prepared) -> Prepared:
     """The hits whose records are at least half as long as the longest: over frequency all are cut to the shortest."""
     longest = max(len(record.response) for record in ready.records)
     short = [each for each in ready.usable if 2 * len(each.record.response) < longest]
-    why = "shorter than half of the longest record"
-    refused = tuple(RecordUse(each.record.source, False, why) for each in short)
-    usable = tuple(each for each in ready.usable if each not in short)
-    return replace(ready, usable=usable, refused=(*ready.refused, *refused))
+    return ready.without(short, "shorter than half of the longest record")
 
 
 def _many(ready: Prepared, files: tuple[str, ...], many: FrfModes, fitted: Sequence[FloatArray]) -> Identification:
@@ -414,11 +395,7 @@ def _warnings_of(ready: Prepared) -> list[str]:
 
 
 def _choose_course(problem: Taps, models: Search, sought: Sought) -> tuple[Taps, Search, list[Fit]]:
-    """The course of the force between its samples for which the data speak, and fits of what else it may have been.
-
-    A recorder with an anti-aliasing filter gives a band-limited force; a simulation may have one that is linear between
-    samples, or single blows. The mass differs by (pi f/rate)^2/3 and more.
-    """
+    """The course of the force between its samples for which the data speak, and fits of what else it may have been."""
     courses = [(problem, models)]
     order = max(sought.order(models), 1)
     for other in problem.other_courses(models.fits[order - 1]):
@@ -440,7 +417,7 @@ def _choose_course(problem: Taps, models: Search, sought: Sought) -> tuple[Taps,
 def _result(
     ready: Prepared,
     files: tuple[str, ...],
-    problem: Taps | Decays,
+    problem: FitProblem,
     models: Search,
     others: Sequence[Fit],
     sought: Sought,
@@ -457,7 +434,7 @@ def _result(
         warnings=tuple(warnings),
         notes=(*ready.notes, *_thinned_note(ready, problem, sought.band_hz)),
         prepared=ready,
-        chart=stabilisation_chart(problem),
+        chart=chart_of(enumerate(chart_modes(problem), start=1)),
         fitted=tuple(np.zeros(len(response)) for response in problem.responses),
         fitted_records=_fitted_records(ready, problem),
     )
@@ -499,19 +476,19 @@ def _result(
     )
 
 
-def _fitted_records(ready: Prepared, problem: Taps | Decays) -> tuple[Record, ...]:
+def _fitted_records(ready: Prepared, problem: FitProblem) -> tuple[Record, ...]:
     """The records as they were fitted: thinned out, if they were."""
     if isinstance(problem, Decays) or problem.thinned is None:
         return ready.records
     thinned = problem.thinned
     parts = zip(ready.records, problem.responses, problem.forces, thinned.first_s, strict=True)
     return tuple(
-        replace(record, response=response, force_n=force, period_s=thinned.period_s, start_s=record.start_s + first_s)
-        for record, response, force, first_s in parts
+        replace(each, response=response, force_n=force, period_s=thinned.period_s, start_s=each.start_s + first_s)
+        for each, response, force, first_s in parts
     )
 
 
-def _thinned_note(ready: Prepared, problem: Taps | Decays, band_hz: tuple[float, float] | None) -> list[str]:
+def _thinned_note(ready: Prepared, problem: FitProblem, band_hz: tuple[float, float] | None) -> list[str]:
     thinned = problem.thinned if isinstance(problem, Taps) else None
     if thinned is None:
         return []
@@ -527,12 +504,8 @@ def _thinned_note(ready: Prepared, problem: Taps | Decays, band_hz: tuple[float,
     ]
 
 
-def _aliased(ready: Prepared, problem: Taps | Decays) -> Callable[[float], float]:
-    """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate.
-
-    Its height at half the rate, beyond noise, tells how much: a half sine falls with the square of the frequency, so
-    that two thirds of it fold down from both sides of the rate. A straight force without noise is no recording.
-    """
+def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
+    """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate."""
     if isinstance(problem, Decays):
         return lambda _hz: 0.0
     is_simulated = problem.force_noise_n == 0.0 and problem.hold != "band_limited"
@@ -545,6 +518,7 @@ def _aliased(ready: Prepared, problem: Taps | Decays) -> Callable[[float], float
     share = np.fft.rfftfreq(_SPECTRUM)
     highest = float(np.sqrt(np.mean(spectrum[share > HIGHEST_SHARE] ** 2)))
     noise = (ready.usable[0].force_noise_n or 0.0) * np.sqrt(len(pulse))
+    # A half sine falls with the square of the frequency: two thirds of it fold down from both sides of the rate.
     folded = _FOLDED * np.sqrt(max(highest**2 - 2.0 * noise**2, 0.0))
 
     def at(frequency_hz: float) -> float:
@@ -554,7 +528,7 @@ def _aliased(ready: Prepared, problem: Taps | Decays) -> Callable[[float], float
     return at
 
 
-def _alone(problem: Taps | Decays, fit: Fit) -> list[Fit]:
+def _alone(problem: FitProblem, fit: Fit) -> list[Fit]:
     """The same modes fitted to each record by itself; none if there is but one, or a record does not hold them."""
     if len(problem.responses) < 2:
         return []
@@ -564,7 +538,7 @@ def _alone(problem: Taps | Decays, fit: Fit) -> list[Fit]:
         return []
 
 
-def _mass_check(problem: Taps | Decays, fit: Fit) -> MassCheck | None:
+def _mass_check(problem: FitProblem, fit: Fit) -> MassCheck | None:
     """The equivalent mass by paper 003's way, from the first tap, where the model has one mode."""
     if isinstance(problem, Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
         return None

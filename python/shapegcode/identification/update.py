@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -114,13 +115,10 @@ def update_modes(
     rigid: str = "",
     file: str = "<text>",
 ) -> MachineUpdate:
-    """The text of a machine file with the modes of one axis replaced by identified ones.
+    """The text of a machine file with the modes of one axis replaced by identified ones; twice gives the same text.
 
-    A mode whose frequency is within 10 % of one in the file takes its table: values and uncertainties change where
-    they stand, participation, `frequency_over` and every comment line stay, and so does an uncertainty of the
-    frequency that somebody stated wider than it was measured. A mode of the file that the test shows, but does not
-    support, stays as it is. Other tables of the axis' modes go, other modes get a table of their own, whose
-    participation is its share of the residues. Putting the same modes in twice gives the same text.
+    A mode within 10 % of one in the file takes its table, in which everything that was not measured stays, as does a
+    mode that the test shows, but does not support. Other tables of the axis' modes go, other modes get their own.
     """
     if axis not in ("x", "y", "z"):
         raise ArgumentError(f"axis {axis!r}: must be x, y or z")
@@ -203,13 +201,8 @@ _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
 _SUM_SLACK = 1e-3  # of the participations: rounding
 _KEYS = (
-    "frequency_hz",
-    "damping_ratio",
-    "frequency_uncertainty_percent",
-    "damping_uncertainty_percent",
-    "mass_kg",
-    "mass_uncertainty_percent",
-    "source",
+    *("frequency_hz", "damping_ratio", "frequency_uncertainty_percent", "damping_uncertainty_percent"),
+    *("mass_kg", "mass_uncertainty_percent", "source"),
 )
 
 
@@ -230,13 +223,10 @@ class ModeTables:
         self.name = f"axes.{self.axis}.modes"
         self.old: list[dict[str, Any]] = list(self.data["axes"][self.axis].get("modes", []))
         self.expected: list[dict[str, Any]] = []
-        self._said: dict[int, dict[str, str]] = {}
-        """Of a table, by its identity: where the values that were put into it come from."""
+        self._said: dict[int, dict[str, str]] = {}  # by identity of a table: origins of values that were put into it
         self.home = self._axis_table()
-        self.tables: list[Table] = next(
-            (item.body for key, item in self.home.value.body if isinstance(item, AoT) and _is_modes(key, item)),
-            [],
-        )
+        held = (item.body for key, item in self.home.value.body if isinstance(item, AoT) and _is_modes(key, item))
+        self.tables: list[Table] = next(held, [])
         self._before = list(self.tables)
         if len(self.tables) != len(self.old):
             raise ArgumentError(
@@ -276,9 +266,7 @@ class ModeTables:
             self.notes.append("it was said to be rigid: that is taken back")
         if said or (said is False and self._remarks.get(f"axes.{self.axis}.rigid", "").startswith("assumed")):
             self._say_rigid(False, "a mode was measured")
-        text = self.document.as_string()
-        self._check(text)
-        return self._with_origins(text, [*stay, *added])
+        return self._finished([*stay, *added])
 
     def make_rigid(self) -> str:
         """The text without modes of the axis, which is said to be rigid."""
@@ -287,12 +275,12 @@ class ModeTables:
         place = next((n for n, (key, item) in enumerate(entries) if _is_modes(key, item)), len(entries))
         entries[place : place + 1] = [(None, item) for _, item in left]
         self._say_rigid(True, "decided: no mode of it counts")
-        text = self.document.as_string()
-        self._check(text, rigid=True)
-        return self._with_origins(text, [])
+        return self._finished([], rigid=True)
 
-    def _with_origins(self, text: str, tables: Sequence[Table]) -> str:
-        """The new text with the origins of the modes where they are now."""
+    def _finished(self, tables: Sequence[Table], *, rigid: bool = False) -> str:
+        """The new text, checked, with the origins of the modes where they are now."""
+        text = self.document.as_string()
+        self._check(text, rigid)
         found = {key: remark for key, remark in self._remarks.items() if not key.startswith(self.name)}
         before = {id(table): number for number, table in enumerate(self._before, start=1)}
         for number, table in enumerate(tables, start=1):
@@ -329,12 +317,12 @@ class ModeTables:
                 left += tail[len(blank) :]
                 self._gap = blank if number == 0 else self._gap
                 continue
-            table.trivia.indent = _text(left) + table.trivia.indent
+            table.trivia.indent = "".join(item.as_string() for _, item in left) + table.trivia.indent
             left = []
             stay.append(table)
         return stay, left
 
-    def _check(self, text: str, *, rigid: bool = False) -> None:
+    def _check(self, text: str, rigid: bool) -> None:
         """The new text must say what is meant, and nothing else may have changed."""
         wanted = copy.deepcopy(self.data)
         axis = wanted["axes"][self.axis]
@@ -344,8 +332,8 @@ class ModeTables:
         try:
             found = tomllib.loads(text)
             found["axes"][self.axis].setdefault("modes", [])
-            found["axes"][self.axis]["modes"].sort(key=_frequency)
-            wanted["axes"][self.axis]["modes"].sort(key=_frequency)
+            for each in (found, wanted):
+                each["axes"][self.axis]["modes"].sort(key=itemgetter("frequency_hz"))
         except (tomllib.TOMLDecodeError, KeyError, AttributeError):
             found = {}
         if found != wanted:
@@ -421,7 +409,7 @@ class ModeTables:
         others = ", ".join(
             f"{letter} {each.low:.3g} ... {each.high:.3g}" for letter, each in told.items() if letter != self.axis
         )
-        return {"moves": ({letter: float(f"{each.value:.4g}") for letter, each in told.items()}, f"95 %: {others}")}
+        return {"moves": ({letter: _rounded(each.value, 4) for letter, each in told.items()}, f"95 %: {others}")}
 
     def _table(self, mode: IdentifiedMode, share: float, meaning: str) -> Table:
         """A new table."""
@@ -481,13 +469,8 @@ def _is_modes(key: Key | None, item: object) -> bool:
     return key is not None and key.key == "modes" and isinstance(item, AoT)
 
 
-def _text(entries: Sequence[Entry]) -> str:
-    """Comments and blank lines as they stand in the file."""
-    return "".join(item.as_string() for _, item in entries)
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+def _rounded(value: float, digits: int = _DIGITS) -> float:
+    return float(f"{value:.{digits}g}")
 
 
 def _rounded_up(value: float) -> float:
@@ -503,10 +486,6 @@ def _line(key: str, value: object, remark: str) -> str:
     return f"{key} = {toml(value)}" + (f"  # {remark}" if remark else "")
 
 
-def _frequency(mode: dict[str, Any]) -> float:
-    return float(mode["frequency_hz"])
-
-
 SAME_MODE = 0.1  # Two frequencies, relative to the old one, within which a mode is taken as the one that the file has
 
 _NO_PAIR = 1e3
@@ -517,13 +496,9 @@ def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
     """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes."""
     masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
     if len(masses) < len(modes):
-        return [_share(1.0 / len(modes))] * len(modes), "equal shares"
+        return [_rounded(1.0 / len(modes), _SHARE_DIGITS)] * len(modes), "equal shares"
     total = sum(1.0 / mass for mass in masses)
-    return [_share(1.0 / mass / total) for mass in masses], "share of the residues 1/m"
-
-
-def _share(value: float) -> float:
-    return float(f"{value:.{_SHARE_DIGITS}g}")
+    return [_rounded(1.0 / mass / total, _SHARE_DIGITS) for mass in masses], "share of the residues 1/m"
 
 
 def matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:

@@ -149,11 +149,7 @@ def _steady_lag(trace: ServoTrace, use: Masks, period_s: float) -> float:
 def lag_estimates(
     fit: LoopFit, halves: Sequence[LoopFit], trace: ServoTrace, use: Masks, period_s: float
 ) -> tuple[ServoEstimate, ...]:
-    """Parameters of a servo lag behind a dead time, with 95 % intervals.
-
-    The interval is that of least squares with as many independent samples as the autocorrelation of what is left
-    allows, and never narrower than what the fits to the halves differ by.
-    """
+    """Parameters of a servo lag behind a dead time, with 95 % intervals no narrower than what the halves differ by."""
 
     def model(values: FloatArray) -> FloatArray:
         late = values[0] / period_s
@@ -185,22 +181,19 @@ def lag_estimates(
     gains = half([0.0, 1.0, 0.0, 0.0], [each.gain_per_s for each in halves])
     forward = half([0.0, 0.0, 1.0, 0.0], [each.rest for each in halves])
     ends = max(0.0, 1.0 - rest - forward), min(1.0, 1.0 - rest + forward)
-    lags = (
-        ServoEstimate("lag at constant speed", fit.lag_s, fit.lag_s - lag, fit.lag_s + lag, "s"),
-        ServoEstimate("dead time", fit.dead_s, max(0.0, fit.dead_s - dead), fit.dead_s + dead, "s"),
+    why = "the feed-forward leaves no lag that tells it"
+    loop = (
+        ServoEstimate("position gain", None, None, None, "1/s", why),
+        ServoEstimate("feed-forward", None, *ends, "1", why),
     )
     if gains < 0.5 * gain and forward < rest:
         why = "of a first-order loop that lags alike; the control's setting may be another"
-        return (
-            *lags,
-            ServoEstimate("position gain", gain, gain - gains, gain + gains, "1/s", why),
-            ServoEstimate("feed-forward", 1.0 - rest, *ends, "1"),
-        )
-    why = "the feed-forward leaves no lag that tells it"
+        gain_estimate = ServoEstimate("position gain", gain, gain - gains, gain + gains, "1/s", why)
+        loop = gain_estimate, ServoEstimate("feed-forward", 1.0 - rest, *ends, "1")
     return (
-        *lags,
-        ServoEstimate("position gain", None, None, None, "1/s", why),
-        ServoEstimate("feed-forward", None, *ends, "1", why),
+        ServoEstimate("lag at constant speed", fit.lag_s, fit.lag_s - lag, fit.lag_s + lag, "s"),
+        ServoEstimate("dead time", fit.dead_s, max(0.0, fit.dead_s - dead), fit.dead_s + dead, "s"),
+        *loop,
     )
 
 
@@ -310,10 +303,7 @@ def range_of_three(name: str, values: Sequence[float], unit: str) -> ServoEstima
 def torque_friction(
     trace: ServoTrace, lag_s: float, uses: Sequence[Masks], period_s: float
 ) -> tuple[ServoEstimate, ...]:
-    """Friction over mass from the torque, which the models of the position loop do not see.
-
-    The torque is T_c sign(v) + J a + T_v v + T_0, of the command as late as the axis lags; what is told is T_c/J.
-    """
+    """Friction over mass, T_c/J, from the torque: T_c sign(v) + J a + T_v v + T_0 of the command, late by the lag."""
     if trace.torque is None:
         return ()
     torque = trace.torque
