@@ -166,10 +166,8 @@ def _waits(facts: LogFacts, stops: dict[str, _Interval], rapids: dict[str, list[
 def _runs(facts: LogFacts, run: list[PartLog], blocks: list[PartLog]) -> None:
     """Ceil or carry from the mean time of long blocks; the block time from short ones."""
     settle = (facts.cutting or 0.1) * (4.5 if facts.exponential else 1.1)
-    end = None
-    if run:
-        end = _block_end(facts, run[0], settle)
-    else:
+    end = _block_end(facts, run[0], settle) if run else None
+    if not run:
         facts.add_unknown("block end", "needs log_run", "")
     if blocks:
         _block_time(facts, blocks[0], settle, end)
@@ -185,15 +183,14 @@ def _block_end(facts: LogFacts, run: PartLog, settle: float) -> str | None:
     note = f"blocks of {nominal * 1e3:.2f} ms last {lasts * 1e3:.2f} ms"
     full = whole_periods(nominal, facts.period) - nominal if facts.period else None
     slack = lasts * half / speed + 1e-5
-    end = None
     if lasts - nominal > 3.0 * slack and (full is None or abs(lasts - nominal - full) < 0.3 * full + slack):
         end = "ceil"
     elif full is not None and abs(lasts - nominal) < 0.3 * full and slack < 0.3 * full:
         end = "carry"
-    if end:
-        facts.add_word("block end", end, "controller.block_end", note)
     else:
         facts.add_unknown("block end", note + ": neither fits, or the period is not known", "")
+        return None
+    facts.add_word("block end", end, "controller.block_end", note)
     return end
 
 
@@ -221,10 +218,10 @@ def _block_time(facts: LogFacts, blocks: PartLog, settle: float, end: str | None
 
 def _feed_steps(facts: LogFacts, parts: list[PartLog]) -> None:
     """The shortest distance over which the speed follows a step of the feed between F and F/2 by 90 %."""
-    name = f"feed-control interval at F{parts[0].part.feed_mm_per_min:g}" if parts else "feed-control interval"
     if not parts:
-        facts.add_unknown(name, "needs log_feed_steps", "mm")
+        facts.add_unknown("feed-control interval", "needs log_feed_steps", "mm")
         return
+    name = f"feed-control interval at F{parts[0].part.feed_mm_per_min:g}"
     depths = {abs(log.part.length_mm): depth for log in parts if (depth := _followed_share(log)) is not None}
     followed = [d for d in depths if all(depths[e] >= _FOLLOWED for e in depths if e >= d)]
     shown = ", ".join(f"{d:g} mm {max(0.0, min(1.0, depths[d])) * 100:.0f} %" for d in sorted(depths))
@@ -308,12 +305,9 @@ def fit_cutting(facts: LogFacts, stops: list[PartLog]) -> None:
     if best == "linear" and rms["bell"] ** 2 < _BELL_GAIN * rms["linear"] ** 2 and min(bell) > facts.fine_s:
         best = "bell"
     if rms[best] > _ODD_SHAPE * abs(stops[0].part.length_mm) + 3.0 * stops[0].noise_mm:
-        why = (
-            f"no moving average and no exponential: the best fit ({best}) leaves {rms[best] * 1e3:.1f} µm; "
-            "was a look-ahead mode on?"
-        )
+        why = f"no moving average and no exponential: the best fit ({best}) leaves {rms[best] * 1e3:.1f} µm; "
         for name in names:
-            facts.add_unknown(name, why)
+            facts.add_unknown(name, f"{why}was a look-ahead mode on?")
         return
     # Of each fit the longest time first.
     times = [
@@ -428,10 +422,7 @@ def fit_rapids(facts: LogFacts, axis: str, parts: list[PartLog]) -> list[tuple[f
 
 
 def _short_ramp(facts: LogFacts, fits: list[_Rapid]) -> tuple[float, float]:
-    """Between which time constants rapids lie that do not reach the rate.
-
-    Half of such a rapid lasts ceil(sqrt(nominal * A) / T) T (eq. 16 of paper 004, docs/evidence/references.md).
-    """
+    """Between which time constants rapids lie that do not reach the rate: eq. 16 of paper 004, for half of a rapid."""
     period = facts.tick
     halves = [(whole_periods(fit.ramp[0] - 0.3 * period, period), fit) for fit in fits]
     sure = [(half, fit) for half, fit in halves if abs(half - fit.ramp[0]) + fit.ramp[1] < 0.3 * period]
