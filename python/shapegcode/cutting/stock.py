@@ -154,10 +154,7 @@ class Stock(TomlTable):
     @property
     def kind(self) -> Literal["box", "polygon", "allowance", "program"]:
         """Which of the four tables the file has."""
-        for name in ("box", "polygon", "allowance"):
-            if getattr(self, name) is not None:
-                return name
-        return "program"
+        return next(name for name in ("box", "polygon", "allowance", "program") if getattr(self, name) is not None)
 
     def beside(self, name: str) -> Path:
         """The path of a file that this one names.
