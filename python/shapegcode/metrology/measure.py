@@ -130,6 +130,8 @@ def measure(
                 ],
             )
         )
+    names = [Path(program.source).name for program in several]
+    second = several[1] if len(several) > 1 else None
     return Measurement(
         machine=machine.name,
         plant=plant,
@@ -140,23 +142,13 @@ def measure(
         roughness_lambda_s_mm=lambda_s_mm,
         contour_tolerance_um=limit_um,
         programs=tuple(measured),
-        simulated=_simulated(several, machine, plant),
+        simulated=SimulatedPrograms(several[0], machine, second, labels=(names[0], names[-1]), plant=plant),
     )
 
 
-def _simulated(programs: Sequence[Program], machine: Machine, plant: str) -> SimulatedPrograms:
-    """The first two programs, under the names of their files."""
-    names = [Path(program.source).name for program in programs]
-    second = programs[1] if len(programs) > 1 else None
-    return SimulatedPrograms(programs[0], machine, second, labels=(names[0], names[-1]), plant=plant)
-
-
 def _judged(programs: Sequence[tuple[str, bool, str]]) -> list[bool]:
-    """Which programs are held against the tolerance; each: its name, whether it is shaped, against what it is measured.
-
-    Shaped programs beside the programmed path; what they are compared with only stands beside them. Without such a
-    program the others. A shaped program's own path is not the programmed one: it is not judged against that.
-    """
+    """Which programs are held against the tolerance; each: name, whether it is shaped, against what it is measured."""
+    # Shaped ones beside the programmed path, if there are any; the own path of a shaped one is not the programmed one.
     beside = [shaped and against != name for name, shaped, against in programs]
     return beside if any(beside) else [not shaped for _, shaped, _ in programs]
 
@@ -270,12 +262,10 @@ def _measured(
     for command, response in chunks:
         metrology.feed(command, response)
     walls = [_wall(metrology, index) if keep_walls else None for index in range(len(sections))]
-    figures = metrology.finish()
-    found = (
-        MeasuredSection.of(each, region, 2.0 * options.tool_radius_mm, wall)
-        for each, wall in zip(figures.sections, walls, strict=True)
-    )
-    return MeasuredRegion(lines, path, figures, tuple(found), metrology.station_spacing_mm)
+    figures, diameter_mm = metrology.finish(), 2.0 * options.tool_radius_mm
+    both = zip(figures.sections, walls, strict=True)
+    found = tuple(MeasuredSection.of(each, region, diameter_mm, wall) for each, wall in both)
+    return MeasuredRegion(lines, path, figures, found, metrology.station_spacing_mm)
 
 
 def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
@@ -306,9 +296,7 @@ class Job:
     nominal: _core.Region
     path: _core.Path
     sections: list[_core.PathSection]
-    joined_mm: float = (
-        0.0  # runs shorter than this are one curve, because there were too many of them; 0: as everywhere
-    )
+    joined_mm: float = 0.0  # runs shorter than this are one curve, as there were too many; 0: as everywhere
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
@@ -334,17 +322,11 @@ def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequenc
 
 
 def _joined(pairs: Sequence[tuple[_core.Region, _core.Region]], machine: Machine, *, own_blocks: bool) -> float:
-    """How many times longer than elsewhere runs must be to stand alone, so that a program has a number of sections
-    that somebody may look at; a region has one at least."""
-    most = max(_MAX_SECTIONS, len(pairs))
+    """How many times longer than elsewhere runs must be to stand alone, so that somebody may look at all sections."""
+    most = max(_MAX_SECTIONS, len(pairs))  # a region has one at least
+    shortest = [(region.path, _short_mm(region.path, machine, own_blocks=own_blocks)) for _, region in pairs]
     factor = 1.0
-    while factor < _MAX_FACTOR:
-        count = sum(
-            len(_core.path_sections(region.path, factor * _short_mm(region.path, machine, own_blocks=own_blocks)))
-            for _, region in pairs
-        )
-        if count <= most:
-            break
+    while factor < _MAX_FACTOR and sum(len(_core.path_sections(path, factor * mm)) for path, mm in shortest) > most:
         factor *= 2.0
     return factor
 
