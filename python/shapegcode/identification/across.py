@@ -17,6 +17,7 @@ from scipy import stats
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import Prepared, is_clipped, prepare
+from shapegcode.identification.decay import part_of
 from shapegcode.identification.frf_model import mode_columns
 from shapegcode.identification.frf_search import cut
 from shapegcode.identification.lines import measured_lines
@@ -208,9 +209,7 @@ def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Rec
     begin = round((use.start_s - first.start_s) / first.period_s)
     if abs(first.period_s / use.period_s - 1.0) > 1e-6 or begin < 0 or begin + len(use.response) > len(first.response):
         raise RecordError(f"{first.source}: was not recorded together with {use.source}")
-    inside = slice(begin, begin + len(use.response))
-    force_n = None if first.force_n is None else first.force_n[inside]
-    beside = replace(first, response=first.response[inside], force_n=force_n)
+    beside = part_of(first, begin, begin + len(use.response))
     if not np.ptp(beside.response) > 0.0:
         raise RecordError(
             f"{beside.source}: every sample of the response is {beside.response[0]:g}: is the sensor connected?"
@@ -319,13 +318,13 @@ def _local(at: FloatArray, power: FloatArray, poles: _Poles) -> FloatArray:
 def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int) -> tuple[complex, Estimate]:
     """A mode's amplitude along another axis over that along its own, and its real part with the 95 % interval."""
     if len(own) == len(other):  # hit by hit: what changes from hit to hit changes along both
-        pairs = [
-            (a.value[index], a.variance[index], b.value[index], b.variance[index])
-            for a, b in zip(own, other, strict=True)
-        ]
+        one, one_variance, two, two_variance = (*_of_mode(own, index), *_of_mode(other, index))
     else:
-        pairs = [(*_mean(own, index), *_mean(other, index))]
-    one, one_variance, two, two_variance = (np.array(column) for column in zip(*pairs, strict=True))
+        sides = (_of_mode(parts, index) for parts in (own, other))
+        means = [
+            (value.mean(keepdims=True), variance.sum(keepdims=True) / len(value) ** 2) for value, variance in sides
+        ]
+        (one, one_variance), (two, two_variance) = means
     weight = np.abs(one) ** 2
     ratio = complex(np.sum(np.conj(one) * two) / np.sum(weight))
     variance = float(np.sum(weight * (two_variance + abs(ratio) ** 2 * one_variance)) / np.sum(weight) ** 2)
@@ -336,7 +335,5 @@ def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int)
     return ratio, Estimate(ratio.real, ratio.real - half, ratio.real + half)
 
 
-def _mean(parts: Sequence[_Amplitudes], index: int) -> tuple[complex, float]:
-    values = np.array([part.value[index] for part in parts])
-    variances = np.array([part.variance[index] for part in parts])
-    return complex(np.mean(values)), float(np.sum(variances)) / len(parts) ** 2
+def _of_mode(parts: Sequence[_Amplitudes], index: int) -> tuple[ComplexArray, FloatArray]:
+    return np.array([part.value[index] for part in parts]), np.array([part.variance[index] for part in parts])

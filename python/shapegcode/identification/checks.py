@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.decay import find_decay
+from shapegcode.identification.decay import find_decay, part_of
 from shapegcode.identification.spectra import decay_spectrum
 from shapegcode.io.record import UNITS, FloatArray, Quantity, Record
 
@@ -434,11 +434,6 @@ class Hit:
     second_s: float = 0.0  # how long after this one it comes
 
 
-def robust_sigma(values: FloatArray) -> float:
-    """Standard deviation of the noise of a signal that is quiet most of the time."""
-    return _MAD * float(np.median(np.abs(values - np.median(values))))
-
-
 def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
     """Every pulse of a force without offset whose largest value is positive."""
     peak = float(np.max(force))
@@ -478,7 +473,8 @@ def find_hits(record: Record) -> list[Hit]:
     hits: list[Hit] = []
     largest = float(np.max(sign * force))
     noise = 0.0
-    for pulse in _pulses(sign * force, robust_sigma(force)):
+    sigma = _MAD * float(np.median(np.abs(force - np.median(force))))  # quiet most of the time
+    for pulse in _pulses(sign * force, sigma):
         if not hits and pulse.first > 1:
             noise = float(np.std(record.response[: pulse.first - 1]))
         if hits:
@@ -499,18 +495,9 @@ def split_hits(record: Record) -> list[Record]:
     hits = find_hits(record)
     if len(hits) < 2:
         return [record]
-    assert record.force_n is not None
     gaps = np.diff([hit.first for hit in hits])
     lead = int(_LEAD_SHARE * float(np.min(gaps)))
     starts = [max(0, hit.first - lead) for hit in hits]
     ends = [*starts[1:], len(record.response)]
-    return [
-        replace(
-            record,
-            source=f"{record.source} hit {number}",
-            response=record.response[start:end],
-            force_n=record.force_n[start:end],
-            start_s=record.start_s + start * record.period_s,
-        )
-        for number, (start, end) in enumerate(zip(starts, ends, strict=True), start=1)
-    ]
+    ranges = enumerate(zip(starts, ends, strict=True), start=1)
+    return [part_of(record, start, end, f" hit {number}") for number, (start, end) in ranges]

@@ -141,6 +141,13 @@ def _refuse_still(record: Record) -> None:
         )
 
 
+def part_of(record: Record, begin: int, end: int, name: str = "") -> Record:
+    """Some samples of a record as one of their own."""
+    force_n = None if record.force_n is None else record.force_n[begin:end]
+    at_s, response = record.start_s + begin * record.period_s, record.response[begin:end]
+    return replace(record, source=f"{record.source}{name}", response=response, force_n=force_n, start_s=at_s)
+
+
 def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
     """One record for each stop of a run behind which the machine rests, those with least motion first, 20 at most."""
     _refuse_still(record)
@@ -160,13 +167,8 @@ def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
         return float(np.sum(slow[inside] ** 2) / np.sum(quiet[inside] ** 2))
 
     parts = sorted(sorted(parts, key=lambda part: -envelope[part[0]])[:_MOST_STOPS], key=moved)
-    times = ((begin, stop, record.start_s + begin * record.period_s) for begin, stop in parts)
-    return [
-        replace(
-            record, source=f"{record.source} stop at {at_s:.2f} s", response=record.response[begin:stop], start_s=at_s
-        )
-        for begin, stop, at_s in times
-    ]
+    times = (record.start_s + begin * record.period_s for begin, _ in parts)
+    return [part_of(record, *part, f" stop at {at_s:.2f} s") for part, at_s in zip(parts, times, strict=True)]
 
 
 def _overview(record: Record) -> tuple[FloatArray, float, float]:
@@ -203,4 +205,4 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
         start, end = _longest(envelope)
         start = _onset(quiet, scales, start, end)
         start = _rest_after_motion(quiet, scales.slowest, float(np.max(envelope[start:end])), start, end)
-    return replace(record, response=response[start:end], start_s=record.start_s + start * record.period_s)
+    return part_of(record, start, end)

@@ -15,6 +15,7 @@ from shapegcode.identification.checks import EXCITED, Prepared
 from shapegcode.identification.frf_model import Lines, ModalFit
 from shapegcode.identification.frf_search import (
     STABLE,
+    Pole,
     StablePole,
     Uncertainty,
     Window,
@@ -50,7 +51,6 @@ from shapegcode.identification.model_search import (
     lasting_share,
     mode_estimates,
 )
-from shapegcode.identification.plscf import Pole
 from shapegcode.identification.problem import MIN_SWINGS, Starts
 from shapegcode.identification.result import ChartPole, Identification, IdentifiedMode, by_support
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
@@ -287,7 +287,10 @@ def _in_responses(measured: _Measured, sought: Sought) -> FrfModes:
     models = _model(measured.parts, windows)
     parts = tuple(_weighed(lines, model) for lines, model in zip(measured.parts, models, strict=True))
     windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, modes_of(windows))
-    windows = [_with_correlation(window) for window in windows]
+    for rank, window in enumerate(windows):
+        correlation = neighbours_correlation(window.fit.left)
+        correlated = tuple(replace(lines, correlation=correlation) for lines in window.parts)
+        windows[rank] = replace(window, parts=correlated)
     return _tested(replace(measured, parts=parts), windows, pool, poles, sought)
 
 
@@ -335,11 +338,6 @@ def _weighed(lines: Lines, model: ComplexArray) -> Lines:
     )
     noise = min((even, high, 0.5 * (even + high)), key=lambda each: float(np.sum(np.log(each) + left / each)))
     return weighted(lines, noise)
-
-
-def _with_correlation(window: Window) -> Window:
-    correlation = neighbours_correlation(window.fit.left)
-    return replace(window, parts=tuple(replace(lines, correlation=correlation) for lines in window.parts))
 
 
 def _model(parts: Sequence[Lines], windows: Sequence[Window]) -> list[ComplexArray]:
@@ -450,7 +448,7 @@ def _logarithms(
     """ln of frequency (Hz), damping ratio, mass, viscous damping, stiffness, and half of their 95 % intervals."""
     fit = window.fit
     residue = abs(residues_of(fit)[0, index])
-    omega, zeta = float(fit.omega[index]), float(fit.zeta[index])
+    omega, zeta = starts_of(fit)[index]
     base = np.array([np.log(omega), np.log(zeta), np.log(max(residue, 1e-300))])
     scale = np.array([1.0, 1.0, 1.0 / max(residue, 1e-300)])
     covariance = _misfit(fit, window.parts, index) * known.each[0, index] * np.outer(scale, scale)

@@ -381,8 +381,12 @@ class _Clock:
         return self._recorded(rows[np.isin(rows ^ 1, rows) | (rows == alone)], 1)
 
     def _recorded(self, rows: npt.NDArray[np.intp], fewest: int) -> npt.NDArray[np.intp]:
-        """Those of the parts that the record holds until they rang down."""
-        inside = np.array([row for row in rows.tolist() if self._is_recorded(row)], dtype=np.intp)
+        """Those of the parts that the record holds from their begin until they rang down, or the next one begins."""
+        begins, ends = np.array(self.windows).T
+        until = np.minimum(ends, np.array(self.command.parts)[:, 1] + _RINGS_S)
+        first, last = (self.places_s + (each - self.middles) / (1.0 + self.rate) for each in (begins, until))
+        held = (first >= 0.0) & (last <= len(self.values) * self.record.period_s)
+        inside = np.intersect1d(rows, np.flatnonzero(held))
         if len(inside) < fewest:
             raise RecordError(
                 f"{self.record.source}: no two parts of {self.command.source} (1 and 2, 3 and 4, ...) are both in the "
@@ -390,14 +394,6 @@ class _Clock:
                 "such pair, a rise and fall of a sweep"
             )
         return inside
-
-    def _is_recorded(self, row: int) -> bool:
-        """Whether the record holds a part from its begin until it rang down, or the next one begins."""
-        begin, end = self.windows[row]
-        until = min(end, self.command.parts[row][1] + _RINGS_S)
-        place, middle, stretch = float(self.places_s[row]), float(self.middles[row]), 1.0 + self.rate
-        lasts_s = len(self.values) * self.record.period_s
-        return place + (begin - middle) / stretch >= 0.0 and place + (until - middle) / stretch <= lasts_s
 
     def _no_relation(self, found: str) -> str:
         axis = self.command.axis.upper()

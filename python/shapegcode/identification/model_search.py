@@ -196,28 +196,24 @@ class Doubts:
     limit_percent: float  # least certainty of damping ratio and stiffness
     band_hz: tuple[float, float]  # frequencies that were searched
     record_s: float  # length of the longest record
-    rival: Fit | None = None  # another model of nearly the same evidence
-    aliased: Callable[[float], float] = lambda _hz: 0.0  # see `estimates_of`
+    rival: Fit | None  # another model of nearly the same evidence
+    aliased: Callable[[float], float]  # share of the force at a frequency that may be folded down
+    white_share: float  # of the samples, how many are independent
+    least: tuple[float, float]  # half intervals of ln f and ln zeta that nothing falls below
 
 
-def estimates_of(
-    fit: Fit,
-    alone: Sequence[Fit],
-    others: Sequence[Fit] = (),
-    aliased: Callable[[float], float] = lambda _hz: 0.0,
-    white_share: float = 1.0,
-    least: tuple[float, float] = (0.0, 0.0),
-) -> list[IdentifiedMode]:
+def _estimates(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Doubts) -> list[IdentifiedMode]:
     """Values and 95 % intervals of each mode of a fit; one that moves against the push has that as its refusal."""
+    white_share = doubts.white_share
     freedom = max(white_share * fit.samples - fit.parameters, 1.0)
     quantile = float(stats.t.ppf(0.975, freedom)) / np.sqrt(white_share)
     rows = [_logarithms(fit, mode) for mode in range(len(fit.omega_rad_s))]
     found = []
     for mode, row in enumerate(rows):
         spread = _half_widths(row, quantile)
-        spread[:2] = np.hypot(spread[:2], least)
+        spread[:2] = np.hypot(spread[:2], doubts.least)
         if len(row.values) > 2:
-            spread[2:] = np.hypot(spread[2:], aliased(float(np.exp(row.values[0]))))
+            spread[2:] = np.hypot(spread[2:], doubts.aliased(float(np.exp(row.values[0]))))
         # What the force does between its samples is not known to the covariance.
         for other in others:
             apart = _logarithms(other, mode)
@@ -296,12 +292,12 @@ def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
     return larger if gain > by_chance else None
 
 
-def judged_modes(modes: Sequence[IdentifiedMode], doubts: Doubts) -> list[IdentifiedMode]:
+def judged_modes(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Doubts) -> list[IdentifiedMode]:
     """The modes by ascending frequency, each with its refusal if any, without drift and what lies outside the band."""
     low, high = doubts.band_hz
     found = [
         replace(mode, refusal=_refusal_of(mode, doubts))
-        for mode in modes
+        for mode in _estimates(fit, alone, others, doubts)
         if mode.damping_ratio.value <= _NO_VIBRATION and low <= mode.frequency_hz.value <= high
     ]
     return sorted(found, key=lambda mode: mode.frequency_hz.value)

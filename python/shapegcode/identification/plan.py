@@ -9,15 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.identification.checks import (
-    DOUBLE_HIT,
-    EXCITED_HALF_SINE,
-    FOLDING,
-    MIN_FORCE,
-    MIN_LEAD,
-    MIN_PERIODS,
-    MIN_PULSE,
-)
+from shapegcode.identification import checks
 from shapegcode.machine import Machine
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
@@ -133,9 +125,9 @@ def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisReco
     """How to record."""
     known = modes or tuple((frequency, _USUAL_DAMPING) for frequency in _USUAL_HZ)
     highest = max(_LOOK_LEAST_HZ, _LOOK_ABOVE * max(frequency for frequency, _ in known))
-    pulse = EXCITED_HALF_SINE / highest
+    pulse = checks.EXCITED_HALF_SINE / highest
     limit, tip = next((limit, name) for limit, name in _TIPS if highest <= limit)
-    shortest = EXCITED_HALF_SINE / (limit if math.isfinite(limit) else highest)
+    shortest = checks.EXCITED_HALF_SINE / (limit if math.isfinite(limit) else highest)
     rate = _round_up(_PULSE_SAMPLES / shortest)
     fallen = max(math.log(1.0 / _FALLEN_TO) / (2.0 * math.pi * f * (z or _USUAL_DAMPING)) for f, z in known)
     duration = _round_up(max(fallen, _PERIODS / min(f for f, _ in known)))
@@ -176,14 +168,14 @@ def _stop_distance_mm(machine: Machine | None, index: int) -> float:
 def _instructions(about: str, recordings: tuple[AxisRecording, ...], stops: tuple[RapidStop, ...]) -> str:
     """The text for the operator, in lines of 80 characters."""
     text = (resources.files("shapegcode") / "data" / "tap_plan.txt").read_text(encoding="utf-8").format(
-        highest=max(recordings, key=lambda how: how.highest_hz), pulse_samples=_PULSE_SAMPLES, min_pulse=MIN_PULSE,
-        taps=_TAPS, stop_count=2 * _STOPS, program=textwrap.indent(stops[0].program.rstrip("\n"), "    "),
+        highest=max(recordings, key=lambda how: how.highest_hz), pulse_samples=_PULSE_SAMPLES, taps=_TAPS,
+        checks=checks, stop_count=2 * _STOPS, program=textwrap.indent(stops[0].program.rstrip("\n"), "    "),
         others="\n".join(
             f"    {stop.axis}: the same with {stop.axis} and {stop.distance_mm:g} mm, O{7201 + index}"
             for index, stop in enumerate(stops[1:], start=1)
         ),
-        times=[row / recordings[0].samples_per_s for row in range(4)], double_hit=100 * DOUBLE_HIT,
-        folding=100 * FOLDING, min_force=MIN_FORCE, min_periods=MIN_PERIODS, min_lead=MIN_LEAD,
+        times=[row / recordings[0].samples_per_s for row in range(4)], double_hit=100 * checks.DOUBLE_HIT,
+        folding=100 * checks.FOLDING,
     )  # fmt: skip
     lines: list[str] = []
     for line in f"{about}\n\n{text}".splitlines():

@@ -21,19 +21,7 @@ from shapegcode.errors import ArgumentError, MachineError
 from shapegcode.identification.across import LEAST_MOVE, told_moves
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, MachineFile
 from shapegcode.machine import Machine, check_axes
-from shapegcode.settings.edit import (
-    Entry,
-    commented_key,
-    commented_table,
-    entry_of,
-    is_blank,
-    own_end,
-    parse_exactly,
-    take_tail,
-    with_origin_table,
-    with_remarks,
-    without_origins,
-)
+from shapegcode.settings import edit
 from shapegcode.settings.keys import toml
 from shapegcode.settings.load import read_text
 from shapegcode.settings.remarks import remarks_of
@@ -194,7 +182,7 @@ def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[
             notes.append(f"{parts[1].upper()}: kept, though not measured here ({said})")
         return marked
 
-    return with_remarks(text, remark), notes
+    return edit.with_remarks(text, remark), notes
 
 
 _MEASURED = "half of the 95 % interval"
@@ -212,14 +200,14 @@ class ModeTables:
     def __init__(self, text: str, axis: str, source: str, file: str) -> None:
         """Find them."""
         self._remarks = remarks_of(text)
-        text = without_origins(text)
+        text = edit.without_origins(text)
         self.newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
         self._last_end = "" if text.endswith("\n") else self.newline
-        self.document = parse_exactly(text + self._last_end, file)
+        self.document = edit.parse_exactly(text + self._last_end, file)
         self.data: dict[str, Any] = tomllib.loads(text)
         self.axis, self.source, self.file = axis, source, file
         self.notes: list[str] = []  # what was replaced, kept, removed and added, one sentence each
-        self._gap: list[Entry] = []  # the blank line behind the first table, if that went
+        self._gap: list[edit.Entry] = []  # the blank line behind the first table, if that went
         self.name = f"axes.{self.axis}.modes"
         self.old: list[dict[str, Any]] = list(self.data["axes"][self.axis].get("modes", []))
         self.expected: list[dict[str, Any]] = []
@@ -291,7 +279,7 @@ class ModeTables:
             gone = held - table.keys()
             said = {key: remark for key, remark in old.items() if key not in gone} | self._said.get(id(table), {})
             found |= {f"{self.name}.{number}.{key}": remark for key, remark in said.items() if remark}
-        return with_origin_table(text, found)
+        return edit.with_origin_table(text, found)
 
     def _say_rigid(self, rigid: bool, remark: str) -> None:
         self._remarks[f"axes.{self.axis}.rigid"] = remark
@@ -299,10 +287,10 @@ class ModeTables:
 
     def _old_tables(
         self, kept: Mapping[int, IdentifiedMode], seen: Mapping[int, IdentifiedMode], why: str = "which was not found"
-    ) -> tuple[list[Table], list[Entry]]:
+    ) -> tuple[list[Table], list[edit.Entry]]:
         """Change the tables of the file."""
         stay: list[Table] = []
-        left: list[Entry] = []
+        left: list[edit.Entry] = []
         for number, (table, old) in enumerate(zip(self.tables, self.old, strict=True)):
             if number in kept:
                 self._change(table, old, kept[number])
@@ -312,8 +300,8 @@ class ModeTables:
                 self.notes.append(f"kept {old_hz} Hz as it is: the test shows it at {new_hz:.6g} Hz, not well enough")
             else:
                 self.notes.append(f"removed {toml(old['frequency_hz'])} Hz, {why}: {toml(old)}")
-                tail = take_tail(table)
-                blank = tail[:1] if tail and is_blank(tail[0]) else []
+                tail = edit.take_tail(table)
+                blank = tail[:1] if tail and edit.is_blank(tail[0]) else []
                 left += tail[len(blank) :]
                 self._gap = blank if number == 0 else self._gap
                 continue
@@ -370,20 +358,20 @@ class ModeTables:
             + "; ".join(kept)
         )
 
-    def _put(self, entries: list[Entry], values: Mapping[str, tuple[Any, str]]) -> None:
+    def _put(self, entries: list[edit.Entry], values: Mapping[str, tuple[Any, str]]) -> None:
         """Values in place of those that a table has, or of its commented keys, else behind them."""
         below = next((n for n, (_, item) in enumerate(entries) if isinstance(item, Table)), len(entries))
-        places = {commented_key(entry): place for place, entry in enumerate(entries[:below])}
+        places = {edit.commented_key(entry): place for place, entry in enumerate(entries[:below])}
         places |= {key.key: place for place, (key, _) in enumerate(entries[:below]) if key is not None}
         added = []
         for key, (value, remark) in values.items():
-            entry = entry_of(_line(key, value, remark) + self.newline)
+            entry = edit.entry_of(_line(key, value, remark) + self.newline)
             if key in places:
                 entry[1].trivia.indent = entries[places[key]][1].trivia.indent
                 entries[places[key]] = entry
             else:
                 added.append(entry)
-        place = own_end(entries[:below])
+        place = edit.own_end(entries[:below])
         entries[place:place] = added
 
     def _values(self, mode: IdentifiedMode) -> dict[str, tuple[Any, str]]:
@@ -435,7 +423,7 @@ class ModeTables:
                 f"of one point sum to 1 when the axis moves; by the shares of the modes found they would be {shares}"
             )
 
-    def _insert(self, stay: list[Table], added: list[Table], left: list[Entry]) -> None:
+    def _insert(self, stay: list[Table], added: list[Table], left: list[edit.Entry]) -> None:
         """Put new tables behind the last one that stays, or where the first one was, or where the axis ends."""
         for table in added:
             table.trivia.indent = self.newline
@@ -443,7 +431,7 @@ class ModeTables:
             self._insert_first(added)
             return
         if stay:
-            behind = take_tail(stay[-1]) + left
+            behind = edit.take_tail(stay[-1]) + left
         else:
             added[0].trivia.indent = self.tables[0].trivia.indent.rstrip(" \t")
             behind = self._gap + left
@@ -455,13 +443,13 @@ class ModeTables:
         entries = self.home.value.body
         modes = (SingleKey("modes"), AoT(added, "modes", parsed=True))
         for place, entry in enumerate(entries):
-            if commented_table(entry) == self.name:
+            if edit.commented_table(entry) == self.name:
                 end = place + 1
-                while end < len(entries) and commented_key(entries[end]):
+                while end < len(entries) and edit.commented_key(entries[end]):
                     end += 1
                 entries[place:end] = [modes]
                 return
-        added[-1].value.body.extend(take_tail(self.home))
+        added[-1].value.body.extend(edit.take_tail(self.home))
         entries.append(modes)
 
 

@@ -125,8 +125,7 @@ def measure(
                     *machine_warnings(machine),
                     *region_range_warnings(program.regions, machine),
                     *(why for _, why in shaped_warnings(program, machine)),
-                    *_spacing_warnings(regions, station_spacing_mm),
-                    *_section_warnings(jobs),
+                    *_coarse_warnings(regions, station_spacing_mm, jobs),
                 ],
             )
         )
@@ -153,16 +152,13 @@ def _judged(programs: Sequence[tuple[str, bool, str]]) -> list[bool]:
     return beside if any(beside) else [not shaped for _, shaped, _ in programs]
 
 
-def _spacing_warnings(regions: Iterable[MeasuredRegion], asked_mm: float) -> Iterator[str]:
+def _coarse_warnings(regions: Iterable[MeasuredRegion], asked_mm: float, jobs: Iterable[Job]) -> Iterator[str]:
     for region in regions:
         if region.station_spacing_mm > asked_mm:
             yield (
                 f"lines {region.lines[0]} to {region.lines[1]}: so long a path that its walls are measured every "
                 f"{region.station_spacing_mm:.3g} mm, not every {asked_mm:g} mm"
             )
-
-
-def _section_warnings(jobs: Iterable[Job]) -> Iterator[str]:
     joined_mm = max((job.joined_mm for job in jobs), default=0.0)
     if joined_mm > 0.0:
         yield (

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
 from itertools import accumulate
 from pathlib import Path
 
@@ -411,29 +412,17 @@ class _Writer:
 
     def head(self) -> Iterator[str]:
         """Instructions, in lines that any control shows."""
-        cut, tool = self.cut, self.cut.tool
-        left, right = min(each.start_mm for each in cut.passes), max(each.end_mm for each in cut.passes)
-        edge = "REAR EDGE" if self.side < 0.0 else "FRONT EDGE"
-        rate = math.ceil(_SAMPLES_PER_TOOTH * tool.flutes * cut.spindle_rev_per_min / _PER_MINUTE / 10.0) * 10
+        cut = self.cut
+        ends = self.side * (-_RAW_MM - 3.0 * self.radius), self.side * self.walls[-1]
+        rate = math.ceil(_SAMPLES_PER_TOOTH * cut.tool.flutes * cut.spindle_rev_per_min / _PER_MINUTE / 10.0) * 10
+        text = (resources.files("shapegcode") / "data" / "testcut_head.txt").read_text(encoding="ascii")
         yield from _PURPOSES[cut.kind]
-        yield f"TESTCUT BY SHAPEGCODE FOR {_plain(cut.machine)}"
-        yield f"TOOL IN SPINDLE: D{tool.diameter_mm:g} MM, {tool.flutes} FLUTES,"
-        yield f"HELIX {tool.helix_deg:g} DEG, FLUTES OVER {cut.axial_depth_mm:g} MM LONG"
-        yield f"STOCK: X {self.design.stock_mm:g} MM LONG, {edge} FREE,"
-        yield f"AT LEAST {math.ceil(self.walls[-1] + 5.0)} MM WIDE BEYOND THE CLAMPS,"
-        yield f"FREE FROM TOP TO {math.ceil(cut.axial_depth_mm + 2.0)} MM BELOW"
-        yield "CLAMP IT ON THE DYNAMOMETER, EDGE ALONG X WITHIN 0.1 MM"
-        yield f"ZERO G54: X LEFT END, Y {edge}, Z TOP OF STOCK,"
-        yield "Z WITH THIS TOOL: NO LENGTH OFFSET IS CALLED"
-        far = self.side * (-_RAW_MM - 3.0 * self.radius), self.side * self.walls[-1]
-        yield f"TOOL AXIS: X{left:g} TO {right:g}, Y{min(far):.1f} TO {max(far):.1f},"
-        yield f"Z-{cut.axial_depth_mm:g} TO {_CLEAR_Z_MM:g}: KEEP IT FREE OF CLAMPS"
-        yield OVERRIDE.comment
-        yield "NO LOOK-AHEAD MODE THAT CHANGES F"
-        yield f"AT EACH M00: START A NEW RECORD, FX FY, {rate} HZ OR MORE,"
-        yield "FX ALONG +X, FY ALONG +Y, THEN CYCLE START;"
-        yield "STOP THE RECORD AT THE NEXT STOP. ONE FILE PER PASS"
-        yield "FIRST RUN: DRY, ABOVE THE STOCK"
+        yield from text.format(
+            cut=cut, machine=_plain(cut.machine), stock_mm=self.design.stock_mm, rate=rate, clear_z_mm=_CLEAR_Z_MM,
+            edge="REAR EDGE" if self.side < 0.0 else "FRONT EDGE", near=min(ends), far=max(ends),
+            wide=math.ceil(self.walls[-1] + 5.0), deep=math.ceil(cut.axial_depth_mm + 2.0), override=OVERRIDE.comment,
+            left=min(each.start_mm for each in cut.passes), right=max(each.end_mm for each in cut.passes),
+        ).splitlines()  # fmt: skip
         if isinstance(cut.about, CornerDetails) and cut.about.deeper_than_corner is not None:
             deeper = cut.about.deeper_than_corner
             yield f"X{deeper.from_mm:.2f} TO {deeper.to_mm:.2f}: UP TO {deeper.most_mm:.3f} MM DEEPER"

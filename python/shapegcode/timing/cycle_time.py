@@ -157,16 +157,9 @@ def _blocks(rows: npt.NDArray[Any], program: Program) -> Iterator[BlockTime]:
     for line, kind, start_s, duration_s, reached in zip(*columns, strict=True):
         queue = moves[line, kind == _RAPID] if kind in (_CUTTING, _RAPID) else None
         length, feed = queue.popleft() if queue else (0.0, 0.0)
-        yield BlockTime(
-            line,
-            _KINDS[kind],
-            start_s,
-            duration_s,
-            length,
-            feed * 60.0 if kind == _CUTTING else None,
-            length / duration_s * 60.0 if duration_s > 0.0 else 0.0,
-            reached * 60.0,
-        )
+        programmed = feed * 60.0 if kind == _CUTTING else None
+        mean = length / duration_s * 60.0 if duration_s > 0.0 else 0.0
+        yield BlockTime(line, _KINDS[kind], start_s, duration_s, length, programmed, mean, reached * 60.0)
 
 
 def _moves(program: Program) -> dict[tuple[int, bool], deque[tuple[float, float]]]:

@@ -170,16 +170,16 @@ def lag_estimates(
     inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-12) / np.outer(scale, scale)
     covariance = inverse * float(np.mean(left**2)) * _correlated_samples(left)
 
-    def half(gradient: Sequence[float], take: Sequence[float]) -> float:
-        slope = np.asarray(gradient)
+    def half(name: str, *gradient: float) -> float:
+        slope, take = np.array(gradient), [float(getattr(each, name)) for each in halves]
         formal = 1.96 * math.sqrt(max(float(slope @ covariance @ slope), 0.0))
         return max(formal, (max(take) - min(take)) / 2.0)
 
     gain, rest = fit.gain_per_s, fit.rest
-    lag = half([1.0, -rest / gain**2, 1.0 / gain, 0.0], [each.lag_s for each in halves])
-    dead = half([1.0, 0.0, 0.0, 0.0], [each.dead_s for each in halves])
-    gains = half([0.0, 1.0, 0.0, 0.0], [each.gain_per_s for each in halves])
-    forward = half([0.0, 0.0, 1.0, 0.0], [each.rest for each in halves])
+    lag = half("lag_s", 1.0, -rest / gain**2, 1.0 / gain, 0.0)
+    dead, gains, forward = (
+        half(name, *row) for name, row in zip(("dead_s", "gain_per_s", "rest"), np.eye(4), strict=False)
+    )
     ends = max(0.0, 1.0 - rest - forward), min(1.0, 1.0 - rest + forward)
     why = "the feed-forward leaves no lag that tells it"
     loop = (

@@ -16,6 +16,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.timing.calibration import open_times
 from shapegcode.timing.calibration.motion import (
     FAMILIES,
     FunctionFit,
@@ -39,15 +40,6 @@ from shapegcode.timing.calibration.observed import (
     rapid_rate,
     timed_program,
     with_override,
-)
-from shapegcode.timing.calibration.open_times import (
-    MIN_WEIGHT,
-    cut_scatter,
-    function_rows,
-    kind_weights,
-    motion_rows,
-    open_row,
-    run_scatter,
 )
 from shapegcode.timing.calibration.result import (
     TOLERANCE_PERCENT,
@@ -134,11 +126,11 @@ def learn_clock(
             best = index
     motion = fits[best]
     learned = _Learned.of(fitted, motion, machine)
-    weighted = zip(fits, kind_weights(order, best), strict=True)
+    weighted = zip(fits, open_times.kind_weights(order, best), strict=True)
     rivals = [
         (_Learned.of(fitted, fit, machine), weight)
         for fit, weight in weighted
-        if fit is not motion and weight >= MIN_WEIGHT
+        if fit is not motion and weight >= open_times.MIN_WEIGHT
     ]
     others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
     rows, warnings = _rows(observed, learned, others)
@@ -305,7 +297,7 @@ def _scatters(rows: Sequence[LearnedRun], observed: Sequence[ObservedRun], learn
             late[row.program].append((share.measured_s - share.predicted_s) / math.sqrt(max(1, len(run.cut_sections))))
     # The same codes come again and again: where they err together, whole programs show it.
     together = float(np.sqrt(np.mean([np.mean(each) ** 2 for each in late.values()]))) if late else 0.0
-    return max(learned.functions.scatter_s, together), run_scatter(ratios)
+    return max(learned.functions.scatter_s, together), open_times.run_scatter(ratios)
 
 
 def _with_interval(row: LearnedRun, run: ObservedRun, machine: Machine) -> LearnedRun:
@@ -464,15 +456,15 @@ def learned_machine(
     if not math.isfinite(motion.rapid_mm_per_s):
         not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
     values["times.scatter"] = {
-        "cuts_percent": round(100.0 * cut_scatter(runs, motion, machine), 3),
+        "cuts_percent": round(100.0 * open_times.cut_scatter(runs, motion, machine), 3),
         "between_cuts_s": round(scatters[0], 3),
         "runs_percent": round(100.0 * scatters[1], 3),
     }
-    rows = motion_rows(motion, covariance, runs, machine)
-    rows += function_rows(functions, partial(_function_values, runs=runs), lambda name: _meaning(name)[1])
+    rows = open_times.motion_rows(motion, covariance, runs, machine)
+    rows += open_times.function_rows(functions, partial(_function_values, runs=runs), lambda name: _meaning(name)[1])
     for other, weight in rivals:
         its_values = other.motion.file_values() | _function_values(other.functions, runs)
-        rows += open_row(f"kind of look-ahead ({other.motion.family.name})", values, its_values, weight)
+        rows += open_times.open_row(f"kind of look-ahead ({other.motion.family.name})", values, its_values, weight)
     values["times.open"] = rows
     for key in values:
         if key != "times.open":  # beside each value of its rows, once is enough: times.scatter says it
