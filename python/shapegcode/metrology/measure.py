@@ -109,26 +109,17 @@ def measure(
     limit_um = machine.tolerance.contour_um
     beside = [(each.source, ours, (against or each).source) for each, ours in zip(several, shaped, strict=True)]
     measured = []
-    for program, is_shaped, counts in zip(several, shaped, _judged(beside), strict=True):
-        nominal = against or program
-        jobs = jobs_of(program, nominal, machine, lines)
-        regions = list(_measured_regions(jobs, machine, plant, options, one_done))
-        measured.append(
-            MeasuredProgram.of(
-                regions,
-                program=program.source,
-                shaped=is_shaped,
-                measured_against=nominal.source,
-                limit_um=limit_um if counts else None,
-                warnings=[
-                    *program.warnings,
-                    *machine_warnings(machine),
-                    *region_range_warnings(program.regions, machine),
-                    *(why for _, why in shaped_warnings(program, machine)),
-                    *_coarse_warnings(regions, station_spacing_mm, jobs),
-                ],
-            )
+    for program, about, counts in zip(several, beside, _judged(beside), strict=True):
+        jobs = jobs_of(program, against or program, machine, lines)
+        regions = tuple(_measured_regions(jobs, machine, plant, options, one_done))
+        warnings = (
+            *program.warnings,
+            *machine_warnings(machine),
+            *region_range_warnings(program.regions, machine),
+            *(why for _, why in shaped_warnings(program, machine)),
+            *_coarse_warnings(regions, station_spacing_mm, jobs),
         )
+        measured.append(MeasuredProgram.of(about, regions, limit_um if counts else None, warnings))
     names = [Path(program.source).name for program in several]
     second = several[1] if len(several) > 1 else None
     return Measurement(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -275,32 +275,26 @@ class MeasuredProgram:
     @classmethod
     def of(
         cls,
-        regions: Iterable[MeasuredRegion],
-        *,
-        program: str,
-        shaped: bool,
-        measured_against: str,
+        about: tuple[str, bool, str],
+        regions: tuple[MeasuredRegion, ...],
         limit_um: float | None,
-        warnings: Iterable[str] = (),
+        warnings: tuple[str, ...],
     ) -> MeasuredProgram:
-        """The figures of its regions together."""
-        kept = tuple(regions)
-        figures = [region.figures for region in kept]
+        """The figures of its regions together; about: program, whether it is shaped, what it is measured against."""
+        figures = [region.figures for region in regions]
         contour = Tracks(
             SidedError.of([each.command for each in figures], [each.command_sides for each in figures]),
             SidedError.of([each.response for each in figures], [each.response_sides for each in figures]),
         )
         return cls(
-            program=program,
-            shaped=shaped,
-            measured_against=measured_against,
+            *about,
             ok=None if limit_um is None else contour.response.max <= limit_um,
             cutting_time_s=sum(each.duration_s for each in figures),
             contour_error_um=contour,
             residual_vibration_um=largest_xyz_um(each.rest.residual_mm for each in figures),
-            sections=tuple(section for region in kept for section in region.sections),
-            warnings=tuple(warnings),
-            regions=kept,
+            sections=tuple(section for region in regions for section in region.sections),
+            warnings=warnings,
+            regions=regions,
         )
 
     @property
