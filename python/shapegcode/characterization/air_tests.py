@@ -1,7 +1,6 @@
 """The tests: parts of equal moves in the air, those for a machine and a box, and how long they last.
 
-A test is one program. A part of it is a number of equal moves on one axis that go out and come back, so that every
-program ends where it began. The fit needs only these facts, which ``RESULTS.toml`` repeats.
+A test is one program. The fit needs only these facts, which ``RESULTS.toml`` repeats.
 """
 
 from __future__ import annotations

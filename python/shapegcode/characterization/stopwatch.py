@@ -1,9 +1,7 @@
-"""What stopwatch times of the test programs say about a controller.
+"""What stopwatch times of the test programs say about a controller; method: this project.
 
-Each time is one equation. For every usual interpolation period and both rules of the block's end the others are least
-squares; a period or rule counts as known only where the alternatives fit clearly worse. Rapids come after that, since a
-short rapid lasts whole periods of a square root: every time constant is tried, and what then is left is bell time and
-in-position time. Method: this project.
+Each time is one equation. For every usual period and both rules of the block's end the others are least squares; a
+period or rule counts as known only where the alternatives fit clearly worse. Rapids follow, for every time constant.
 """
 
 from __future__ import annotations

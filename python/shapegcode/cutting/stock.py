@@ -1,9 +1,4 @@
-"""The stock file: the material that is there before the first block of a program runs.
-
-A stock file is TOML and holds one of the tables ``[box]``, ``[polygon]``, ``[allowance]``, ``[program]``. Coordinates
-are those of the program: its work coordinate system. :class:`Stock` is the model of the file; `cutting.stock_shape`
-makes polygons of it.
-"""
+"""The stock file: the material that is there before the first block of a program runs, in the program's coordinates."""
 
 from __future__ import annotations
 

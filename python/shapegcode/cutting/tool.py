@@ -1,7 +1,4 @@
-"""The tool file: an end mill, the forces that it needs, the limits that it must keep and how its feed may be set.
-
-A tool file is TOML. :class:`Tool` is its model; it and its tables are the only place that holds defaults for it.
-"""
+"""The tool file: an end mill, the forces that it needs, the limits that it must keep and how its feed may be set."""
 
 from __future__ import annotations
 

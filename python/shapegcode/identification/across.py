@@ -1,8 +1,6 @@
 """What modes move across the axis along which they were found: their poles in the responses of the other axes.
 
-With the poles known everything else is linear. Over time the free part behind a hit or stop is a sum of decays; over
-frequency the lines around a mode are its residue and a smooth background. The ratio of the amplitudes along two axes is
-the mode's shape between them, whatever the force was.
+With the poles known the rest is linear; the ratio of the amplitudes along two axes is the mode's shape between them.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Modes from a control's own capture: commands and actual positions of an axis while it did its work.
 
-The position loop moves the point that its encoder measures, and what stands on it vibrates as with that point held. At
-such a frequency the structure takes the force that would have moved the encoder: actual over command has a dip there,
-and command over actual a peak. The drive between both is smooth beside a mode and takes up the rest.
+The position loop moves the encoder, and what stands on it vibrates as with that point held: actual over command has a
+dip there, command over actual a peak. The drive between both is smooth beside a mode.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """Modes from the record of any accelerometer beside a program whose command is known.
 
-The axis moves as commanded but for a smooth lag of its drive, and the sensor on what it carries shows the command's
-acceleration times 1 - sum of G s²/(s² + 2 zeta omega s + omega²). The logger runs on its own clock: where the program
-begins in the record and how much faster its clock runs is found from the record, part by part of the program. The clock
-is found within the parts: how long the control ramps and waits between them is not known, and is found too.
+But for a smooth lag of the drive the sensor shows the command's acceleration times 1 - sum of G s²/(s² + 2 zeta omega s
++ omega²). Start and clock of the logger, and the waits of the control, are found from the record, part by part.
 """
 
 from __future__ import annotations

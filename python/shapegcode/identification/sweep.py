@@ -1,9 +1,7 @@
 """Frequency and damping from a resonance sweep without force, as the firmware Klipper drives and records it.
 
-The machine shakes its own axis: pulses of acceleration whose amplitude grows with their frequency, which rises slowly.
-So the command's spectrum grows as f between the ends of the sweep, harmonics included, and what the sensor on the axis
-shows beyond that is the transmissibility 1 - sum of G s²/(s² + 2 zeta omega s + omega²). Only its magnitude is known:
-when the sweep began is not in the file.
+The command's spectrum grows as f between the ends of the sweep; what the sensor on the axis shows beyond that is the
+magnitude of the transmissibility 1 - sum of G s²/(s² + 2 zeta omega s + omega²).
 """
 
 from __future__ import annotations

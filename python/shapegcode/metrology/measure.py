@@ -1,8 +1,6 @@
 """Virtual metrology: what the response of the machine would measure on the part, section by section of the path.
 
-Programs are simulated as the controller would, and the response is measured against the programmed path: vibration,
-contour, radius, the walls that a round tool leaves, their roughness. The tool is a disc that removes what it sweeps:
-cutting forces, the tool's deflection and the marks of its teeth are not in it.
+The tool is a disc that removes what it sweeps: cutting forces, its deflection and the marks of its teeth are not in it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """A test cut: tool, cutting conditions and measuring passes, and the side file that keeps them for the fit.
 
-Every measuring pass goes along +X at a constant Y and leaves a straight wall. The material in front of it has an edge
-whose height above that wall is known over X, so the radial depth is known wherever the tool's axis is.
+A pass goes along +X at a constant Y; over X the height of the material's edge above the wall that it leaves is known.
 """
 
 from __future__ import annotations

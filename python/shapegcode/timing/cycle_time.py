@@ -1,8 +1,7 @@
 """How long a program takes on a machine, and where the time goes: in closed form, and by giving every set-point.
 
-The closed form costs one formula per block: of Lee, Ro, Song and Oh, 2022 (paper 004) for acceleration after
-interpolation, of the planner in look-ahead. The full interpolation simulates the same program sample by sample, and is
-the check of it.
+The closed form is of Lee, Ro, Song and Oh, 2022 (paper 004) for acceleration after interpolation, of the planner in
+look-ahead; the full interpolation is the check of it.
 """
 
 from __future__ import annotations

@@ -2,9 +2,7 @@
 
 Servo lag: the command r reaches the loop τ later; the loop is the core's `ServoLag`, x' = K (r − x) + f r'. So the lag
 at constant speed is τ + (1 − f)/K. A Sinumerik with speed feed-forward balances it by a dead time (MD32620 = 3, 4).
-
-Feed drive: a rigid axis of 1 kg stands for it. What it does depends on forces over mass alone, which is all that
-positions can tell. Masses, lead and stiffness of the screw do not follow from them.
+Feed drive: a rigid axis of 1 kg, since positions tell forces over mass alone.
 """
 
 from __future__ import annotations

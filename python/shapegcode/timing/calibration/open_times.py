@@ -1,9 +1,8 @@
 """What run logs leave open of a calibrated cycle-time model, in the form in which the machine file holds it.
 
-Each row is a step of one standard deviation in one direction, independent of the others: the time of a program changes
-by the root of the sum of squares of what the rows change it by. The directions are those of the symmetric root of the
-covariance, each of which is as near as possible to one parameter (Zuber and Strimmer, 2011, "CAR scores"): so the
-squares say how much each parameter contributes.
+Each row is a step of one standard deviation, independent of the others. The directions are those of the symmetric root
+of the covariance, each as near as possible to one parameter (Zuber and Strimmer, 2011, "CAR scores"): so the squares
+say how much each parameter contributes.
 """
 
 from __future__ import annotations
