@@ -75,7 +75,7 @@ class _Inner:
 def test_a_meaning_may_stand_at_its_field() -> None:
     found = schema(_Inner)["properties"]
     meanings = [found[name]["description"] for name in ("first_mm", "second")]
-    assert meanings == ["behind the field", "above the field, in two lines"]
+    assert meanings == ["behind the field.", "above the field, in two lines."]
 
 
 def test_numbers_are_written_as_a_person_would() -> None:

@@ -101,7 +101,7 @@ class Stock(TomlTable):
     )
     program: Rough | None = key("what a program that ran before has left", default=None)
 
-    # Where the file stands, so that names in it can be resolved; its name and text, for messages.
+    # Where the file stands, so that names in it can be resolved; its name and text, for messages
     _folder: Path = PrivateAttr(default=Path())
     _source: str = PrivateAttr(default="<text>")
     _text: str = PrivateAttr(default="")

@@ -18,15 +18,15 @@ from shapegcode.io.record import UNITS, FloatArray, Quantity, Record
 class RecordUse:
     """What became of one tap or decay."""
 
-    source: str  # file, and which hit or channel of it.
-    used: bool  # whether the modes come from it too.
-    reason: str = ""  # why it is not used; empty: it is.
-    samples: int | None = None  # that were recorded; null where it is not used, as for the others.
-    period_s: float | None = None  # time between two samples.
-    start_s: float | None = None  # time of the first sample in the file.
-    quantity: Quantity | None = None  # what the sensor measured.
-    excited_hz: float | None = None  # up to where the hit excites (-20 dB); null for a decay.
-    # distance of two lines of a frequency response without time record, whose lines are its samples.
+    source: str  # file, and which hit or channel of it
+    used: bool  # whether the modes come from it too
+    reason: str = ""  # why it is not used; empty: it is
+    samples: int | None = None  # that were recorded; null where it is not used, as for the others
+    period_s: float | None = None  # time between two samples
+    start_s: float | None = None  # time of the first sample in the file
+    quantity: Quantity | None = None  # what the sensor measured
+    excited_hz: float | None = None  # up to where the hit excites (-20 dB); null for a decay
+    # distance of two lines of a frequency response without time record, whose lines are its samples
     resolution_hz: float | None = None
 
     @property

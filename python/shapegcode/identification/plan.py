@@ -22,24 +22,24 @@ if TYPE_CHECKING:
 class AxisRecording:
     """How to record the modes of an axis."""
 
-    axis: str  # "X", "Y", "Z", or all of them.
-    modes_hz: tuple[float, ...]  # those known, ascending; empty: the usual range is taken.
-    highest_hz: float  # modes are looked for up to here.
-    samples_per_s: float  # sampling rate.
-    duration_s: float  # of one tap, from the trigger on.
-    pre_trigger_s: float  # before it.
-    pulse_s: float  # longest pulse of the force that still excites the highest frequency.
-    tip: str  # of the hammer.
+    axis: str  # "X", "Y", "Z", or all of them
+    modes_hz: tuple[float, ...]  # those known, ascending; empty: the usual range is taken
+    highest_hz: float  # modes are looked for up to here
+    samples_per_s: float  # sampling rate
+    duration_s: float  # of one tap, from the trigger on
+    pre_trigger_s: float  # before it
+    pulse_s: float  # longest pulse of the force that still excites the highest frequency
+    tip: str  # of the hammer
 
 
 @dataclass(frozen=True)
 class RapidStop:
     """How to let an axis decay without a hammer."""
 
-    axis: str  # "X", "Y" or "Z".
-    distance_mm: float  # of each rapid.
-    dwell_s: float  # rest after each, in which the decay is recorded.
-    program: str  # that does it, in FANUC's dialect.
+    axis: str  # "X", "Y" or "Z"
+    distance_mm: float  # of each rapid
+    dwell_s: float  # rest after each, in which the decay is recorded
+    program: str  # that does it, in FANUC's dialect
 
 
 @dataclass(frozen=True, repr=False, eq=False)

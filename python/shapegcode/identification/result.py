@@ -139,9 +139,9 @@ class ChartPole:
 class MassCheck:
     """The equivalent mass by the method of Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md)."""
 
-    closed_form_kg: float  # one simulation; the RMS of the response is proportional to 1/m.
-    bisection_kg: float  # the paper's search.
-    halvings: int  # of the search.
+    closed_form_kg: float  # one simulation; the RMS of the response is proportional to 1/m
+    bisection_kg: float  # the paper's search
+    halvings: int  # of the search
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,9 +163,9 @@ class Sweep:
 class MachineFile:
     """A machine file that took the modes."""
 
-    path: str  # as named.
-    axis: str  # "x", "y" or "z".
-    notes: tuple[str, ...]  # what was replaced, kept, removed and added, one sentence each.
+    path: str  # as named
+    axis: str  # "x", "y" or "z"
+    notes: tuple[str, ...]  # what was replaced, kept, removed and added, one sentence each
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)

@@ -23,8 +23,8 @@ T = TypeVar("T")
 class Sides(Generic[T]):
     """A figure of both sides of the travel."""
 
-    left: T  # of the left one.
-    right: T  # of the right one.
+    left: T  # of the left one
+    right: T  # of the right one
 
     def both(self) -> tuple[T, T]:
         """Left and right."""
@@ -35,12 +35,12 @@ class Sides(Generic[T]):
 class SidedError:
     """How far a track leaves the programmed path, in µm; a vertical deviation is above or below, not left or right."""
 
-    max: float  # distance, any side.
-    rms: float  # root mean square over the time in which the command moves.
-    left: float  # largest to the left of the travel.
-    right: float  # largest to the right of it.
-    above: float  # largest above it.
-    below: float  # largest below it.
+    max: float  # distance, any side
+    rms: float  # root mean square over the time in which the command moves
+    left: float  # largest to the left of the travel
+    right: float  # largest to the right of it
+    above: float  # largest above it
+    below: float  # largest below it
 
     @classmethod
     def of(cls, stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> SidedError:
@@ -55,12 +55,12 @@ class SidedError:
 class FittedCircle:
     """A circle through what was moved or cut on an arc."""
 
-    nominal_radius_mm: float  # as programmed; of a wall with the tool's radius.
-    fitted_radius_mm: float  # circle of least squares.
-    radius_deviation_um: float  # fitted less nominal.
-    mean_radius_deviation_um: float  # mean distance from the programmed centre less nominal.
-    centre_offset_um: tuple[float, float]  # of the fitted centre from the programmed one, in the plane of the arc.
-    form_error_um: float  # largest less smallest radial distance.
+    nominal_radius_mm: float  # as programmed; of a wall with the tool's radius
+    fitted_radius_mm: float  # circle of least squares
+    radius_deviation_um: float  # fitted less nominal
+    mean_radius_deviation_um: float  # mean distance from the programmed centre less nominal
+    centre_offset_um: tuple[float, float]  # of the fitted centre from the programmed one, in the plane of the arc
+    form_error_um: float  # largest less smallest radial distance
 
     @classmethod
     def of(cls, arc: _core.ArcFigures | None, nominal_mm: float, centre_mm: FloatArray) -> FittedCircle | None:
@@ -76,12 +76,12 @@ class FittedCircle:
 class MeasuredArc:
     """What only an arc has."""
 
-    nominal_radius_mm: float  # as programmed.
-    command: FittedCircle | None  # circle through the set-points; arcs of 10 degrees on, else None.
-    response: FittedCircle | None  # through the table's positions, likewise.
-    inside_wall: FittedCircle | None  # through the wall towards the centre; None where there is none.
-    outside_wall: FittedCircle | None  # through the other wall, likewise.
-    orbit_error_percent: Tracks[float | None]  # area between track and arc over the sector; None where it is not known.
+    nominal_radius_mm: float  # as programmed
+    command: FittedCircle | None  # circle through the set-points; arcs of 10 degrees on, else None
+    response: FittedCircle | None  # through the table's positions, likewise
+    inside_wall: FittedCircle | None  # through the wall towards the centre; None where there is none
+    outside_wall: FittedCircle | None  # through the other wall, likewise
+    orbit_error_percent: Tracks[float | None]  # area between track and arc over the sector; None where it is not known
 
     @classmethod
     def of(cls, figures: _core.SectionFigures, tool_diameter_mm: float) -> MeasuredArc:
@@ -99,11 +99,11 @@ class MeasuredArc:
 class WallDeviation:
     """A wall from where the programmed path cuts it, in µm, positive to the left of the travel; None without a wall."""
 
-    min: float | None  # least.
-    mean: float | None  # of all stations.
-    max: float | None  # largest.
-    band: float | None  # largest less least.
-    stations: int  # places at which it was measured.
+    min: float | None  # least
+    mean: float | None  # of all stations
+    max: float | None  # largest
+    band: float | None  # largest less least
+    stations: int  # places at which it was measured
 
     @classmethod
     def of(cls, wall: _core.WallFigures) -> WallDeviation:
@@ -117,11 +117,11 @@ class WallDeviation:
 class Width:
     """From wall to wall, in mm; None where there are no two walls."""
 
-    nominal: float  # the tool's diameter.
-    min: float | None  # least.
-    mean: float | None  # of all stations.
-    max: float | None  # largest.
-    stations: int  # places at which it was measured.
+    nominal: float  # the tool's diameter
+    min: float | None  # least
+    mean: float | None  # of all stations
+    max: float | None  # largest
+    stations: int  # places at which it was measured
 
     @classmethod
     def of(cls, width: _core.WallFigures, tool_diameter_mm: float) -> Width:
@@ -135,11 +135,11 @@ class Width:
 class WallRoughness:
     """Roughness and waviness of a wall (ISO 4287, ISO 21920-2)."""
 
-    ra_um: float  # arithmetic mean height of the roughness.
-    rz_um: float  # mean of highest less deepest over sampling lengths.
-    wa_um: float  # arithmetic mean height of the waviness.
-    cutoff_mm: float  # cut-off λc.
-    evaluated_mm: float  # length that the figures speak of.
+    ra_um: float  # arithmetic mean height of the roughness
+    rz_um: float  # mean of highest less deepest over sampling lengths
+    wa_um: float  # arithmetic mean height of the waviness
+    cutoff_mm: float  # cut-off λc
+    evaluated_mm: float  # length that the figures speak of
 
     @classmethod
     def of(cls, figures: _core.Roughness | None) -> WallRoughness | None:
@@ -167,23 +167,23 @@ class WallProfile:
 class MeasuredSection:
     """One section of the path: a line, an arc, a curve of short moves, or the lines that one asked for."""
 
-    region: int  # cutting region in which it is, from 1.
-    kind: str  # "line", "arc" or "curve".
-    lines: tuple[int, int]  # first and last of the nominal program, from 1.
-    begin_mm: float  # distance from the region's start.
-    length_mm: float  # of the section.
-    time_s: float  # while the command moves in it.
-    peak_vibration_um: Xyz[float]  # largest |response - command| of each axis while the command moves.
-    residual_vibration_um: Xyz[float] | None  # the same once it rests; None: it does not stop here.
-    # from then until it stays within the band; null: not while it was looked at; None: no stop.
+    region: int  # cutting region in which it is, from 1
+    kind: str  # "line", "arc" or "curve"
+    lines: tuple[int, int]  # first and last of the nominal program, from 1
+    begin_mm: float  # distance from the region's start
+    length_mm: float  # of the section
+    time_s: float  # while the command moves in it
+    peak_vibration_um: Xyz[float]  # largest |response - command| of each axis while the command moves
+    residual_vibration_um: Xyz[float] | None  # the same once it rests; None: it does not stop here
+    # from then until it stays within the band; null: not while it was looked at; None: no stop
     settling_time_s: Xyz[float | None] | None
-    observed_rest_s: float | None  # how long the rest was looked at; None: no stop.
-    contour_error_um: Tracks[SidedError]  # distance of command and response from the path.
-    arc: MeasuredArc | None  # what only arcs have; None for others.
-    wall_deviation_um: Sides[WallDeviation]  # of both walls.
-    width_mm: Width  # from wall to wall.
-    roughness: Sides[WallRoughness | None]  # of both walls; None where a wall is too short.
-    walls: WallProfile | None = field(metadata=hidden())  # the profiles; None where so many stations are not kept.
+    observed_rest_s: float | None  # how long the rest was looked at; None: no stop
+    contour_error_um: Tracks[SidedError]  # distance of command and response from the path
+    arc: MeasuredArc | None  # what only arcs have; None for others
+    wall_deviation_um: Sides[WallDeviation]  # of both walls
+    width_mm: Width  # from wall to wall
+    roughness: Sides[WallRoughness | None]  # of both walls; None where a wall is too short
+    walls: WallProfile | None = field(metadata=hidden())  # the profiles; None where so many stations are not kept
 
     @classmethod
     def of(

@@ -261,16 +261,16 @@ class MeasuredRegion:
 class MeasuredProgram:
     """One program, measured."""
 
-    program: str  # its name.
-    shaped: bool  # simulated as one that shapegcode wrote: block by block at its feed.
-    measured_against: str  # name of the program whose path is the nominal one; its own name for its own path.
-    ok: bool | None  # the response stays within the tolerance of the path; None: it is not judged.
-    cutting_time_s: float  # of all regions, until the set-points rest.
-    contour_error_um: Tracks[SidedError]  # of all regions; missed corners count.
-    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis at the stops.
-    sections: tuple[MeasuredSection, ...]  # of all regions, in order.
-    warnings: tuple[str, ...]  # about the program and the machine.
-    regions: tuple[MeasuredRegion, ...] = field(metadata=hidden())  # in order.
+    program: str  # its name
+    shaped: bool  # simulated as one that shapegcode wrote: block by block at its feed
+    measured_against: str  # name of the program whose path is the nominal one; its own name for its own path
+    ok: bool | None  # the response stays within the tolerance of the path; None: it is not judged
+    cutting_time_s: float  # of all regions, until the set-points rest
+    contour_error_um: Tracks[SidedError]  # of all regions; missed corners count
+    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis at the stops
+    sections: tuple[MeasuredSection, ...]  # of all regions, in order
+    warnings: tuple[str, ...]  # about the program and the machine
+    regions: tuple[MeasuredRegion, ...] = field(metadata=hidden())  # in order
 
     @classmethod
     def of(

@@ -283,7 +283,7 @@ def _comments(cls: type) -> dict[str, str]:
             above.append(line[6:])
             continue
         if (field := _FIELD.fullmatch(line)) and (said := [*above, *filter(None, [field[2]])]):
-            found[field[1]] = " ".join(said)
+            found[field[1]] = " ".join(said) + "."
         above = []
     return found
 

@@ -30,13 +30,13 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 class CuttingLaw:
     """The coefficients of the force law, as in the tool file's ``[cutting]``; see docs/concepts/cutting_force.md."""
 
-    specific_n_per_mm2: float  # specific cutting force k1 at a chip 1 mm thick.
-    specific_exponent: float = 0.0  # of the chip thickness in k1.
-    ratio: float = 0.0  # of radial to tangential force, k2, at a chip 1 mm thick.
-    ratio_exponent: float = 0.0  # of the chip thickness in k2.
-    tangential_edge_n_per_mm: float = 0.0  # tangential force of the edge per length, K_te.
-    radial_edge_n_per_mm: float = 0.0  # radial force of the edge per length, K_re.
-    # to which the exponents belong, "mean" of the engagement or "local".
+    specific_n_per_mm2: float  # specific cutting force k1 at a chip 1 mm thick
+    specific_exponent: float = 0.0  # of the chip thickness in k1
+    ratio: float = 0.0  # of radial to tangential force, k2, at a chip 1 mm thick
+    ratio_exponent: float = 0.0  # of the chip thickness in k2
+    tangential_edge_n_per_mm: float = 0.0  # tangential force of the edge per length, K_te
+    radial_edge_n_per_mm: float = 0.0  # radial force of the edge per length, K_re
+    # to which the exponents belong, "mean" of the engagement or "local"
     chip_thickness: Literal["mean", "local"] = "mean"
 
     @classmethod
@@ -55,11 +55,11 @@ class CuttingLaw:
 class CutTool:
     """The end mill of a test cut."""
 
-    diameter_mm: _Positive  # as it turns, measured.
-    flutes: Annotated[int, Field(gt=0)]  # their number.
-    helix_deg: _Finite  # right-hand helix.
-    runout_mm: tuple[_Finite, ...] = ()  # how far each flute stands out; empty: not known.
-    cutting: CuttingLaw = CuttingLaw(0.0)  # the force law that is known before.
+    diameter_mm: _Positive  # as it turns, measured
+    flutes: Annotated[int, Field(gt=0)]  # their number
+    helix_deg: _Finite  # right-hand helix
+    runout_mm: tuple[_Finite, ...] = ()  # how far each flute stands out; empty: not known
+    cutting: CuttingLaw = CuttingLaw(0.0)  # the force law that is known before
 
     @property
     def radius_mm(self) -> float:
@@ -71,14 +71,14 @@ class CutTool:
 class MeasuringPass:
     """One pass whose force is recorded."""
 
-    name: str  # what is special about it.
-    start_mm: _Finite  # X of the tool's axis at its start, in the air.
-    end_mm: _Finite  # X at its end, in the air.
-    # ascending X of the edge's corner points, from one end of the stock to the other.
+    name: str  # what is special about it
+    start_mm: _Finite  # X of the tool's axis at its start, in the air
+    end_mm: _Finite  # X at its end, in the air
+    # ascending X of the edge's corner points, from one end of the stock to the other
     edge_x_mm: Annotated[tuple[_Finite, ...], Field(min_length=2)]
-    # how high the edge stands there above the wall that the pass leaves; straight between them.
+    # how high the edge stands there above the wall that the pass leaves; straight between them
     edge_height_mm: Annotated[tuple[_Finite, ...], Field(min_length=2)]
-    # pairs (X up to which it holds, feed in mm/min), ascending.
+    # pairs (X up to which it holds, feed in mm/min), ascending
     feeds: Annotated[tuple[tuple[_Finite, _Positive], ...], Field(min_length=1)]
 
     @property
@@ -115,47 +115,47 @@ class MeasuringPass:
 class TaperDetails:
     """What is special about a taper."""
 
-    radial_depth_mm: tuple[float, float]  # at the begin and at the end of the stock.
-    length_mm: float  # of the stock.
+    radial_depth_mm: tuple[float, float]  # at the begin and at the end of the stock
+    length_mm: float  # of the stock
 
 
 @dataclass(frozen=True)
 class Deepest:
     """Where a pass meets most."""
 
-    max: float  # radial depth, mm.
-    at_mm: float  # X of the tool's axis.
+    max: float  # radial depth, mm
+    at_mm: float  # X of the tool's axis
 
 
 @dataclass(frozen=True)
 class DeeperStretch:
     """Where passes meet more than the corner has, by more than 1 µm, as the tool that mills the edge is round."""
 
-    from_mm: float  # X at its begin.
-    to_mm: float  # X at its end.
-    most_mm: float  # how much more.
+    from_mm: float  # X at its begin
+    to_mm: float  # X at its end
+    most_mm: float  # how much more
 
 
 @dataclass(frozen=True)
 class CornerDetails:
     """What is special about an unrolled corner."""
 
-    allowance_mm: float  # radial depth on the walls.
-    rough_radius_mm: float  # of the rough corner.
-    finish_radius_mm: float  # of the finished corner.
-    interval_mm: float  # length of a block with a feed of its own.
-    corner_begins_at_mm: float  # X.
-    radial_depth_mm: Deepest  # the deepest place.
-    deeper_than_corner: DeeperStretch | None  # where more is met than the corner has; None: nowhere.
+    allowance_mm: float  # radial depth on the walls
+    rough_radius_mm: float  # of the rough corner
+    finish_radius_mm: float  # of the finished corner
+    interval_mm: float  # length of a block with a feed of its own
+    corner_begins_at_mm: float  # X
+    radial_depth_mm: Deepest  # the deepest place
+    deeper_than_corner: DeeperStretch | None  # where more is met than the corner has; None: nowhere
 
 
 @dataclass(frozen=True)
 class IntervalDetails:
     """What is special about an interval test."""
 
-    radial_depth_mm: float  # everywhere.
-    intervals_mm: tuple[_Positive, ...]  # length of the blocks of each pass.
-    steps_begin_at_mm: float  # X of the first change of the feed.
+    radial_depth_mm: float  # everywhere
+    intervals_mm: tuple[_Positive, ...]  # length of the blocks of each pass
+    steps_begin_at_mm: float  # X of the first change of the feed
 
 
 @dataclass(frozen=True)

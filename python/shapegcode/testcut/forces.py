@@ -244,11 +244,11 @@ _UNITS = ("N/mm²", "", "", "", "N/mm", "N/mm")  # of COEFFICIENTS
 class Coefficient:
     """One value with its 95 % interval."""
 
-    name: str  # key of ``[cutting]``.
-    value: float  # the best.
-    low: float  # lower end.
-    high: float  # upper end.
-    unit: str  # of all three.
+    name: str  # key of ``[cutting]``
+    value: float  # the best
+    low: float  # lower end
+    high: float  # upper end
+    unit: str  # of all three
 
 
 @dataclass(frozen=True, eq=False)

@@ -82,29 +82,29 @@ RATIO_LIMIT = 0.10  # By how much the measured effect of the feed may differ fro
 class ChipRange:
     """Mean chip thicknesses of the mean forces."""
 
-    min: float  # thinnest, mm.
-    max: float  # thickest, mm.
-    middle: float  # geometric mean, mm.
+    min: float  # thinnest, mm
+    max: float  # thickest, mm
+    middle: float  # geometric mean, mm
 
 
 @dataclass(frozen=True)
 class TaperPass:
     """What the record of one pass showed."""
 
-    file: str  # where it was read.
-    feed_mm_per_min: float  # between entry and exit.
-    spindle_rev_per_min: float  # as the record shows it, or as commanded.
-    offset_n: tuple[float, float]  # force along the feed and to its left that was shown in the air before the cut.
-    drift_n: tuple[float, float]  # change of it until after the cut.
+    file: str  # where it was read
+    feed_mm_per_min: float  # between entry and exit
+    spindle_rev_per_min: float  # as the record shows it, or as commanded
+    offset_n: tuple[float, float]  # force along the feed and to its left that was shown in the air before the cut
+    drift_n: tuple[float, float]  # change of it until after the cut
 
 
 @dataclass(frozen=True)
 class LeftOut:
     """A part of a pass with chatter."""
 
-    number: int  # of the pass, from 1.
-    from_mm: float  # X at its begin.
-    to_mm: float  # X at its end.
+    number: int  # of the pass, from 1
+    from_mm: float  # X at its begin
+    to_mm: float  # X at its end
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -225,21 +225,21 @@ class TaperResult(Result):
 class CornerPass:
     """Largest resultant of a pass within the stock, mean over a revolution and momentary."""
 
-    number: int  # of the pass, from 1.
-    measured_mean_n: float  # largest mean, as recorded.
-    measured_peak_n: float  # largest magnitude, as recorded.
-    expected_mean_n: float  # largest mean of the force law.
-    expected_peak_n: float  # largest magnitude of the force law.
-    record: Revolutions = field(metadata=hidden())  # what was recorded, by revolution.
-    forecast: Expected = field(metadata=hidden())  # what the force law lets expect.
+    number: int  # of the pass, from 1
+    measured_mean_n: float  # largest mean, as recorded
+    measured_peak_n: float  # largest magnitude, as recorded
+    expected_mean_n: float  # largest mean of the force law
+    expected_peak_n: float  # largest magnitude of the force law
+    record: Revolutions = field(metadata=hidden())  # what was recorded, by revolution
+    forecast: Expected = field(metadata=hidden())  # what the force law lets expect
 
 
 @dataclass(frozen=True)
 class ForceRatio:
     """Largest mean resultant with the modified feed over that with the constant one."""
 
-    measured: float  # as recorded.
-    expected: float  # of the force law.
+    measured: float  # as recorded
+    expected: float  # of the force law
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -308,18 +308,18 @@ class CornerResult(Result):
 class FollowedPass:
     """How the controller followed the feeds of one pass."""
 
-    number: int  # of the pass, from 1.
-    interval_mm: float  # length of its blocks.
-    deviation: float  # largest |measured - commanded| force at the end of a block, as a share of commanded.
-    at_mm: float  # X of the end of that block.
-    noise: float  # standard deviation of such a mean where the feed does not change, as a share of it.
-    lag_s: float  # time constant with which the feed follows best.
-    ok: bool  # whether it is followed: the deviation is within 5 % and twice the noise.
-    time_s: FloatArray = field(metadata=hidden())  # (m,) of the record.
-    # (m,) mean over a revolution, scaled to what is expected on the straight part.
+    number: int  # of the pass, from 1
+    interval_mm: float  # length of its blocks
+    deviation: float  # largest |measured - commanded| force at the end of a block, as a share of commanded
+    at_mm: float  # X of the end of that block
+    noise: float  # standard deviation of such a mean where the feed does not change, as a share of it
+    lag_s: float  # time constant with which the feed follows best
+    ok: bool  # whether it is followed: the deviation is within 5 % and twice the noise
+    time_s: FloatArray = field(metadata=hidden())  # (m,) of the record
+    # (m,) mean over a revolution, scaled to what is expected on the straight part
     force_n: FloatArray = field(metadata=hidden())
-    immediate_n: FloatArray = field(metadata=hidden())  # (m,) expected if the feed follows at once.
-    lagging_n: FloatArray = field(metadata=hidden())  # (m,) expected with the lag.
+    immediate_n: FloatArray = field(metadata=hidden())  # (m,) expected if the feed follows at once
+    lagging_n: FloatArray = field(metadata=hidden())  # (m,) expected with the lag
 
 
 @dataclass(frozen=True, repr=False, eq=False)

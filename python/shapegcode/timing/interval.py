@@ -22,17 +22,17 @@ CUTS, BETWEEN, RUNS = "cuts of a tool, by themselves", "between cuts, by themsel
 class OpenPart:
     """What one source contributes to the interval of a time."""
 
-    name: str  # a parameter, the kind of look-ahead, or a scatter.
-    half_width_s: float  # half of the 95 % interval that it alone would give, s.
-    share: float  # of the variance, 0 to 1.
+    name: str  # a parameter, the kind of look-ahead, or a scatter
+    half_width_s: float  # half of the 95 % interval that it alone would give, s
+    share: float  # of the variance, 0 to 1
 
 
 @dataclass(frozen=True)
 class LogNext:
     """A program that one could run with a log, and calibrate with next."""
 
-    program: str  # name of it.
-    half_width_s: float  # half of the 95 % interval that would be left of the program that is timed, s.
+    program: str  # name of it
+    half_width_s: float  # half of the 95 % interval that would be left of the program that is timed, s
 
 
 # What a program must hold that tells a parameter, by a word of its name; the first that fits.
