@@ -11,7 +11,8 @@ import pytest
 
 import cut_reference as reference
 from shapegcode._core import ArgumentError
-from shapegcode.testcut.cut import COEFFICIENTS, CuttingLaw, CutTool
+from shapegcode.cutting.tool import COEFFICIENTS
+from shapegcode.testcut.cut import CuttingLaw, CutTool
 from shapegcode.testcut.forces import (
     CoefficientFit,
     Engagement,

@@ -62,6 +62,22 @@ class _Part:
     gouge: float | None = dataclasses.field(default=None, metadata=sparse())
 
 
+@dataclasses.dataclass(frozen=True)
+class _Inner:
+    """A part that is not public."""
+
+    first_mm: float = 0.0  # behind the field
+    # above the field,
+    # in two lines
+    second: dict[str, float] = dataclasses.field(default_factory=dict)
+
+
+def test_a_meaning_may_stand_at_its_field() -> None:
+    found = schema(_Inner)["properties"]
+    meanings = [found[name]["description"] for name in ("first_mm", "second")]
+    assert meanings == ["behind the field.", "above the field, in two lines."]
+
+
 def test_numbers_are_written_as_a_person_would() -> None:
     part = _Part(Xyz(1e-12, -0.0, 1.0 / 3.0), (1.0 / 3.0, -0.0), (1.0,), Pair(math.nan, 1e-12))
     assert plain(part) == {

@@ -15,7 +15,7 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.checks import Prepared, excited_hz, find_hits, is_clipped, prepare, split_hits
 from shapegcode.identification.decay import find_decay
 from shapegcode.identification.plan import TapPlan, rapid_stop_program, recording_for, tap_plan
-from shapegcode.identification.spectra import decay_spectrum, envelope, frf, mode_envelopes
+from shapegcode.identification.spectra import decay_spectrum, frf, mode_envelopes
 from shapegcode.io.record import FloatArray, Record
 from shapegcode.machine import Machine
 from shapegcode.program import Program
@@ -358,7 +358,6 @@ def receptance(frequency: FloatArray) -> np.ndarray[Any, np.dtype[np.complex128]
 def test_the_frf_is_that_of_the_plant() -> None:
     taps = [tap(half_sine(10_000, 200, 12, 400.0 + 20.0 * k), snr_db=30.0, seed=k) for k in range(8)]
     found = frf(prepare(taps).records)
-    assert found.taps == 8
     band = (found.frequency_hz > 20.0) & (found.frequency_hz < 300.0)
     truth = receptance(found.frequency_hz[band])
     error = np.abs(found.response[band] - truth) / np.abs(truth)
@@ -368,16 +367,7 @@ def test_the_frf_is_that_of_the_plant() -> None:
     near = [int(np.argmin(np.abs(found.frequency_hz - each))) for each in (46.0, 131.0)]
     assert found.coherence[near] == pytest.approx(1.0, abs=1e-3)
     assert found.coherence[found.frequency_hz > 2000.0].mean() < 0.5, "the hammer does not reach there"
-    ratio = np.abs(found.response[near]) ** 2 * found.force_spectrum[near] / found.response_spectrum[near]
-    assert ratio == pytest.approx(1.0, abs=2e-3)
-    # Parseval: the energy of the force is the integral of its density, both sides.
-    record = prepare(taps[:1]).records[0]
-    single = frf([record])
-    assert single.coherence is None
-    assert record.force_n is not None
-    step = single.frequency_hz[1]
-    integral = step * (2.0 * np.sum(single.force_spectrum) - single.force_spectrum[0])
-    assert integral == pytest.approx(np.sum(record.force_n**2) / RATE, rel=1e-3)
+    assert frf(prepare(taps[:1]).records).coherence is None
 
 
 def test_the_frf_agrees_with_scipys_welch_of_one_segment() -> None:
@@ -387,8 +377,8 @@ def test_the_frf_agrees_with_scipys_welch_of_one_segment() -> None:
     options: dict[str, Any] = {"fs": RATE, "window": "boxcar", "nperseg": 4096, "detrend": False}
     frequency, cross = signal.csd(record.force_n, record.response, **options)
     _, power = signal.welch(record.force_n, **options)
-    np.testing.assert_allclose(found.frequency_hz, frequency)
-    np.testing.assert_allclose(found.response[1:-1], (cross / power)[1:-1], rtol=1e-9)
+    np.testing.assert_allclose(found.frequency_hz, frequency[1:])
+    np.testing.assert_allclose(found.response[:-1], (cross / power)[1:-1], rtol=1e-9)
 
 
 def test_an_frf_needs_force_and_one_rate() -> None:
@@ -408,7 +398,6 @@ def test_peaks_of_a_decay() -> None:
     assert [peak.frequency_hz for peak in found.peaks] == pytest.approx([46.3, 131.7], abs=0.05)
     assert [peak.amplitude for peak in found.peaks] == pytest.approx([2.0, 0.1], rel=0.02)
     assert [peak.label for peak in found.peaks] == ["46.3 Hz", "131.7 Hz"]
-    assert found.resolution_hz == pytest.approx(2000.0 / 4096)
     noise = np.random.default_rng(1).normal(size=4096)
     assert decay_spectrum(Record("noise", 1e-3, noise)).peaks == ()
     assert decay_spectrum(Record("nothing", 1e-3, np.zeros(100))).peaks == ()
@@ -421,11 +410,8 @@ def test_the_envelopes_fall_as_the_modes_do() -> None:
     record = Record("decay", 1.0 / 4000.0, np.asarray(wave))
     for (frequency, damping), found in zip(modes, mode_envelopes(record, [46.0, 131.0]), strict=True):
         middle = slice(200, 1600)
-        slope = np.polyfit(found.time_s[middle], np.log(found.envelope[middle]), 1)[0]
+        slope = np.polyfit(time[middle], np.log(found[middle]), 1)[0]
         assert -slope / (2.0 * np.pi * frequency) == pytest.approx(damping, rel=0.05)
-    assert envelope(record).band_hz is None
-    with pytest.raises(RecordError, match="band 100 to 3000 Hz: must lie between 0 and 2000 Hz"):
-        envelope(record, (100.0, 3000.0))
     with pytest.raises(RecordError, match="mode at 3000 Hz"):
         mode_envelopes(record, [3000.0])
 

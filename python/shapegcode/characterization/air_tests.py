@@ -1,7 +1,6 @@
 """The tests: parts of equal moves in the air, those for a machine and a box, and how long they last.
 
-A test is one program. A part of it is a number of equal moves on one axis that go out and come back, so that every
-program ends where it began. The fit needs only these facts, which ``RESULTS.toml`` repeats.
+A test is one program. The fit needs only these facts, which ``RESULTS.toml`` repeats.
 """
 
 from __future__ import annotations
@@ -125,14 +124,12 @@ def check(test: AirTest, box: AirBox) -> None:
     at = dict.fromkeys(AXES, 0.0)
     for part in test.parts:
         index = AXES.index(part.axis)
+        low, high = box.low[index], box.high[index]
         for step in steps(part):
             at[part.axis] += step.length_mm
-            position = at[part.axis]
-            if not box.low[index] - 1e-6 <= position <= box.high[index] + 1e-6:
-                raise ArgumentError(
-                    f"test {test.name}: {part.axis} would go to {position:.3f} mm, the box is "
-                    f"{box.low[index]:g} to {box.high[index]:g} mm"
-                )
+            if not low - 1e-6 <= at[part.axis] <= high + 1e-6:
+                goes = f"{part.axis} would go to {at[part.axis]:.3f} mm"
+                raise ArgumentError(f"test {test.name}: {goes}, the box is {low:g} to {high:g} mm")
     if not all(math.isclose(position, 0.0, abs_tol=1e-6) for position in at.values()):
         raise ArgumentError(f"test {test.name} would not end where it began: {at}")
 
@@ -193,9 +190,8 @@ class _Maker:
     ) -> Part:
         """Moves of nearly the same duration, each ending in a stop."""
         base, dwell = (_LOG_STOP_S, _LOG_DWELL_S) if log else (_STOP_S, _STOP_DWELL_S)
-        feed = self.feed / slower
-        length = self._length(axis, base, feed, side)
-        return Part(pattern, axis, count, length, feed, dwell_s=dwell if pattern == "dwell" else 0.0)
+        length = self._length(axis, base, self.feed / slower, side)
+        return Part(pattern, axis, count, length, self.feed / slower, dwell_s=dwell if pattern == "dwell" else 0.0)
 
     def run(self, axis: str, count: int, duration_s: float, side: int = 0) -> Part:
         """Continuous moves, there and back over as much of the box as they fill evenly."""
@@ -319,15 +315,9 @@ class ControllerTiming:
             values = get() if get is not None else (value,) * 3
             return dict(zip(AXES, values, strict=True))
 
-        return cls(
-            control.interpolation_period_s,
-            control.block_end,
-            control.block_time_s,
-            control.time_constant_s + control.bell_time_s,
-            by_axis(control.rapid_time_constant_s),
-            by_axis(control.rapid_bell_time_s),
-            by_axis(control.in_position_s),
-        )
+        rapid_s, rapid_bell_s = by_axis(control.rapid_time_constant_s), by_axis(control.rapid_bell_time_s)
+        stop = control.block_end, control.block_time_s, control.time_constant_s + control.bell_time_s
+        return cls(control.interpolation_period_s, *stop, rapid_s, rapid_bell_s, by_axis(control.in_position_s))
 
 
 def whole_periods(duration_s: float, period_s: float) -> float:

@@ -9,18 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shapegcode.characterization import moves
 from shapegcode.characterization.air_tests import AXES, AirTest, whole_periods
-from shapegcode.characterization.moves import (
-    PartLog,
-    ShapeFit,
-    bend_samples,
-    fit_shape,
-    held_samples,
-    lagged_share,
-    line_slope,
-    parts_of,
-    smoothed_share,
-)
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, ControllerFact, Facts, mean
 from shapegcode.identification.servo.models import GAINS, lag_way
 from shapegcode.io.record import FloatArray
@@ -34,8 +24,8 @@ _STEPS_SETTLE_S = 0.3
 
 def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:
     """Fit everything that the logs hold."""
-    bend = bend_samples(list(logs.values()))
-    parts = {name: parts_of(log, tests[name], bend) for name, log in logs.items()}
+    bend = moves.bend_samples(list(logs.values()))
+    parts = {name: moves.parts_of(log, tests[name], bend) for name, log in logs.items()}
     facts = LogFacts()
     stops = [part for part in parts.get("log_cutting", []) if part.part.pattern == "dwell"]
     run = parts.get("log_run", [])
@@ -58,10 +48,12 @@ def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list
     return facts.found
 
 
-def _period(facts: LogFacts, logs: Mapping[str, ServoLog], stops: list[PartLog], run: list[PartLog], bend: int) -> None:
+def _period(
+    facts: LogFacts, logs: Mapping[str, ServoLog], stops: list[moves.PartLog], run: list[moves.PartLog], bend: int
+) -> None:
     """Interpolation period: from a held command, else from moves just below and just above whole periods."""
     name, key = "interpolation period", "controller.interpolation_period_s"
-    count, sampling = min((held_samples(log)[0], log.sampling_s) for log in logs.values())
+    count, sampling = min((moves.held_samples(log)[0], log.sampling_s) for log in logs.values())
     facts.sampling = sampling
     note = f"the command changes every {count} samples"
     if count == 1 and bend > 1:
@@ -82,7 +74,7 @@ def _period(facts: LogFacts, logs: Mapping[str, ServoLog], stops: list[PartLog],
     facts.add_unknown(name, why)
 
 
-def _period_of_stops(stops: list[PartLog]) -> tuple[float, float, str] | None:
+def _period_of_stops(stops: list[moves.PartLog]) -> tuple[float, float, str] | None:
     """Of the usual periods the one that rounds two durations so far apart; its half-width and a note."""
     if len(stops) < 2:
         return None
@@ -96,9 +88,9 @@ def _period_of_stops(stops: list[PartLog]) -> tuple[float, float, str] | None:
     return fits[0], half, f"moves of {short * 1e3:.2f} and {long * 1e3:.2f} ms differ by {step * 1e3:.2f} ms"
 
 
-def _period_of_run(run: list[PartLog], sampling: float) -> tuple[float, float, str] | None:
+def _period_of_run(run: list[moves.PartLog], sampling: float) -> tuple[float, float, str] | None:
     """Of the usual periods the one to which the blocks of a run are rounded; its half-width and a note."""
-    steady = line_slope(run[0], _RUN_SETTLE_S) if run else None
+    steady = moves.line_slope(run[0], _RUN_SETTLE_S) if run else None
     if steady is None:
         return None
     part = run[0].part
@@ -111,7 +103,7 @@ def _period_of_run(run: list[PartLog], sampling: float) -> tuple[float, float, s
     return fits[0], slack, note
 
 
-def _dwells(facts: LogFacts, part: PartLog) -> float:
+def _dwells(facts: LogFacts, part: moves.PartLog) -> float:
     """Whether the control waits for in-position before a dwell; returns the pitch of the moves without the dwell."""
     pitch, half = part.pitch_s()
     moving = pitch - whole_periods(part.part.dwell_s, facts.tick)
@@ -122,7 +114,7 @@ def _dwells(facts: LogFacts, part: PartLog) -> float:
     return moving
 
 
-def _in_position(facts: LogFacts, parts: list[PartLog], stop_pitch: float | None) -> dict[str, _Interval]:
+def _in_position(facts: LogFacts, parts: list[moves.PartLog], stop_pitch: float | None) -> dict[str, _Interval]:
     """In-position time of each axis from exact stops."""
     out = {}
     for part in parts:
@@ -163,13 +155,11 @@ def _waits(facts: LogFacts, stops: dict[str, _Interval], rapids: dict[str, list[
             facts.add(name, max(value, 0.0), half, key, note)
 
 
-def _runs(facts: LogFacts, run: list[PartLog], blocks: list[PartLog]) -> None:
+def _runs(facts: LogFacts, run: list[moves.PartLog], blocks: list[moves.PartLog]) -> None:
     """Ceil or carry from the mean time of long blocks; the block time from short ones."""
     settle = (facts.cutting or 0.1) * (4.5 if facts.exponential else 1.1)
-    end = None
-    if run:
-        end = _block_end(facts, run[0], settle)
-    else:
+    end = _block_end(facts, run[0], settle) if run else None
+    if not run:
         facts.add_unknown("block end", "needs log_run", "")
     if blocks:
         _block_time(facts, blocks[0], settle, end)
@@ -177,30 +167,29 @@ def _runs(facts: LogFacts, run: list[PartLog], blocks: list[PartLog]) -> None:
         facts.add_unknown("block time", "needs log_blocks")
 
 
-def _block_end(facts: LogFacts, run: PartLog, settle: float) -> str | None:
+def _block_end(facts: LogFacts, run: moves.PartLog, settle: float) -> str | None:
     part = run.part
     nominal = part.duration_s
-    speed, half = line_slope(run, settle) or (abs(part.length_mm) / nominal, math.inf)
+    speed, half = moves.line_slope(run, settle) or (abs(part.length_mm) / nominal, math.inf)
     lasts = abs(part.length_mm) / speed
     note = f"blocks of {nominal * 1e3:.2f} ms last {lasts * 1e3:.2f} ms"
     full = whole_periods(nominal, facts.period) - nominal if facts.period else None
     slack = lasts * half / speed + 1e-5
-    end = None
     if lasts - nominal > 3.0 * slack and (full is None or abs(lasts - nominal - full) < 0.3 * full + slack):
         end = "ceil"
     elif full is not None and abs(lasts - nominal) < 0.3 * full and slack < 0.3 * full:
         end = "carry"
-    if end:
-        facts.add_word("block end", end, "controller.block_end", note)
     else:
         facts.add_unknown("block end", note + ": neither fits, or the period is not known", "")
+        return None
+    facts.add_word("block end", end, "controller.block_end", note)
     return end
 
 
-def _block_time(facts: LogFacts, blocks: PartLog, settle: float, end: str | None) -> None:
+def _block_time(facts: LogFacts, blocks: moves.PartLog, settle: float, end: str | None) -> None:
     name, part = "block time", blocks.part
     lasting = f"blocks of {part.duration_s * 1e3:.2f} ms"
-    steady = line_slope(blocks, settle)
+    steady = moves.line_slope(blocks, settle)
     if steady is None:
         facts.add_unknown(name, f"{lasting} are over before the speed is steady: it is short")
         return
@@ -219,12 +208,12 @@ def _block_time(facts: LogFacts, blocks: PartLog, settle: float, end: str | None
     facts.add(name, lasts, slack, "controller.block_time_s", f"{lasting} last so long")
 
 
-def _feed_steps(facts: LogFacts, parts: list[PartLog]) -> None:
+def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
     """The shortest distance over which the speed follows a step of the feed between F and F/2 by 90 %."""
-    name = f"feed-control interval at F{parts[0].part.feed_mm_per_min:g}" if parts else "feed-control interval"
     if not parts:
-        facts.add_unknown(name, "needs log_feed_steps", "mm")
+        facts.add_unknown("feed-control interval", "needs log_feed_steps", "mm")
         return
+    name = f"feed-control interval at F{parts[0].part.feed_mm_per_min:g}"
     depths = {abs(log.part.length_mm): depth for log in parts if (depth := _followed_share(log)) is not None}
     followed = [d for d in depths if all(depths[e] >= _FOLLOWED for e in depths if e >= d)]
     shown = ", ".join(f"{d:g} mm {max(0.0, min(1.0, depths[d])) * 100:.0f} %" for d in sorted(depths))
@@ -236,7 +225,7 @@ def _feed_steps(facts: LogFacts, parts: list[PartLog]) -> None:
     facts.add_interval(name, best, below, best, "", f"followed: {shown}", "mm")
 
 
-def _followed_share(log: PartLog) -> float | None:
+def _followed_share(log: moves.PartLog) -> float | None:
     """Share of the speed step that is followed; None where no part of the move has a constant speed."""
     part = log.part
     top = int(np.argmax(log.travel_mm))  # the turn, which smoothing cuts short
@@ -298,7 +287,7 @@ class LogFacts(Facts):
 # --- cutting moves ----------------------------------------------------------------------------------------------------
 
 
-def fit_cutting(facts: LogFacts, stops: list[PartLog]) -> None:
+def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
     """Time constant and bell time from the shape of moves between stops."""
     names = ("cutting time constant", "cutting bell time")
     fits = _cutting_fits(facts, stops[:2])
@@ -308,12 +297,9 @@ def fit_cutting(facts: LogFacts, stops: list[PartLog]) -> None:
     if best == "linear" and rms["bell"] ** 2 < _BELL_GAIN * rms["linear"] ** 2 and min(bell) > facts.fine_s:
         best = "bell"
     if rms[best] > _ODD_SHAPE * abs(stops[0].part.length_mm) + 3.0 * stops[0].noise_mm:
-        why = (
-            f"no moving average and no exponential: the best fit ({best}) leaves {rms[best] * 1e3:.1f} µm; "
-            "was a look-ahead mode on?"
-        )
+        why = f"no moving average and no exponential: the best fit ({best}) leaves {rms[best] * 1e3:.1f} µm; "
         for name in names:
-            facts.add_unknown(name, why)
+            facts.add_unknown(name, f"{why}was a look-ahead mode on?")
         return
     # Of each fit the longest time first.
     times = [
@@ -336,17 +322,17 @@ def fit_cutting(facts: LogFacts, stops: list[PartLog]) -> None:
         facts.add(CUTTING_SUM, facts.cutting, facts.cutting_half)
 
 
-def _cutting_fits(facts: LogFacts, stops: list[PartLog]) -> dict[str, list[ShapeFit]]:
+def _cutting_fits(facts: LogFacts, stops: list[moves.PartLog]) -> dict[str, list[moves.ShapeFit]]:
     """Each part with each shape: its nominal duration and one or two times are fitted."""
-    fits: dict[str, list[ShapeFit]] = {"linear": [], "bell": [], "exponential": []}
+    fits: dict[str, list[moves.ShapeFit]] = {"linear": [], "bell": [], "exponential": []}
     for part in stops:
         nominal = part.part.duration_s
         low, high = nominal * 0.95, nominal + (facts.period or 0.004) * 1.1
         one = [low, 1e-4], [high, 1.0]
-        fits["linear"].append(fit_shape(part, smoothed_share, [nominal, 0.05], *one))
+        fits["linear"].append(moves.fit_shape(part, moves.smoothed_share, [nominal, 0.05], *one))
         two = [low, 1e-4, 1e-5], [high, 1.0, 0.5]
-        fits["bell"].append(fit_shape(part, smoothed_share, [nominal, 0.06, 0.02], *two))
-        fits["exponential"].append(fit_shape(part, lagged_share, [nominal, 0.03], *one))
+        fits["bell"].append(moves.fit_shape(part, moves.smoothed_share, [nominal, 0.06, 0.02], *two))
+        fits["exponential"].append(moves.fit_shape(part, moves.lagged_share, [nominal, 0.03], *one))
     return fits
 
 
@@ -365,19 +351,21 @@ class _Rapid:
     rms_mm: float
 
 
-def _rapid(part: PartLog, facts: LogFacts) -> _Rapid:
+def _rapid(part: moves.PartLog, facts: LogFacts) -> _Rapid:
     """The shape of rapids over one length, as a long move (the rate is reached) or a short one."""
     nominal = part.part.duration_s
     rectangle = whole_periods(nominal, facts.tick)
-    found: list[tuple[ShapeFit, bool, bool]] = []
+    found: list[tuple[moves.ShapeFit, bool, bool]] = []
     for bell, ramp_guess in itertools.product((None, 0.005, 0.03, 0.08), (0.06, 0.15)):
         begin = math.sqrt(nominal * ramp_guess)
         tail, low, high = ([], [], []) if bell is None else ([bell], [1e-5], [0.5])
         ends = [0.1 * begin, *low], [20.0 * begin, *high]
-        fit = fit_shape(part, lambda t, p: smoothed_share(t, [p[0], p[0], *p[1:]]), [begin, *tail], *ends)
+        fit = moves.fit_shape(part, lambda t, p: moves.smoothed_share(t, [p[0], p[0], *p[1:]]), [begin, *tail], *ends)
         found.append((fit, False, bell is not None))
         ends = [1e-4, *low], [1.05 * rectangle, *high]
-        fit = fit_shape(part, lambda t, p: smoothed_share(t, [rectangle, *p]), [0.7 * rectangle, *tail], *ends)
+        fit = moves.fit_shape(
+            part, lambda t, p: moves.smoothed_share(t, [rectangle, *p]), [0.7 * rectangle, *tail], *ends
+        )
         found.append((fit, True, bell is not None))
     plain = min((each for each in found if not each[2]), key=lambda each: each[0].rms_mm)
     curved = min((each for each in found if each[2]), key=lambda each: each[0].rms_mm)
@@ -393,7 +381,7 @@ def _rapid(part: PartLog, facts: LogFacts) -> _Rapid:
     return _Rapid(long, ramp, bell_value, (pitch - moving, half + slack), nominal, fit.rms_mm)
 
 
-def fit_rapids(facts: LogFacts, axis: str, parts: list[PartLog]) -> list[tuple[float, float]]:
+def fit_rapids(facts: LogFacts, axis: str, parts: list[moves.PartLog]) -> list[tuple[float, float]]:
     """Time constants of an axis' rapids; returns the in-position times that they show, with their half-widths."""
     name, bell_name = f"rapid time constant {axis}", f"rapid bell time {axis}"
     every = [_rapid(part, facts) for part in parts]
@@ -428,10 +416,7 @@ def fit_rapids(facts: LogFacts, axis: str, parts: list[PartLog]) -> list[tuple[f
 
 
 def _short_ramp(facts: LogFacts, fits: list[_Rapid]) -> tuple[float, float]:
-    """Between which time constants rapids lie that do not reach the rate.
-
-    Half of such a rapid lasts ceil(sqrt(nominal * A) / T) T (eq. 16 of paper 004, docs/evidence/references.md).
-    """
+    """Between which time constants rapids lie that do not reach the rate: eq. 16 of paper 004, for half of a rapid."""
     period = facts.tick
     halves = [(whole_periods(fit.ramp[0] - 0.3 * period, period), fit) for fit in fits]
     sure = [(half, fit) for half, fit in halves if abs(half - fit.ramp[0]) + fit.ramp[1] < 0.3 * period]
@@ -474,7 +459,7 @@ def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, floa
     """Command, following error and time step, one row for each held command so that its stairs are no error."""
     if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
         return None
-    count, first = held_samples(log)
+    count, first = moves.held_samples(log)
     n = (len(log.times_s) - first) // count
 
     def rows(values: FloatArray) -> FloatArray:

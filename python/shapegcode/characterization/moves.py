@@ -1,7 +1,6 @@
 """Single moves in a servo log: when the command changes, where the moves are, what shape they have.
 
-A move that starts and ends at rest is a rectangle of speed, smoothed. Its travel is a sum of powers of time for moving
-averages, and a closed form for an exponential; time constants come from fitting that to all moves of a part at once.
+A move between rests is a smoothed rectangle of speed, in closed form; time constants are fitted to all moves of a part.
 """
 
 from __future__ import annotations

@@ -6,23 +6,13 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from shapegcode.characterization.air_tests import (
-    AXES,
-    AirBox,
-    AirTest,
-    ControllerTiming,
-    Kind,
-    Part,
-    Pattern,
-    make_tests,
-    program_time_s,
-    steps,
-)
+from shapegcode.characterization import air_tests
 from shapegcode.characterization.result import CharacterisationTests, WrittenTest
 from shapegcode.errors import ArgumentError, FileError, Problem
 from shapegcode.io.atomic import write_text
@@ -36,7 +26,7 @@ _HEADER = "G21 G17 G91 G94 G64"
 
 
 def write_characterization_tests(
-    folder: str | Path, machine: Machine, box: str | AirBox = "0:100,0:100,0:20"
+    folder: str | Path, machine: Machine, box: str | air_tests.AirBox = "0:100,0:100,0:20"
 ) -> CharacterisationTests:
     """Write test programs that show what a controller does with blocks, and what the operator needs for them.
 
@@ -54,9 +44,9 @@ def write_characterization_tests(
         ArgumentError: the box or the feeds are too small; the folder holds a RESULTS.toml, which may be filled in.
         OSError: the folder or a file cannot be written.
     """
-    box = AirBox.parse(box) if isinstance(box, str) else box
+    box = air_tests.AirBox.parse(box) if isinstance(box, str) else box
     out = Path(folder)
-    tests = make_tests(machine, box)
+    tests = air_tests.make_tests(machine, box)
     if (out / SHEET).exists():
         raise ArgumentError(f"{out / SHEET} exists and may hold results: name another folder")
     out.mkdir(parents=True, exist_ok=True)
@@ -64,53 +54,41 @@ def write_characterization_tests(
         write_text(out / test.program, program_text(test, box, machine))
     write_text(out / "README.txt", readme_text(tests, machine, box))
     write_text(out / SHEET, sheet_text(tests, machine, box))
-    timing = ControllerTiming.of(machine)
-    written = [
-        WrittenTest(
-            each.name, each.program, each.kind, each.override_percent, program_time_s(each, timing), each.purpose
-        )
-        for each in tests
-    ]
-    return CharacterisationTests(machine.name, str(folder), str(box), tuple(written))
+    timing = air_tests.ControllerTiming.of(machine)
+    written = tuple(
+        WrittenTest(t.name, t.program, t.kind, t.override_percent, air_tests.program_time_s(t, timing), t.purpose)
+        for t in tests
+    )
+    return CharacterisationTests(machine.name, str(folder), str(box), written)
 
 
-def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
+def program_text(test: air_tests.AirTest, box: air_tests.AirBox, machine: Machine) -> str:
     """The program of a test: incremental, no spindle, no reference point, no tool change, written out."""
     decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
     shared = test.name.startswith("override")  # one program, run at several overrides
     title = "OVERRIDE" if shared else test.name.upper().replace("_", "-")
-    seconds = program_time_s(replace(test, override_percent=100), ControllerTiming.of(machine))
-    sides = [f"{a}{low:g}/{high:g}" for a, low, high in zip(AXES, box.low, box.high, strict=True)]
-    lines = [
-        "%",
-        f"O{test.number:04d}({title})",
-        f"({test.purpose})",
-        f"(BOX FROM START POINT {sides[0]})",
-        f"({sides[1]} {sides[2]} MM)",
-        f"(ABOUT {seconds:.0f} S IN TOTAL, AIR ONLY)",
-        "(INCREMENTAL, ENDS WHERE IT BEGAN)",
-        _HEADER,
-    ]
+    seconds = air_tests.program_time_s(replace(test, override_percent=100), air_tests.ControllerTiming.of(machine))
+    sides = [f"{a}{low:g}/{high:g}" for a, low, high in zip(air_tests.AXES, box.low, box.high, strict=True)]
+    lines = ["%", f"O{test.number:04d}({title})", f"({test.purpose})"]
+    lines += [f"(BOX FROM START POINT {sides[0]})", f"({sides[1]} {sides[2]} MM)"]
+    lines += [f"(ABOUT {seconds:.0f} S IN TOTAL, AIR ONLY)", "(INCREMENTAL, ENDS WHERE IT BEGAN)", _HEADER]
     for part in test.parts:
         mode: tuple[str, float] | None = None
         if part.pattern == "exact":
             lines.append("G61")
-        for block in steps(part):
+        for block in air_tests.steps(part):
             if block.length_mm == 0.0:
                 lines.append(f"G04 P{round(block.dwell_s * 1000.0)}")
                 continue
             word = _word(part.axis, block.length_mm, decimals)
             now = ("G00" if part.pattern == "rapid" else "G01", block.feed_mm_per_min)
-            if mode is None or now[0] != mode[0]:
-                word = f"{now[0]} {word}"
-            if now[0] == "G01" and (mode is None or now[1] != mode[1]):
-                word = f"{word} {_word('F', block.feed_mm_per_min, 1)}"
+            code = "" if mode is not None and now[0] == mode[0] else f"{now[0]} "
+            feed = "" if now[0] == "G00" or now == mode else f" {_word('F', block.feed_mm_per_min, 1)}"
+            lines.append(f"{code}{word}{feed}")
             mode = now
-            lines.append(word)
         if part.pattern == "exact":
             lines.append("G64")
-    lines += ["G90", "M30", "%"]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, "G90", "M30", "%"]) + "\n"
 
 
 def _word(address: str, value: float, decimals: int) -> str:
@@ -120,55 +98,27 @@ def _word(address: str, value: float, decimals: int) -> str:
     return f"{address}{text}"
 
 
-def readme_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
+def readme_text(tests: Sequence[air_tests.AirTest], machine: Machine, box: air_tests.AirBox) -> str:
     """Instructions for the operator."""
-    timing = ControllerTiming.of(machine)
+    timing = air_tests.ControllerTiming.of(machine)
     watch = [test for test in tests if test.kind == "stopwatch"]
     logs = [test for test in tests if test.kind == "log"]
-    rates = ", ".join(f"{n} {a.rapid_mm_per_min:g}" for n, a in zip(AXES, machine.axes.as_tuple(), strict=True))
+    rates = ", ".join(
+        f"{n} {a.rapid_mm_per_min:g}" for n, a in zip(air_tests.AXES, machine.axes.as_tuple(), strict=True)
+    )
     feed = max(part.feed_mm_per_min for test in tests for part in test.parts if part.pattern != "rapid")
 
-    def row(test: AirTest) -> str:
-        seconds = program_time_s(test, timing)
+    def row(test: air_tests.AirTest) -> str:
+        seconds = air_tests.program_time_s(test, timing)
         note = f"override {test.override_percent} %" if test.name.startswith("override") else ""
         return f"  {test.program}  {test.name:<15} {seconds:7.1f} s  {test.purpose.capitalize()}  {note}".rstrip()
 
-    text = [
-        f"Characterization of {machine.name}",
-        "",
-        "Before you start",
-        "  No tool, no workpiece, no spindle. The programs only move the axes, in the air.",
-        f"  From the point at which you start, the tests reach X {box.low[0]:g} to {box.high[0]:g}, "
-        f"Y {box.low[1]:g} to {box.high[1]:g}, Z {box.low[2]:g} to {box.high[2]:g} mm.",
-        "  Jog to a point from which all of this box is free, fixtures and tool changer included.",
-        f"  Cutting feed up to {feed:g} mm/min; rapid at the machine's rate ({rates} mm/min in the machine file:",
-        "  compare parameter 1420; a wrong rate makes the rapid time constants wrong).",
-        "  The programs are incremental (G91) and end where they began. After a stop in the middle: reset, jog back",
-        "  to the start point, begin that program anew. Never restart in the middle.",
-        "  First run each program once in single block or dry run, to see where it goes; times count only without.",
-        "  Overrides 100 % unless the table says otherwise. Switch look-ahead modes off (G05.1 Q0, G08 P0),",
-        "  if you want the figures without them; write down which mode was on.",
-        "",
-        f"With a stopwatch: about {sum(program_time_s(test, timing) for test in watch) / 60:.0f} minutes",
-        "  Time from cycle start to the end of the program, or read the cycle time off the control.",
-        "  Put the times into RESULTS.toml (times_s = [34.2] or, for several runs, [34.2, 34.3]).",
-        "  Tests may be left out: what then cannot be known is said. The order does not matter.",
-        "",
-        *(row(test) for test in watch),
-        "",
-        f"With a servo log: about {sum(program_time_s(test, timing) for test in logs):.0f} s of motion",
-        "  Record time and the commanded positions of X, Y, Z (and the actual positions, if you can) every 1 ms, from",
-        "  before the start to after the end. Save as CSV with a header line such as",
-        "    time_ms,X,Y,Z,X_act,Y_act,Z_act",
-        "  in mm, one file for each program, named after the test: log_cutting.csv and so on.",
-        "",
-        *(row(test) for test in logs),
-        "",
-        "Then",
-        "  shapegcode characterize --fit RESULTS.toml -m MACHINE -o fitted.toml",
-        "",
-    ]
-    return "\n".join(text)
+    text = (resources.files("shapegcode") / "data" / "characterization_readme.txt").read_text(encoding="utf-8")
+    return text.format(
+        machine=machine.name, low=box.low, high=box.high, feed=feed, rates=rates,
+        watch="\n".join(map(row, watch)), watch_min=sum(air_tests.program_time_s(test, timing) for test in watch) / 60,
+        logs="\n".join(map(row, logs)), logs_s=sum(air_tests.program_time_s(test, timing) for test in logs),
+    )  # fmt: skip
 
 
 SHEET = "RESULTS.toml"  # Name of the file
@@ -184,7 +134,7 @@ _PROGRAM = r"^O(\d{1,8})\.nc$"
 class _PartTable(InlineTable):
     """What a part does, as `plan.Part`."""
 
-    pattern: Pattern = key("kind of move")
+    pattern: air_tests.Pattern = key("kind of move")
     axis: Literal["X", "Y", "Z"] = key("of the moves", default="X")
     count: _Whole = key("number of moves", default=1)
     length_mm: _Length = key("of a move", default=0.0)
@@ -225,7 +175,7 @@ class FilledSheet:
     """What was measured."""
 
     file: str  # where it was read
-    tests: dict[str, AirTest]  # every test of the file
+    tests: dict[str, air_tests.AirTest]  # every test of the file
     times_s: dict[str, tuple[float, ...]]  # stopwatch times by test; a test without times is left out
     logs: dict[str, Path]  # servo log by test
     resolution_s: float  # step of the stopwatch
@@ -238,11 +188,11 @@ def read_sheet(path: Path) -> FilledSheet:
     text = read_text(path, FileError)
     sheet = validated(_SheetTable, parsed(text, str(path), FileError), str(path), text, FileError)
     logs: dict[str, Path] = {}
-    tests: dict[str, AirTest] = {}
+    tests: dict[str, air_tests.AirTest] = {}
     for name, test in sheet.tests.items():
-        kind: Kind = "stopwatch" if test.log is None else "log"
-        parts = tuple(Part(**part.model_dump()) for part in test.parts)
-        tests[name] = AirTest(name, int(test.program[1:-3]), kind, "", parts, test.override_percent)
+        kind: air_tests.Kind = "stopwatch" if test.log is None else "log"
+        parts = tuple(air_tests.Part(**part.model_dump()) for part in test.parts)
+        tests[name] = air_tests.AirTest(name, int(test.program[1:-3]), kind, "", parts, test.override_percent)
         if test.log is None:
             continue
         file = path.parent / (test.log or f"{name}.csv")
@@ -251,20 +201,14 @@ def read_sheet(path: Path) -> FilledSheet:
         elif test.log:
             where = f"tests.{name}.log"
             raise FileError(str(path), (Problem(where, test.log, f"no such file: {file}", line_of(where, text)),))
-    return FilledSheet(
-        file=str(path),
-        tests=tests,
-        times_s={name: test.times_s for name, test in sheet.tests.items() if test.times_s},
-        logs=logs,
-        resolution_s=sheet.resolution_s,
-        reaction_s=sheet.reaction_s,
-        lines={name: line_of(f"tests.{name}", text) or 1 for name in sheet.tests},
-    )
+    times = {name: test.times_s for name, test in sheet.tests.items() if test.times_s}
+    lines = {name: line_of(f"tests.{name}", text) or 1 for name in sheet.tests}
+    return FilledSheet(str(path), tests, times, logs, sheet.resolution_s, sheet.reaction_s, lines)
 
 
-def sheet_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
+def sheet_text(tests: Sequence[air_tests.AirTest], machine: Machine, box: air_tests.AirBox) -> str:
     """The file to fill in."""
-    timing = ControllerTiming.of(machine)
+    timing = air_tests.ControllerTiming.of(machine)
     lines = [
         f"# Results of the characterization tests of {machine.name}; box from the start point, mm: {box}",
         "# Fill in times_s (one or more times in s, from cycle start to the end of the program), or put the servo log",
@@ -275,13 +219,12 @@ def sheet_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
         "",
     ]
     for test in tests:
-        lines.append(f"[tests.{test.name}]  # {test.purpose.lower()}")
-        lines.append(f'program = "{test.program}"')
+        seconds = air_tests.program_time_s(test, timing)
+        lines += [f"[tests.{test.name}]  # {test.purpose.lower()}", f'program = "{test.program}"']
         if test.kind == "stopwatch":
-            lines.append(f"override_percent = {test.override_percent}")
-            lines.append(f"times_s = []  # expected: about {program_time_s(test, timing):.1f} s")
+            lines += [f"override_percent = {test.override_percent}", f"times_s = []  # expected: about {seconds:.1f} s"]
         else:
-            lines.append(f'log = ""  # for example "{test.name}.csv"; about {program_time_s(test, timing):.0f} s')
+            lines.append(f'log = ""  # for example "{test.name}.csv"; about {seconds:.0f} s')
         lines.append("parts = [")
         for part in test.parts:
             values = [

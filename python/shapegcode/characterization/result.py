@@ -20,29 +20,17 @@ PERIODS_S = tuple(ms / 1000.0 for ms in (0.125, 0.25, 0.5, 1, 1.5, 2, 2.5, 3, 4,
 
 @dataclass(frozen=True)
 class ControllerFact:
-    """One quantity.
+    """One quantity."""
 
-    Attributes:
-        quantity: its name, the same whatever it is found from.
-        value: a number, a word, or None if it is not known.
-        low: lower end of the 95 % interval; None for a word, and where nothing bounds it.
-        high: upper end.
-        unit: of value, low and high.
-        key: dotted key of the machine file that it goes into; empty: none.
-        source: how it was measured, "log" or "stopwatch"; empty: not at all.
-        note: what it rests on; for an unknown value, why it is not known.
-        assumed: what the machine file had; None where it has no such key.
-    """
-
-    quantity: str
-    value: float | str | None
-    low: float | None
-    high: float | None
-    unit: str
-    key: str
-    source: str
-    note: str = ""
-    assumed: float | str | None = None
+    quantity: str  # its name, the same whatever it is found from
+    value: float | str | None  # a number, a word, or None if it is not known
+    low: float | None  # lower end of the 95 % interval; None for a word, and where nothing bounds it
+    high: float | None  # upper end
+    unit: str  # of value, low and high
+    key: str  # dotted key of the machine file that it goes into; empty: none
+    source: str  # how it was measured, "log" or "stopwatch"; empty: not at all
+    note: str = ""  # what it rests on; for an unknown value, why it is not known
+    assumed: float | str | None = None  # what the machine file had; None where it has no such key
 
     @property
     def width(self) -> float:
@@ -121,23 +109,14 @@ def combine(first: Sequence[ControllerFact], second: Sequence[ControllerFact]) -
 
 @dataclass(frozen=True)
 class WrittenTest:
-    """One run of one program.
+    """One run of one program."""
 
-    Attributes:
-        name: of the test, as in ``RESULTS.toml``.
-        program: name of its file.
-        kind: "stopwatch": timed from start to end; "log": recorded by the control.
-        override_percent: feed override at which it is run.
-        expected_s: how long it lasts on a controller as the machine file says.
-        purpose: what it is for.
-    """
-
-    name: str
-    program: str
-    kind: Kind
-    override_percent: int
-    expected_s: float
-    purpose: str
+    name: str  # of the test, as in ``RESULTS.toml``
+    program: str  # name of its file
+    kind: Kind  # "stopwatch": timed from start to end; "log": recorded by the control
+    override_percent: int  # feed override at which it is run
+    expected_s: float  # how long it lasts on a controller as the machine file says
+    purpose: str  # what it is for
 
 
 @dataclass(frozen=True, repr=False, eq=False)

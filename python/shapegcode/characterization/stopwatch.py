@@ -1,9 +1,7 @@
-"""What stopwatch times of the test programs say about a controller.
+"""What stopwatch times of the test programs say about a controller; method: this project.
 
-Each time is one equation. For every usual interpolation period and both rules of the block's end the others are least
-squares; a period or rule counts as known only where the alternatives fit clearly worse. Rapids come after that, since a
-short rapid lasts whole periods of a square root: every time constant is tried, and what then is left is bell time and
-in-position time. Method: this project.
+Each time is one equation. For every usual period and both rules of the block's end the others are least squares; a
+period or rule counts as known only where the alternatives fit clearly worse. Rapids follow, for every time constant.
 """
 
 from __future__ import annotations
@@ -94,8 +92,7 @@ def fit_stopwatch(results: FilledSheet) -> WatchFacts:
             )
     for axis in AXES:
         mine = [row for row in rows.values() if row.test.parts[0].pattern == "rapid" and row.test.parts[0].axis == axis]
-        contradiction = fit_timed_rapids(facts, axis, mine, period, best.get("overhead"), best.get(axis))
-        facts.contradictions += [contradiction] if contradiction else []
+        _fit_rapids(facts, axis, mine, period, best)
     _override(best, rows, facts)
     return facts
 
@@ -118,20 +115,14 @@ def _rows(results: FilledSheet) -> dict[str, TimedTest]:
 def _used(rows: dict[str, TimedTest], exponential: float) -> list[TimedTest]:
     """What the least squares are of: no rapids, no overrides, and no stops that say the same again."""
     left_out = {*_SLOW, "stop_above"} if exponential else {"stop_slow" if "stop_slower" in rows else ""}
-    used = [
-        row
-        for name, row in rows.items()
-        if name not in left_out and row.test.parts[0].pattern != "rapid" and not name.startswith("override")
-    ]
-    if not exponential:
-        return used
-    # The tail of a run is not that of a stop: its last speed and its length are others.
-    return [
-        replace(row, sigma_s=math.hypot(row.sigma_s, 1.5 * exponential))
-        if row.test.parts[0].pattern == "continuous"
-        else row
-        for row in used
-    ]
+    used = []
+    for name, row in rows.items():
+        pattern = row.test.parts[0].pattern
+        # The tail of a run is not that of a stop: its last speed and its length are others.
+        sigma_s = math.hypot(row.sigma_s, 1.5 * exponential) if pattern == "continuous" else row.sigma_s
+        if name not in left_out and pattern != "rapid" and not name.startswith("override"):
+            used.append(replace(row, sigma_s=sigma_s))
+    return used
 
 
 def _timing(values: FloatArray, period: float, end: BlockEnd) -> ControllerTiming:
@@ -267,20 +258,14 @@ class TimedTest:
     sigma_s: float  # its standard deviation
 
 
-def fit_timed_rapids(
-    facts: Facts,
-    axis: str,
-    timed: list[TimedTest],
-    period: float | None,
-    overhead: tuple[float, float],
-    wait: tuple[float, float],
-) -> str:
+def _fit_rapids(facts: WatchFacts, axis: str, timed: list[TimedTest], period: float | None, best: _Fit) -> None:
     """Time constant and bell time of an axis' rapids."""
+    overhead, wait = best.get("overhead"), best.get(axis)
     names = (f"rapid time constant {axis}", f"rapid bell time {axis}")
     if len(timed) < 2:
         for name in names:
             facts.add_unknown(name, f"needs two of the rapid_{axis.lower()} tests or more")
-        return ""
+        return
     parts = [each.test.parts[0] for each in timed]
     count = np.array([part.count for part in parts])
     sigma = np.hypot([each.sigma_s for each in timed], overhead[1] / 1.96) / count
@@ -302,10 +287,11 @@ def fit_timed_rapids(
         for name in names:
             facts.add_unknown(name, "the times contradict each other")
         tests = ", ".join(each.test.name for each in timed)
-        return (
+        facts.contradictions.append(
             f"{tests}: no time constant gives these times (chi² {floor:.0f}); is the rapid rate of the machine file "
             "right, and the rapid override 100 %?"
         )
+        return
     inside = chi2 <= floor + _INSIDE
     likely = np.exp(-0.5 * (chi2[inside] - floor))
     _ramp(facts, axis, _RAMPS_S[inside], likely)
@@ -313,7 +299,6 @@ def fit_timed_rapids(
     slack = math.hypot(wait[1], 1.96 / math.sqrt(float(weight.sum())))
     ends = float(sums.min()) - wait[0] - slack, float(sums.max()) - wait[0] + slack
     _bell(facts, axis, float(likely @ sums / likely.sum()), wait, ends, slack)
-    return ""
 
 
 def _ramp(facts: Facts, axis: str, ramps: FloatArray, likely: FloatArray) -> None:

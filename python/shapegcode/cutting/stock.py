@@ -1,9 +1,4 @@
-"""The stock file: the material that is there before the first block of a program runs.
-
-A stock file is TOML and holds one of the tables ``[box]``, ``[polygon]``, ``[allowance]``, ``[program]``. Coordinates
-are those of the program: its work coordinate system. :class:`Stock` is the model of the file; `cutting.stock_shape`
-makes polygons of it.
-"""
+"""The stock file: the material that is there before the first block of a program runs, in the program's coordinates."""
 
 from __future__ import annotations
 
@@ -106,7 +101,7 @@ class Stock(TomlTable):
     )
     program: Rough | None = key("what a program that ran before has left", default=None)
 
-    # Where the file stands, so that names in it can be resolved; its name and text, for messages.
+    # Where the file stands, so that names in it can be resolved; its name and text, for messages
     _folder: Path = PrivateAttr(default=Path())
     _source: str = PrivateAttr(default="<text>")
     _text: str = PrivateAttr(default="")
@@ -154,10 +149,7 @@ class Stock(TomlTable):
     @property
     def kind(self) -> Literal["box", "polygon", "allowance", "program"]:
         """Which of the four tables the file has."""
-        for name in ("box", "polygon", "allowance"):
-            if getattr(self, name) is not None:
-                return name
-        return "program"
+        return next(name for name in ("box", "polygon", "allowance", "program") if getattr(self, name) is not None)
 
     def beside(self, name: str) -> Path:
         """The path of a file that this one names.

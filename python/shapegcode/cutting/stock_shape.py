@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode import _core
-from shapegcode.cutting.stock import Allowance, Box, Polygon, Rough, Solid, Stock
+from shapegcode.cutting.stock import Allowance, Polygon, Rough, Solid, Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import StockError
 from shapegcode.program import Program
@@ -50,28 +50,16 @@ class StockPiece:
 
 
 def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
-    """The stock as prisms over polygons; of the kind `program`: what was there before that program.
-
-    Source: this project; the allowance with its rough corner is the case of Kim and Ko, 2001 (paper 001).
-    """
+    """The stock as prisms over polygons; of the kind `program`: what was there before that program."""
     if stock.allowance is not None:
         return _pieces(_Allowance(stock, stock.allowance, tool_radius_mm).area(paths), stock.allowance.z_mm)
-    if stock.program is not None:
-        return _solid(stock, stock.program.on, "program.on.")
-    return _solid(stock, stock, "")
-
-
-def _solid(stock: Stock, solid: Solid | Stock, prefix: str) -> list[StockPiece]:
+    solid: Solid | Stock = stock if stock.program is None else stock.program.on
     if solid.box is not None:
-        return [_box(solid.box)]
+        (left, right), (front, back) = solid.box.x_mm, solid.box.y_mm
+        outline = np.array([(left, front), (right, front), (right, back), (left, back)])
+        return [StockPiece((outline,), *solid.box.z_mm)]
     assert solid.polygon is not None, "one of the two is there"
-    return _polygon(stock, solid.polygon, f"{prefix}polygon")
-
-
-def _box(box: Box) -> StockPiece:
-    (left, right), (front, back) = box.x_mm, box.y_mm
-    outline = np.array([(left, front), (right, front), (right, back), (left, back)])
-    return StockPiece((outline,), *box.z_mm)
+    return _polygon(stock, solid.polygon, "polygon" if stock.program is None else "program.on.polygon")
 
 
 def _polygon(stock: Stock, polygon: Polygon, key: str) -> list[StockPiece]:
@@ -105,16 +93,14 @@ def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockP
 
 
 class _Allowance:
-    """Builds the area that roughing left: the part behind the walls, thickened, with the corners of roughing."""
+    """Builds the area that roughing left (Kim and Ko, 2001, paper 001): the part thickened, with roughing's corners."""
 
     def __init__(self, stock: Stock, allowance: Allowance, radius_mm: float) -> None:
         self._stock, self._keys, self._radius = stock, allowance, radius_mm
         corner = allowance.corner_radius_mm
         if corner < radius_mm * (1 - 1e-9):
-            raise self._error(
-                "corner_radius_mm",
-                f"tool bigger than the corner: must not be below the tool's radius, {radius_mm:g} mm",
-            )
+            why = f"tool bigger than the corner: must not be below the tool's radius, {radius_mm:g} mm"
+            raise self._error("corner_radius_mm", why)
         self._reach = radius_mm + allowance.width_mm
         self._rough = allowance.allowance_mm + corner
 
@@ -128,11 +114,8 @@ class _Allowance:
             loops, rest = _loops(_with_touched(points))
             closed, whole = sum(_length(np.vstack([loop, loop[:1]])) for loop in loops), _length(points)
             if loops and closed < _CLOSED_RATIO * whole:
-                raise self._error(
-                    "wall",
-                    f"only {closed:.4g} of {whole:.4g} mm of a run of cutting moves close upon themselves: is that the "
-                    "wall? Describe the stock as [polygon]",
-                )
+                why = f"only {closed:.4g} of {whole:.4g} mm of a run of cutting moves close upon themselves"
+                raise self._error("wall", f"{why}: is that the wall? Describe the stock as [polygon]")
             for wall, gone in map(self._closed, loops) if loops else [self._open(rest)]:
                 walls.append(wall)
                 swept.append(gone)
@@ -185,11 +168,8 @@ class _Allowance:
         # The offset of GEOS, off by some micrometres, is good enough for this question and quick.
         if pocket.buffer(-self._rough).is_empty:
             room = 2 * shapely.maximum_inscribed_circle(pocket, tolerance=1e-3).length
-            raise self._error(
-                "corner_radius_mm",
-                f"roughing tool bigger than the pocket: with allowance_mm on both sides it needs "
-                f"{2 * self._rough:g} mm, the pocket is {room:.4g} mm wide",
-            )
+            why = "roughing tool bigger than the pocket: with allowance_mm on both sides it needs "
+            raise self._error("corner_radius_mm", f"{why}{2 * self._rough:g} mm, the pocket is {room:.4g} mm wide")
         return grown(pocket, self._keys.width_mm), pocket
 
     def _open(self, points: Points) -> tuple[Area | MultiPolygon, Area]:
@@ -200,19 +180,16 @@ class _Allowance:
         wall = shapely.LineString(points)
         start, end = self._keys.lead_in_mm, wall.length - self._keys.lead_out_mm
         if end - start <= _SAME_MM:
-            raise self._error(
-                "lead_in_mm", f"no wall is left between lead-in and lead-out of a run {wall.length:g} mm long"
-            )
+            why = f"no wall is left between lead-in and lead-out of a run {wall.length:g} mm long"
+            raise self._error("lead_in_mm", why)
         points = np.asarray(substring(wall, start, end).coords)
         # Beyond its ends the wall goes on straight, as far as the tool reaches there.
         beyond = 2 * self._radius + self._rough
         straight = _extended(points, beyond)
         line = shapely.LineString(straight)
         if not line.is_simple:
-            raise self._error(
-                "wall",
-                "the path crosses itself or the straight continuation of its ends: describe the stock as [polygon]",
-            )
+            why = "the path crosses itself or the straight continuation of its ends"
+            raise self._error("wall", f"{why}: describe the stock as [polygon]")
         band = swept(straight, self._reach, round_ends=False)
         cut = shapely.LineString(_extended(straight, _SAME_MM))
         faces = shapely.get_parts(shapely.polygonize([shapely.union_all([band.boundary, cut])]))
@@ -271,11 +248,7 @@ def _with_touched(points: Points) -> Points:
 
 
 def _loops(points: Points) -> tuple[list[Points], Points]:
-    """Closed contours in a line, and what is left of it without them.
-
-    A contour closes where the line comes back to one of its own points. Loops without area (there and back on the
-    same way) are no contours.
-    """
+    """Closed contours in a line, each with an area, and what is left of the line without them."""
     loops: list[Points] = []
     line: list[int] = []
     seen: dict[tuple[int, int], int] = {}
@@ -409,22 +382,16 @@ def build_material(
     *,
     others: Sequence[_core.Path] = (),
 ) -> _core.Material:
-    """The material before the first block of a program.
-
-    What a roughing program leaves is computed by sweeping its tool through what was there before.
-    """
+    """The material before the first block of a program; what a roughing program leaves: swept by its tool."""
     pieces = stock_polygons(stock, paths, tool.radius_mm)
-    bottom, top = pieces[0].bottom_mm, pieces[0].top_mm
-    rings = [ring for piece in pieces for ring in piece.rings]
+    rough = stock.program
+    diameter_mm = 0.0 if rough is None else Tool.load(stock.beside(rough.tool)).tool.diameter_mm
+    moves = [] if rough is None else _moves(stock, rough, machine)
     step = _RAMP_STEP_RATIO * tool.tool.diameter_mm
-    if stock.program is None:
-        return _core.Material(rings, _fewer(_core.layer_borders([*paths, *others], bottom, top, step)), resolution_mm)
-    rough = Tool.load(stock.beside(stock.program.tool))
-    moves = _moves(stock, stock.program, machine)
-    borders = _fewer(_core.layer_borders([*moves, *paths, *others], bottom, top, step))
-    material = _core.Material(rings, borders, resolution_mm)
+    borders = _core.layer_borders([*moves, *paths, *others], pieces[0].bottom_mm, pieces[0].top_mm, step)
+    material = _core.Material([ring for piece in pieces for ring in piece.rings], _fewer(borders), resolution_mm)
     for path in moves:
-        _core.sweep(material, path, rough.tool.diameter_mm)
+        _core.sweep(material, path, diameter_mm)
     return material
 
 

@@ -1,7 +1,4 @@
-"""The tool file: an end mill, the forces that it needs, the limits that it must keep and how its feed may be set.
-
-A tool file is TOML. :class:`Tool` is its model; it and its tables are the only place that holds defaults for it.
-"""
+"""The tool file: an end mill, the forces that it needs, the limits that it must keep and how its feed may be set."""
 
 from __future__ import annotations
 
@@ -20,6 +17,12 @@ from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTab
 from shapegcode.settings.load import KeyProblem, loaded, parsed, validated
 
 _LIBRARY = "materials.toml"
+
+COEFFICIENTS = (
+    *("specific_n_per_mm2", "specific_exponent", "ratio", "ratio_exponent"),
+    *("tangential_edge_n_per_mm", "radial_edge_n_per_mm"),
+)
+"""Names of the numbers of a force law."""
 
 Exponent = Annotated[Float, Field(gt=-1, lt=1)]
 Name = Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[!-$&-'*-~]([ !-$&-'*-~]*[!-$&-'*-~])?$")]
@@ -122,7 +125,7 @@ class Cutting(TomlTable):
             for name in ("specific_n_per_mm2", "ratio"):
                 if getattr(self, name) is None:
                     raise ValueError(f"needs material, or both specific_n_per_mm2 and ratio: {name} is missing")
-        exponent = self._value("specific_exponent", 0.0) + self._value("ratio_exponent", 0.0)
+        exponent = self._value("specific_exponent") + self._value("ratio_exponent")
         if exponent <= -1:
             raise ValueError(
                 f"specific_exponent + ratio_exponent = {toml(exponent)}: must be greater than -1, or the radial force "
@@ -138,23 +141,13 @@ class Cutting(TomlTable):
         """The cutting force as the core takes it."""
         entry = self.library_entry()
         thickness = self.chip_thickness or ("mean" if entry is None else entry.chip_thickness)
-        return _core.CuttingCoefficients(
-            specific_n_per_mm2=self._value("specific_n_per_mm2", 0.0),
-            specific_exponent=self._value("specific_exponent", 0.0),
-            ratio=self._value("ratio", 0.0),
-            ratio_exponent=self._value("ratio_exponent", 0.0),
-            tangential_edge_n_per_mm=self._value("tangential_edge_n_per_mm", 0.0),
-            radial_edge_n_per_mm=self._value("radial_edge_n_per_mm", 0.0),
-            thickness=_core.ChipThickness.__members__[thickness],
-        )
+        values = {name: self._value(name) for name in COEFFICIENTS}
+        return _core.CuttingCoefficients(**values, thickness=_core.ChipThickness.__members__[thickness])
 
-    def _value(self, name: str, otherwise: float) -> float:
-        """A coefficient: as given here, else of the material, else a value."""
-        own = getattr(self, name)
-        if own is not None:
-            return float(own)
-        entry = self.library_entry()
-        return otherwise if entry is None else float(getattr(entry, name))
+    def _value(self, name: str) -> float:
+        """A coefficient: as given here, else of the material, else 0."""
+        own, entry = getattr(self, name), self.library_entry()
+        return float(own if own is not None else 0.0 if entry is None else getattr(entry, name))
 
 
 class Cutter(TomlTable):
@@ -204,21 +197,14 @@ class Cutter(TomlTable):
     @model_validator(mode="after")
     def _fits(self) -> Cutter:
         if self.flute_length_mm > self.overhang_mm:
-            raise KeyProblem(
-                "flute_length_mm", self.flute_length_mm, f"must not exceed overhang_mm = {toml(self.overhang_mm)}"
-            )
-        if self.runout_um is not None:
-            if len(self.runout_um) != self.flutes:
-                raise KeyProblem(
-                    "runout_um",
-                    self.runout_um,
-                    f"has {len(self.runout_um)} values: must have one per flute, flutes = {self.flutes}",
-                )
-            largest = max(abs(value) for value in self.runout_um)
-            if largest >= 500 * self.diameter_mm:
-                raise KeyProblem(
-                    "runout_um", self.runout_um, f"must stay below the radius, {toml(500 * self.diameter_mm)} µm"
-                )
+            limit = f"must not exceed overhang_mm = {toml(self.overhang_mm)}"
+            raise KeyProblem("flute_length_mm", self.flute_length_mm, limit)
+        runout = self.runout_um
+        if runout is not None and len(runout) != self.flutes:
+            limit = f"has {len(runout)} values: must have one per flute, flutes = {self.flutes}"
+            raise KeyProblem("runout_um", runout, limit)
+        if runout is not None and max(map(abs, runout)) >= 500 * self.diameter_mm:
+            raise KeyProblem("runout_um", runout, f"must stay below the radius, {toml(500 * self.diameter_mm)} µm")
         return self
 
 
@@ -289,11 +275,8 @@ class Tool(TomlTable):
         if least is not None and most is not None and speed is not None:
             needed = least * self.tool.flutes * speed
             if needed > most:
-                raise KeyProblem(
-                    "limits.feed_per_tooth_min_mm",
-                    least,
-                    f"asks for a feed of {needed:g} mm/min, feed.max_feed_mm_per_min is {toml(most)}",
-                )
+                limit = f"asks for a feed of {needed:g} mm/min, feed.max_feed_mm_per_min is {toml(most)}"
+                raise KeyProblem("limits.feed_per_tooth_min_mm", least, limit)
         return self
 
     @classmethod
@@ -347,13 +330,9 @@ class Tool(TomlTable):
         Returns:
             The sense in which the tool turns.
         """
-        match self.tool.spindle:
-            case "clockwise":
-                return _core.SpindleSense.clockwise
-            case "counter_clockwise":
-                return _core.SpindleSense.counter_clockwise
-            case _:
-                return _core.SpindleSense.clockwise if programmed is None else programmed
+        if self.tool.spindle is not None:
+            return _core.SpindleSense.__members__[self.tool.spindle]
+        return _core.SpindleSense.clockwise if programmed is None else programmed
 
     def coefficients(self) -> _core.CuttingCoefficients:
         """The cutting force as the core takes it: the file's values, then those of its material."""

@@ -1,8 +1,6 @@
 """What modes move across the axis along which they were found: their poles in the responses of the other axes.
 
-With the poles known everything else is linear. Over time the free part behind a hit or stop is a sum of decays; over
-frequency the lines around a mode are its residue and a smooth background. The ratio of the amplitudes along two axes is
-the mode's shape between them, whatever the force was.
+With the poles known the rest is linear; the ratio of the amplitudes along two axes is the mode's shape between them.
 """
 
 from __future__ import annotations
@@ -17,6 +15,7 @@ from scipy import stats
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import Prepared, is_clipped, prepare
+from shapegcode.identification.decay import part_of
 from shapegcode.identification.frf_model import mode_columns
 from shapegcode.identification.frf_search import cut
 from shapegcode.identification.lines import measured_lines
@@ -67,31 +66,21 @@ def measured_across(
     sources: Sequence[Any], across: bool | str | Path | Measured | Sequence[str | Path | Measured], options: ReadOptions
 ) -> list[Measured]:
     """What the files (those of the taps themselves, or others) hold, of all axes."""
-    given: Sequence[Any]
-    if isinstance(across, bool):
-        given = sources
-    else:
-        given = [across] if isinstance(across, str | Path | Record | FrequencyResponse) else across
-    options = replace(options, axis=None, response_columns=())
-    return [
-        one
-        for each in given
-        for one in ([each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options))
-    ]
+    single = isinstance(across, str | Path | Record | FrequencyResponse)
+    given: Sequence[Any] = sources if isinstance(across, bool) else [across] if single else across  # type: ignore[assignment]
+    return measured(given, replace(options, axis=None, response_columns=()))
+
+
+def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
+    """Records and frequency responses, those of files read."""
+    read = (
+        [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options) for each in sources
+    )
+    return [one for several in read for one in several]
 
 
 def with_moves(found: Identification, others: Sequence[Measured], window_s: float | None = None) -> Identification:
-    """The identification with what its supported modes move of the other axes.
-
-    Args:
-        found: with modes, and the axis along which they were found.
-        others: records or responses that state their axes; those of the axis itself are left out. Of the same file
-            they count as recorded together.
-        window_s: time constant of an exponential window that the analyser applied to all of them.
-
-    Raises:
-        RecordError: no axis, or no response of another one; a free decay that was not recorded together.
-    """
+    """The identification with what its modes move of the other axes; `window_s`: exponential window of all `others`."""
     if found.axis is None:
         raise RecordError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
     others = [each for each in others if not _is_of_refused(each, found)]
@@ -218,9 +207,7 @@ def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Rec
     begin = round((use.start_s - first.start_s) / first.period_s)
     if abs(first.period_s / use.period_s - 1.0) > 1e-6 or begin < 0 or begin + len(use.response) > len(first.response):
         raise RecordError(f"{first.source}: was not recorded together with {use.source}")
-    inside = slice(begin, begin + len(use.response))
-    force_n = None if first.force_n is None else first.force_n[inside]
-    beside = replace(first, response=first.response[inside], force_n=force_n)
+    beside = part_of(first, begin, begin + len(use.response))
     if not np.ptp(beside.response) > 0.0:
         raise RecordError(
             f"{beside.source}: every sample of the response is {beside.response[0]:g}: is the sensor connected?"
@@ -329,13 +316,13 @@ def _local(at: FloatArray, power: FloatArray, poles: _Poles) -> FloatArray:
 def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int) -> tuple[complex, Estimate]:
     """A mode's amplitude along another axis over that along its own, and its real part with the 95 % interval."""
     if len(own) == len(other):  # hit by hit: what changes from hit to hit changes along both
-        pairs = [
-            (a.value[index], a.variance[index], b.value[index], b.variance[index])
-            for a, b in zip(own, other, strict=True)
-        ]
+        one, one_variance, two, two_variance = (*_of_mode(own, index), *_of_mode(other, index))
     else:
-        pairs = [(*_mean(own, index), *_mean(other, index))]
-    one, one_variance, two, two_variance = (np.array(column) for column in zip(*pairs, strict=True))
+        sides = (_of_mode(parts, index) for parts in (own, other))
+        means = [
+            (value.mean(keepdims=True), variance.sum(keepdims=True) / len(value) ** 2) for value, variance in sides
+        ]
+        (one, one_variance), (two, two_variance) = means
     weight = np.abs(one) ** 2
     ratio = complex(np.sum(np.conj(one) * two) / np.sum(weight))
     variance = float(np.sum(weight * (two_variance + abs(ratio) ** 2 * one_variance)) / np.sum(weight) ** 2)
@@ -346,7 +333,5 @@ def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int)
     return ratio, Estimate(ratio.real, ratio.real - half, ratio.real + half)
 
 
-def _mean(parts: Sequence[_Amplitudes], index: int) -> tuple[complex, float]:
-    values = np.array([part.value[index] for part in parts])
-    variances = np.array([part.variance[index] for part in parts])
-    return complex(np.mean(values)), float(np.sum(variances)) / len(parts) ** 2
+def _of_mode(parts: Sequence[_Amplitudes], index: int) -> tuple[ComplexArray, FloatArray]:
+    return np.array([part.value[index] for part in parts]), np.array([part.variance[index] for part in parts])

@@ -1,8 +1,7 @@
 """Modes from a control's own capture: commands and actual positions of an axis while it did its work.
 
-The position loop moves the point that its encoder measures, and what stands on it vibrates as with that point held. At
-such a frequency the structure takes the force that would have moved the encoder: actual over command has a dip there,
-and command over actual a peak. The drive between both is smooth beside a mode and takes up the rest.
+The position loop moves the encoder, and what stands on it vibrates as with that point held: actual over command has a
+dip there, command over actual a peak. The drive between both is smooth beside a mode.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
 from shapegcode.identification.parts import Spectra, moving_parts, transforms
-from shapegcode.identification.result import Identification, Sweep
+from shapegcode.identification.result import Identification, as_sweep
 from shapegcode.identification.servo.record import ServoTrace, read_servo_record
 from shapegcode.io.data_file import open_file
 from shapegcode.io.edge_json import is_edge_json
@@ -47,20 +46,9 @@ def find_modes_of_captures(paths: Sequence[Path], options: ReadOptions, sought: 
         notes += [f"{path}: {note}" for note in record.notes]
     responses = [_response(*each, sought.band_hz, options.axis) for each in traces]
     found = find_frf_modes(responses, tuple(map(str, paths)), replace(sought, phase_known=False))
-    (source, period_s, trace), first = traces[0], responses[0]
+    source, period_s, trace = traces[0]
     notes.append("of what the encoder measures: the modes with it held, no masses")
-    return replace(
-        found,
-        notes=(*notes, *found.notes),
-        responses=(),
-        fitted_lines=(),
-        noise_rms=None,
-        sweep=Sweep(
-            source, first.axis, trace.samples, period_s, found.responses[0].frequency_hz,
-            np.abs(found.responses[0].response), np.abs(found.fitted_lines[0]), command=source,
-            kind="capture of command and encoder",
-        ),
-    )  # fmt: skip
+    return as_sweep(found, notes, source, trace.samples, period_s, source, "capture of command and encoder")
 
 
 def _axis_of(source: str, traces: Sequence[ServoTrace], axis: str | None) -> ServoTrace:
@@ -116,10 +104,7 @@ def _response(
 
 
 def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, FloatArray]]:
-    """Kicks of command and actual position in each part between rests; of a motion without rests, tapered windows.
-
-    A kick is the change of speed at a sample, mm per period.
-    """
+    """Changes of speed, mm per period, of both in each part between rests; tapered windows where there are none."""
     found: list[tuple[FloatArray, FloatArray]] = []
     after, size = round(_AFTER_S / period_s), round(_WINDOW_S / period_s)
     for command, actual in zip(trace.command, trace.actual, strict=True):

@@ -9,35 +9,24 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.decay import find_decay
+from shapegcode.identification.decay import find_decay, part_of
 from shapegcode.identification.spectra import decay_spectrum
 from shapegcode.io.record import UNITS, FloatArray, Quantity, Record
 
 
 @dataclass(frozen=True)
 class RecordUse:
-    """What became of one tap or decay.
+    """What became of one tap or decay."""
 
-    Attributes:
-        source: file, and which hit or channel of it.
-        used: whether the modes come from it too.
-        reason: why it is not used; empty: it is.
-        samples: that were recorded; null where it is not used, as for the others.
-        period_s: time between two samples.
-        start_s: time of the first sample in the file.
-        quantity: what the sensor measured.
-        excited_hz: up to where the hit excites (-20 dB); null for a decay.
-        resolution_hz: distance of two lines of a frequency response without time record, whose lines are its samples.
-    """
-
-    source: str
-    used: bool
-    reason: str = ""
-    samples: int | None = None
-    period_s: float | None = None
-    start_s: float | None = None
-    quantity: Quantity | None = None
-    excited_hz: float | None = None
+    source: str  # file, and which hit or channel of it
+    used: bool  # whether the modes come from it too
+    reason: str = ""  # why it is not used; empty: it is
+    samples: int | None = None  # that were recorded; null where it is not used, as for the others
+    period_s: float | None = None  # time between two samples
+    start_s: float | None = None  # time of the first sample in the file
+    quantity: Quantity | None = None  # what the sensor measured
+    excited_hz: float | None = None  # up to where the hit excites (-20 dB); null for a decay
+    # distance of two lines of a frequency response without time record, whose lines are its samples
     resolution_hz: float | None = None
 
     @property
@@ -71,6 +60,12 @@ class Prepared:
     def records(self) -> tuple[Record, ...]:
         """Those that can be used."""
         return tuple(each.record for each in self.usable)
+
+    def without(self, unused: Sequence[Usable], why: str) -> Prepared:
+        """The same with some of the records refused."""
+        refused = tuple(RecordUse(each.record.source, False, why) for each in unused)
+        usable = tuple(each for each in self.usable if each not in unused)
+        return replace(self, usable=usable, refused=(*self.refused, *refused))
 
 
 #: A second pulse above this share of the first is refused: the momentum, and so the mass, would be off by as much.
@@ -439,11 +434,6 @@ class Hit:
     second_s: float = 0.0  # how long after this one it comes
 
 
-def robust_sigma(values: FloatArray) -> float:
-    """Standard deviation of the noise of a signal that is quiet most of the time."""
-    return _MAD * float(np.median(np.abs(values - np.median(values))))
-
-
 def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
     """Every pulse of a force without offset whose largest value is positive."""
     peak = float(np.max(force))
@@ -483,7 +473,8 @@ def find_hits(record: Record) -> list[Hit]:
     hits: list[Hit] = []
     largest = float(np.max(sign * force))
     noise = 0.0
-    for pulse in _pulses(sign * force, robust_sigma(force)):
+    sigma = _MAD * float(np.median(np.abs(force - np.median(force))))  # quiet most of the time
+    for pulse in _pulses(sign * force, sigma):
         if not hits and pulse.first > 1:
             noise = float(np.std(record.response[: pulse.first - 1]))
         if hits:
@@ -504,18 +495,9 @@ def split_hits(record: Record) -> list[Record]:
     hits = find_hits(record)
     if len(hits) < 2:
         return [record]
-    assert record.force_n is not None
     gaps = np.diff([hit.first for hit in hits])
     lead = int(_LEAD_SHARE * float(np.min(gaps)))
     starts = [max(0, hit.first - lead) for hit in hits]
     ends = [*starts[1:], len(record.response)]
-    return [
-        replace(
-            record,
-            source=f"{record.source} hit {number}",
-            response=record.response[start:end],
-            force_n=record.force_n[start:end],
-            start_s=record.start_s + start * record.period_s,
-        )
-        for number, (start, end) in enumerate(zip(starts, ends, strict=True), start=1)
-    ]
+    ranges = enumerate(zip(starts, ends, strict=True), start=1)
+    return [part_of(record, start, end, f" hit {number}") for number, (start, end) in ranges]

@@ -103,10 +103,7 @@ class _Scales:
 
 
 def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_samples: float) -> _Scales:
-    """What a decay tells of its modes: the slowest from its tail, where no command is left, the strongest from all.
-
-    A tail that has died away tells nothing: all its modes are about as fast as the one already found.
-    """
+    """What a decay tells of its modes: the slowest from its tail, where no command is left, the strongest from all."""
     rate = 1.0 / record.period_s
     tail = quiet[start + int(_TAIL * (end - start)) : end]
     peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _MIN_TAIL else ()
@@ -144,11 +141,15 @@ def _refuse_still(record: Record) -> None:
         )
 
 
-def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
-    """One record for each stop of an ordinary run behind which the machine rests, those with least motion first.
+def part_of(record: Record, begin: int, end: int, name: str = "") -> Record:
+    """Some samples of a record as one of their own."""
+    force_n = None if record.force_n is None else record.force_n[begin:end]
+    at_s, response = record.start_s + begin * record.period_s, record.response[begin:end]
+    return replace(record, source=f"{record.source}{name}", response=response, force_n=force_n, start_s=at_s)
 
-    Of many the strongest ones. `lowest_hz`: no mode lies below; what is slower is motion of the axis.
-    """
+
+def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
+    """One record for each stop of a run behind which the machine rests, those with least motion first, 20 at most."""
     _refuse_still(record)
     quiet = np.asarray(record.response - np.median(record.response), dtype=np.float64)
     period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
@@ -166,15 +167,8 @@ def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
         return float(np.sum(slow[inside] ** 2) / np.sum(quiet[inside] ** 2))
 
     parts = sorted(sorted(parts, key=lambda part: -envelope[part[0]])[:_MOST_STOPS], key=moved)
-    return [
-        replace(
-            record,
-            source=f"{record.source} stop at {record.start_s + begin * record.period_s:.2f} s",
-            response=record.response[begin:stop],
-            start_s=record.start_s + begin * record.period_s,
-        )
-        for begin, stop in parts
-    ]
+    times = (record.start_s + begin * record.period_s for begin, _ in parts)
+    return [part_of(record, *part, f" stop at {at_s:.2f} s") for part, at_s in zip(parts, times, strict=True)]
 
 
 def _overview(record: Record) -> tuple[FloatArray, float, float]:
@@ -211,4 +205,4 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
         start, end = _longest(envelope)
         start = _onset(quiet, scales, start, end)
         start = _rest_after_motion(quiet, scales.slowest, float(np.max(envelope[start:end])), start, end)
-    return replace(record, response=response[start:end], start_s=record.start_s + start * record.period_s)
+    return part_of(record, start, end)

@@ -15,6 +15,7 @@ from shapegcode.identification.checks import EXCITED, Prepared
 from shapegcode.identification.frf_model import Lines, ModalFit
 from shapegcode.identification.frf_search import (
     STABLE,
+    Pole,
     StablePole,
     Uncertainty,
     Window,
@@ -40,19 +41,17 @@ from shapegcode.identification.lines import (
 from shapegcode.identification.model_search import (
     LASTING,
     LOGARITHMS,
-    MIN_SWINGS,
     OPPOSED,
     SCATTER_PROBABILITY,
     TURNED,
     Sought,
-    Starts,
     chart_of,
     interval_refusal,
     lasting_refusal,
     lasting_share,
     mode_estimates,
 )
-from shapegcode.identification.plscf import Pole
+from shapegcode.identification.problem import MIN_SWINGS, Starts
 from shapegcode.identification.result import ChartPole, Identification, IdentifiedMode, by_support
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import FloatArray
@@ -246,16 +245,14 @@ def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -
 
 
 def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[FloatArray]]:
-    """Find modes in hits, and the model's response of each record.
-
-    What oscillates throughout is looked for once more in what a first model leaves.
-    """
+    """Find modes in hits, and the model's response of each record."""
     period = ready.records[0].period_s
     at_first = [steady_sines(each.record.response, period) for each in ready.usable]
     quiet = [each.record.response - sines for each, (sines, _) in zip(ready.usable, at_first, strict=True)]
     measured, hits = _of_hits(ready, quiet, sought)
     pool, poles = candidates_of(measured.parts)
     windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+    # What oscillates throughout is looked for once more in what a first model leaves.
     left = hits.in_time(_left(measured, hits, _model(measured.parts, windows)[0]))
     steady = [steady_sines(rest, period) for rest in left]
     if any(hertz for _, hertz in steady):
@@ -290,7 +287,10 @@ def _in_responses(measured: _Measured, sought: Sought) -> FrfModes:
     models = _model(measured.parts, windows)
     parts = tuple(_weighed(lines, model) for lines, model in zip(measured.parts, models, strict=True))
     windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, modes_of(windows))
-    windows = [_with_correlation(window) for window in windows]
+    for rank, window in enumerate(windows):
+        correlation = neighbours_correlation(window.fit.left)
+        correlated = tuple(replace(lines, correlation=correlation) for lines in window.parts)
+        windows[rank] = replace(window, parts=correlated)
     return _tested(replace(measured, parts=parts), windows, pool, poles, sought)
 
 
@@ -340,19 +340,10 @@ def _weighed(lines: Lines, model: ComplexArray) -> Lines:
     return weighted(lines, noise)
 
 
-def _with_correlation(window: Window) -> Window:
-    if window.fit is None:
-        return window
-    correlation = neighbours_correlation(window.fit.left)
-    return replace(window, parts=tuple(replace(lines, correlation=correlation) for lines in window.parts))
-
-
 def _model(parts: Sequence[Lines], windows: Sequence[Window]) -> list[ComplexArray]:
     """Lines of each response as the windows have them."""
     found = [lines.response.copy() for lines in parts]
     for window in windows:
-        if window.fit is None:
-            continue
         for row, (lines, left) in enumerate(zip(window.parts, window.fit.left, strict=True)):
             core = (lines.omega >= window.low) & (lines.omega < window.high)
             places = np.searchsorted(parts[row].omega, lines.omega[core])
@@ -418,10 +409,9 @@ def _chart(poles: Sequence[Pole]) -> tuple[ChartPole, ...]:
 
 # --- The modes of a window --------------------------------------------------------------------------------------------
 def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], sought: Sought) -> list[IdentifiedMode]:
-    fit = window.fit
-    if fit is None or not window.inside():
+    if not window.inside():
         return []
-    known = uncertainty_of(window)
+    fit, known = window.fit, uncertainty_of(window)
     others = _other_fits(window)
     found = []
     for index in window.inside():
@@ -440,10 +430,8 @@ def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], soug
 
 def _other_fits(window: Window) -> list[ModalFit]:
     """The same modes in a narrower band with another background, and as the other kind of modes, real or complex."""
-    fit = window.fit
-    assert fit is not None
-    starts = starts_of(fit)
-    kind, ends = fit.complex_modes, (float(window.parts[0].omega[0]), float(window.parts[0].omega[-1]))
+    starts, kind = starts_of(window.fit), window.fit.complex_modes
+    ends = (float(window.parts[0].omega[0]), float(window.parts[0].omega[-1]))
     narrow = [cut(lines, window.low / 1.15, window.high * 1.15, kind, 1) for lines in window.parts]
     other = [cut(lines, *ends, not kind) for lines in window.parts]
     found = []
@@ -459,9 +447,8 @@ def _logarithms(
 ) -> tuple[FloatArray, FloatArray]:
     """ln of frequency (Hz), damping ratio, mass, viscous damping, stiffness, and half of their 95 % intervals."""
     fit = window.fit
-    assert fit is not None
     residue = abs(residues_of(fit)[0, index])
-    omega, zeta = float(fit.omega[index]), float(fit.zeta[index])
+    omega, zeta = starts_of(fit)[index]
     base = np.array([np.log(omega), np.log(zeta), np.log(max(residue, 1e-300))])
     scale = np.array([1.0, 1.0, 1.0 / max(residue, 1e-300)])
     covariance = _misfit(fit, window.parts, index) * known.each[0, index] * np.outer(scale, scale)
@@ -496,7 +483,7 @@ def _scatter(
 ) -> FloatArray:
     """Half widths from what single hits would have made of a mode; 0 where noise explains it."""
     hits, fit, lines = measured.hits, window.fit, window.parts[0]
-    assert hits is not None and fit is not None
+    assert hits is not None
     count = len(hits.force)
     if count < 2:
         return np.zeros(5)
@@ -518,21 +505,14 @@ def _scatter(
 
 
 def _refusal(
-    window: Window,
-    index: int,
-    mode: IdentifiedMode,
-    measured: _Measured,
-    pool: Sequence[StablePole],
-    sought: Sought,
+    window: Window, index: int, mode: IdentifiedMode, measured: _Measured, pool: Sequence[StablePole], sought: Sought
 ) -> str:
     """Why the data do not support a mode; empty if they do."""
-    fit = window.fit
-    assert fit is not None
-    omega, zeta = float(fit.omega[index]), float(fit.zeta[index])
+    omega, zeta = starts_of(window.fit)[index]
     hertz, width = omega / (2.0 * np.pi), 2.0 * zeta * omega
     return (
         _record_refusal(hertz, zeta, measured)
-        or (_response_refusal(residues_of(fit)[:, index]) if sought.phase_known else "")
+        or (_response_refusal(residues_of(window.fit)[:, index]) if sought.phase_known else "")
         or _evidence_refusal(window, index, hertz, pool)
         or _local_refusal(window, omega, width)
         or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or _ACCEPTED_PERCENT)
@@ -586,8 +566,7 @@ def _response_refusal(residues: ComplexArray) -> str:
 def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[StablePole]) -> str:
     """Without a peak of its own and a stable pole, the fit must be clearly worse without the mode."""
     fit = window.fit
-    assert fit is not None
-    omega, zeta = float(fit.omega[index]), float(fit.zeta[index])
+    omega, zeta = starts_of(fit)[index]
     share = min(lines.independent for lines in window.parts)
     starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
     apart = np.abs(fit.omega - omega) > zeta * omega + fit.zeta * fit.omega
@@ -611,10 +590,8 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
 
 
 def _local_refusal(window: Window, omega: float, width: float) -> str:
-    fit = window.fit
-    assert fit is not None
     left = total = 0.0
-    for lines, rest in zip(window.parts, fit.left, strict=True):
+    for lines, rest in zip(window.parts, window.fit.left, strict=True):
         near = lines.near(omega, _LOCAL_WIDTHS * width)
         left += float(np.sum(np.abs(rest[near]) ** 2))
         total += float(np.sum(np.abs((lines.weight * lines.response)[near]) ** 2))

@@ -151,10 +151,7 @@ def _solved(triangle: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def fit_modes(
-    parts: Sequence[Lines],
-    starts: Sequence[tuple[float, float]],
-    iterations: int,
-    gain_floor: float,
+    parts: Sequence[Lines], starts: Sequence[tuple[float, float]], iterations: int, gain_floor: float
 ) -> ModalFit:
     """Fit modes to lines: sum over modes of residue s^q / (s² + 2 zeta omega s + omega²), and the background.
 

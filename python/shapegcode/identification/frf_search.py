@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.frf_model import Lines, ModalFit, fit_modes, mode_columns, modelled
-from shapegcode.identification.model_search import Starts
-from shapegcode.identification.plscf import Pole, band_poles
+from shapegcode.identification.problem import Starts
 from shapegcode.io.frequency_response import ComplexArray
 from shapegcode.io.record import FloatArray
 
@@ -101,13 +101,11 @@ class Window:
     low: float  # rad/s, of the modes that count
     high: float
     parts: tuple[Lines, ...]  # lines beyond both ends too, without what modes further off do there
-    fit: ModalFit | None
+    fit: ModalFit
 
     def inside(self) -> list[int]:
         """Modes that count."""
-        return (
-            [] if self.fit is None else [i for i, omega in enumerate(self.fit.omega) if self.low <= omega < self.high]
-        )
+        return [i for i, omega in enumerate(self.fit.omega) if self.low <= omega < self.high]
 
 
 def search(
@@ -120,7 +118,8 @@ def search(
         starts = [(each.omega, each.zeta) for each in candidates if each.share >= STABLE]
         spare = [(each.omega, each.zeta) for each in candidates if each.share < STABLE]
     known = _linear(parts, starts)
-    windows, begin = [], low
+    windows: list[Window] = []
+    begin = low
     while begin < high:
         end = _upper_end(parts, begin / _MARGIN, _CORE * _MARGIN**2, high * _MARGIN) / _MARGIN
         if end * np.sqrt(_CORE) > high:
@@ -134,7 +133,7 @@ def search(
         far = [index for index in range(len(starts)) if index not in near]
         rest = [_without(lines, [starts[i] for i in far], known[row, far]) for row, lines in enumerate(parts)]
         tried = [each for each in spare if first < each[0] < last]
-        windows.append(_fit_window(rest, [starts[i] for i in near], tried, begin, end, most, final))
+        windows += _fit_window(rest, [starts[i] for i in near], tried, begin, end, most, final)
         begin = end
     return windows
 
@@ -150,7 +149,7 @@ def _upper_end(parts: Sequence[Lines], low: float, ratio: float, highest: float)
 
 def modes_of(windows: Sequence[Window]) -> Starts:
     """All modes that count."""
-    return [(float(w.fit.omega[i]), float(w.fit.zeta[i])) for w in windows for i in w.inside() if w.fit is not None]
+    return [starts_of(window.fit)[i] for window in windows for i in window.inside()]
 
 
 def _linear(parts: Sequence[Lines], starts: Starts) -> ComplexArray:
@@ -174,10 +173,7 @@ def _without(lines: Lines, modes: Starts, residues: ComplexArray) -> Lines:
 
 
 def cut(lines: Lines, low: float, high: float, complex_modes: bool, degree: int = _DEGREE) -> Lines:
-    """The lines between two angular frequencies, with a polynomial as background.
-
-    With real modes goes a column for a delay between the channels, which turns them all: `residues_of`.
-    """
+    """The lines between two angular frequencies, with a polynomial and, for real modes, a delay as background."""
     inside = (lines.omega >= low) & (lines.omega <= high)
     place = (lines.omega[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
     powers = place[:, None] ** np.arange(degree + 1)
@@ -198,20 +194,20 @@ def residues_of(fit: ModalFit) -> ComplexArray:
 
 def _fit_window(
     parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, most: int, final: bool
-) -> Window:
-    """The modes of a window by evidence: from those near it, without what explains nothing, with what is left."""
+) -> list[Window]:
+    """A window with its modes by evidence, begun from those near it; none where there are too few lines or no mode."""
     found: list[tuple[float, Window]] = []
     for complex_modes in (True, False) if final else (True,):
         wide = tuple(cut(lines, low / _MARGIN, high * _MARGIN, complex_modes) for lines in parts)
         if min(len(lines.s) for lines in wide) <= _FEWEST:
-            return Window(low, high, (), None)
+            return []
         room = min(most, min(len(lines.s) for lines in wide) // _LINES_PER_MODE)
         best = _best_of(wide, near, spare, room, final)
         if best is None:
             break
         near, most = starts_of(best), len(best.omega) + len(best.omega) // 2 + _MORE_REAL
         found.append((evidence_of(best, min(lines.independent for lines in wide)), Window(low, high, wide, best)))
-    return min(found, key=lambda each: each[0])[1] if found else Window(low, high, wide, None)
+    return [min(found, key=lambda each: each[0])[1]] if found else []
 
 
 def _best_of(wide: Sequence[Lines], near: Starts, spare: Starts, room: int, final: bool) -> ModalFit | None:
@@ -443,7 +439,6 @@ class Uncertainty:
 def uncertainty_of(window: Window) -> Uncertainty:
     """Covariances with the noise that is left and its correlation between lines."""
     fit, parts = window.fit, window.parts
-    assert fit is not None
     modes = len(fit.omega)
     counts = [jacobian.shape[1] - 2 * modes for jacobian in fit.jacobian]
     rows = [jacobian.shape[0] for jacobian in fit.jacobian]
@@ -484,3 +479,65 @@ def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArra
     count = len(columns) + len(kernel) - 1
     product = np.fft.ifft(np.fft.fft(columns, count, axis=0) * np.fft.fft(kernel, count)[:, None], axis=0)
     return np.asarray(product[len(correlation) - 1 :][: len(columns)], dtype=np.complex128)
+
+
+# --- poles by poly-reference least squares in the frequency domain (pLSCF), band by band -----------------------------
+
+_CIRCLE = 0.85  # share of the unit circle that a band is laid on
+_LINES_PER_ORDER = 4
+_MAX_ORDER = 24
+_MIN_ORDER = 2
+_MOST_POLE_DAMPING = 0.3
+
+
+@dataclass(frozen=True)
+class Pole:
+    """A pole of a model of some order in some band."""
+
+    omega: float  # rad/s
+    zeta: float
+    order: int
+
+
+def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:
+    """Poles between two angular frequencies, of models of growing order, ascending.
+
+    Source: P. Guillaume et al., A poly-reference implementation of the least-squares complex frequency-domain
+    estimator, IMAC 21, 2003.
+    """
+    chosen = [(lines, (lines.omega >= low) & (lines.omega <= high)) for lines in parts]
+    fewest = min(int(np.count_nonzero(inside)) for _, inside in chosen)
+    most = min(_MAX_ORDER, fewest // _LINES_PER_ORDER)
+    if most < _MIN_ORDER:
+        return []
+    width = 2.0 * np.pi * _CIRCLE / (high - low)
+    sides: list[tuple[ComplexArray, ComplexArray, ComplexArray]] = []
+    for lines, inside in chosen:
+        z = np.exp(-width * (lines.s[inside] - 1j * low))
+        weight = lines.weight[inside]
+        response = lines.response[inside]
+        numerator = np.asarray(weight[:, None] * z[:, None] ** np.arange(most + 1), dtype=np.complex128)
+        denominator = -response[:, None] * numerator
+        sides.append((numerator.conj().T @ numerator, numerator.conj().T @ denominator,
+                      denominator.conj().T @ denominator))  # fmt: skip
+    found = []
+    for order in range(_MIN_ORDER, most + 1):
+        size = order + 1
+        normal = np.zeros((size, size), dtype=np.complex128)
+        for numerators, mixed, denominators in sides:
+            solved = scipy.linalg.lstsq(numerators[:size, :size], mixed[:size, :size], check_finite=False)[0]
+            normal += denominators[:size, :size] - mixed[:size, :size].conj().T @ solved
+        try:
+            # With the highest coefficient fixed, poles of noise come out unstable.
+            free = np.linalg.solve(normal[:-1, :-1], -normal[:-1, -1])
+        except np.linalg.LinAlgError:
+            continue
+        roots = np.roots(np.append(free, 1.0)[::-1])
+        roots = roots[np.abs(roots) > 0.0]
+        exponent = -np.log(np.abs(roots)) / width - 1j * (np.angle(roots) % (-2.0 * np.pi)) / width
+        for pole in exponent + 1j * low:
+            omega = float(np.abs(pole))
+            zeta = float(-pole.real / omega)
+            if low <= omega <= high and 0.0 < zeta < _MOST_POLE_DAMPING:
+                found.append(Pole(omega, zeta, order))
+    return found

@@ -14,34 +14,17 @@ from threadpoolctl import threadpool_limits
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
-from shapegcode.identification.across import left_by, measured_across, with_moves
+from shapegcode.identification import model_search
+from shapegcode.identification.across import left_by, measured, measured_across, with_moves
 from shapegcode.identification.capture import find_modes_of_captures, is_capture
-from shapegcode.identification.checks import Prepared, RecordUse, prepare
+from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.decay import split_stops
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
-from shapegcode.identification.model_search import (
-    ACCEPTED_PERCENT,
-    MAX_MODES,
-    OPPOSED,
-    TURNED,
-    Doubts,
-    Fit,
-    Search,
-    Sought,
-    estimates_of,
-    evidence_of,
-    judged_modes,
-    rival_of,
-    search,
-    stabilisation_chart,
-    starts_of,
-)
-from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Taps, are_blows, problem_of
+from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Fit, FitProblem, Taps, are_blows, problem_of
 from shapegcode.identification.result import Identification, MassCheck, by_support
 from shapegcode.identification.sweep import find_swept_modes
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse
-from shapegcode.io.read import read_measurement
 from shapegcode.io.record import FloatArray, Quantity, ReadOptions, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.taps import is_klipper, read_sweep
@@ -122,7 +105,7 @@ def identify(
     sources: Sequence[Any] = [source] if isinstance(source, str | Path) else source  # type: ignore[assignment]
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
     window_s = None if options is None else options.exponential_window_s
-    sought = Sought(band_hz, max_modes, modes, accepted_percent, window_s)
+    sought = model_search.Sought(band_hz, max_modes, modes, accepted_percent, window_s)
     if sweep is not None and (machine is None or response is not None):
         raise ArgumentError("a sweep needs the machine whose controller ran it, and files or records")
     if sweep is not None and not isinstance(across, bool):
@@ -142,7 +125,7 @@ def _identified(
     sources: Sequence[Any],
     names: tuple[str, ...],
     options: ReadOptions,
-    sought: Sought,
+    sought: model_search.Sought,
     start_s: float | None,
     sweep: Program | str | Path | None,
     machine: Machine | str | Path | None,
@@ -162,8 +145,9 @@ def _identified(
                 from shapegcode.identification.known_command import find_modes_of_command, known_command
 
                 return find_modes_of_command(known_command(sweep, machine), sources, options, sought, across=across)
-            captures = _captures(sources, options)
-            if captures:
+            # A column that is named as a sensor's makes a capture the record of that sensor.
+            files = [] if options.response_columns else [Path(each) for each in sources if isinstance(each, str | Path)]
+            if captures := [each for each in files if is_capture(each)]:
                 _refuse_of_sensors(captures[0], options, start_s, stops=stops, across=across)
                 if len(captures) < len(sources):
                     raise RecordError(f"{captures[0]}: a capture of command and encoder: other files go apart")
@@ -189,13 +173,6 @@ def _identified(
         return Identification(files=names, prepared=ready, reason=str(error), **told)
 
 
-def _captures(sources: Sequence[Any], options: ReadOptions) -> list[Path]:
-    """Captures of command and encoder; a column that is named as a sensor's makes the file a record of that sensor."""
-    if options.response_columns:
-        return []
-    return [Path(each) for each in sources if isinstance(each, str | Path) and is_capture(Path(each))]
-
-
 def _refuse_of_sensors(
     capture: Path, options: ReadOptions, start_s: float | None, *, stops: bool, across: bool
 ) -> None:
@@ -219,14 +196,11 @@ def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: 
             raise ArgumentError(f"{what}, in which {option} changes nothing: it goes with the record of a tap or decay")
 
 
-def _turned_if_opposed(ready: Prepared, found: Identification, sought: Sought) -> Identification:
-    """What was found; with the sign of the responses turned where all that stands out goes against the push.
-
-    The first moment of the response tells the sign of one mode (`checks`), not that of several.
-    """
-    if found.modes or not any(mode.refusal == OPPOSED for mode in found.refused):
+def _turned_if_opposed(ready: Prepared, found: Identification, sought: model_search.Sought) -> Identification:
+    """What was found; with the sign of the responses turned where all that stands out goes against the push."""
+    if found.modes or not any(mode.refusal == model_search.OPPOSED for mode in found.refused):
         return found
-    text = f"{ready.records[0].source}: {TURNED}"
+    text = f"{ready.records[0].source}: {model_search.TURNED}"
     usable = tuple(
         replace(use, record=replace(use.record, response=-use.record.response), turned=not use.turned)
         for use in ready.usable
@@ -237,14 +211,9 @@ def _turned_if_opposed(ready: Prepared, found: Identification, sought: Sought) -
 
 def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record], list[FrequencyResponse]]:
     """Records over time or frequency responses: either of both is empty."""
-    records: list[Record] = []
-    responses: list[FrequencyResponse] = []
-    for each in sources:
-        for one in [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options):
-            if isinstance(one, Record):
-                records.append(one)
-            else:
-                responses.append(one)
+    found = measured(sources, options)
+    records = [each for each in found if isinstance(each, Record)]
+    responses = [each for each in found if isinstance(each, FrequencyResponse)]
     if responses and records:
         raise RecordError(
             f"{responses[0].source} is a frequency response, {records[0].source} a record over time: identify them "
@@ -267,19 +236,18 @@ def _stops_in(records: Sequence[Record], lowest_hz: float | None) -> list[Record
     return found
 
 
-def _modes_of_stops(records: list[Record], files: tuple[str, ...], sought: Sought) -> Identification:
+def _modes_of_stops(records: list[Record], files: tuple[str, ...], sought: model_search.Sought) -> Identification:
     """Modes of the stops with least motion in them, then of all that these explain."""
     ready = prepare(records, band_hz=None if sought.band_hz is None else sought.band_hz[1])
     first = ready.usable[: max(_FIRST_STOPS, len(ready.usable) // 3)]
     found = find_modes(replace(ready, usable=first), files, sought)
     if not found.modes:
         return found
-    kept = tuple(use for use in ready.usable if left_by(found.modes, use.record) <= _STOP_LEFT)
-    if not kept:
+    moving = [use for use in ready.usable if left_by(found.modes, use.record) > _STOP_LEFT]
+    if len(moving) == len(ready.usable):
         return found
     why = "the modes of the stillest stops do not explain it: something moved"
-    refused = tuple(RecordUse(use.record.source, False, why) for use in ready.usable if use not in kept)
-    return find_modes(replace(ready, usable=kept, refused=(*ready.refused, *refused)), files, sought)
+    return find_modes(ready.without(moving, why), files, sought)
 
 
 def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:
@@ -331,7 +299,7 @@ _FINER = 16  # steps of the check by Wilson's method in a sampling period
 _POSSIBLY = 15.0  # by so much (twice the logarithm of the odds) another course of the force may be less evident
 
 
-def find_modes(ready: Prepared, files: tuple[str, ...], sought: Sought) -> Identification:
+def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sought) -> Identification:
     """Find the modes that checked records of the same point support; see `identify.identify`."""
     problem = problem_of(ready, sought.band_hz, within=sought.modes is not None)
     windowed = sought.exponential_window_s is not None
@@ -345,8 +313,8 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: Sought) -> Ident
         few = None if windowed else _few(ready, problem, many, sought.band_hz is not None)
         if few is None:
             return _many(long, files, many, fitted)
-        sought = replace(sought, max_modes=min(sought.max_modes or MAX_MODES, few + _MORE))
-    models = search(problem, sought)
+        sought = replace(sought, max_modes=min(sought.max_modes or model_search.MAX_MODES, few + _MORE))
+    models = model_search.search(problem, sought)
     sought.order(models)
     others: list[Fit] = []
     if isinstance(problem, Taps) and models.fits:
@@ -376,7 +344,7 @@ def _few(ready: Prepared, problem: Taps, many: FrfModes, narrow: bool) -> int | 
         peaks = problem.peaks_left(quick)
         if not peaks:
             return len(starts) if quick is None else None
-        starts = [*(starts_of(quick) if quick is not None else []), (peaks[0], _START_DAMPING)]
+        starts = [*(model_search.starts_of(quick) if quick is not None else []), (peaks[0], _START_DAMPING)]
     return None if any(mode.refusal == "" for mode in many.modes) else _FEW_MODES
 
 
@@ -384,10 +352,7 @@ def _of_similar_length(ready: Prepared) -> Prepared:
     """The hits whose records are at least half as long as the longest: over frequency all are cut to the shortest."""
     longest = max(len(record.response) for record in ready.records)
     short = [each for each in ready.usable if 2 * len(each.record.response) < longest]
-    why = "shorter than half of the longest record"
-    refused = tuple(RecordUse(each.record.source, False, why) for each in short)
-    usable = tuple(each for each in ready.usable if each not in short)
-    return replace(ready, usable=usable, refused=(*ready.refused, *refused))
+    return ready.without(short, "shorter than half of the longest record")
 
 
 def _many(ready: Prepared, files: tuple[str, ...], many: FrfModes, fitted: Sequence[FloatArray]) -> Identification:
@@ -413,23 +378,21 @@ def _warnings_of(ready: Prepared) -> list[str]:
     return [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
 
 
-def _choose_course(problem: Taps, models: Search, sought: Sought) -> tuple[Taps, Search, list[Fit]]:
-    """The course of the force between its samples for which the data speak, and fits of what else it may have been.
-
-    A recorder with an anti-aliasing filter gives a band-limited force; a simulation may have one that is linear between
-    samples, or single blows. The mass differs by (pi f/rate)^2/3 and more.
-    """
+def _choose_course(
+    problem: Taps, models: model_search.Search, sought: model_search.Sought
+) -> tuple[Taps, model_search.Search, list[Fit]]:
+    """The course of the force between its samples for which the data speak, and fits of what else it may have been."""
     courses = [(problem, models)]
     order = max(sought.order(models), 1)
     for other in problem.other_courses(models.fits[order - 1]):
-        fits = tuple(other.fit(starts_of(fit)) for fit in models.fits[:order])
-        evidence = tuple(evidence_of(other, fit) for fit in fits)
+        fits = tuple(other.fit(model_search.starts_of(fit)) for fit in models.fits[:order])
+        evidence = tuple(model_search.evidence_of(other, fit) for fit in fits)
         # The search is worth its time only where it may win: a wrong course asks for modes of its own.
         may_win = min(evidence) < min(models.evidence)
-        courses.append((other, search(other, sought) if may_win else Search(fits, evidence)))
+        courses.append((other, model_search.search(other, sought) if may_win else model_search.Search(fits, evidence)))
     best = min(courses, key=lambda course: min(course[1].evidence))
     least = min(best[1].evidence)
-    starts = starts_of(best[1].fits[max(sought.order(best[1]), 1) - 1])
+    starts = model_search.starts_of(best[1].fits[max(sought.order(best[1]), 1) - 1])
     # A record that begins within the pulse does not tell half of the momentum from the whole.
     in_pulse = problem.starts_in_pulse and best[0].hold != "impulse"
     possible = [other for other, searched in courses if in_pulse or min(searched.evidence) < least + _POSSIBLY]
@@ -440,10 +403,10 @@ def _choose_course(problem: Taps, models: Search, sought: Sought) -> tuple[Taps,
 def _result(
     ready: Prepared,
     files: tuple[str, ...],
-    problem: Taps | Decays,
-    models: Search,
+    problem: FitProblem,
+    models: model_search.Search,
     others: Sequence[Fit],
-    sought: Sought,
+    sought: model_search.Sought,
 ) -> Identification:
     order = sought.order(models)
     warnings = _warnings_of(ready)
@@ -457,7 +420,7 @@ def _result(
         warnings=tuple(warnings),
         notes=(*ready.notes, *_thinned_note(ready, problem, sought.band_hz)),
         prepared=ready,
-        chart=stabilisation_chart(problem),
+        chart=model_search.chart_of(enumerate(model_search.chart_modes(problem), start=1)),
         fitted=tuple(np.zeros(len(response)) for response in problem.responses),
         fitted_records=_fitted_records(ready, problem),
     )
@@ -466,23 +429,23 @@ def _result(
     fit = models.fits[order - 1]
     coloured = abs(fit.residual_autocorrelation - problem.noise_correlation) * np.sqrt(fit.samples) > _COLOURED
     if coloured:
-        fit = problem.fit(starts_of(fit), coloured=True)
+        fit = problem.fit(model_search.starts_of(fit), coloured=True)
         warnings.append(
             f"what the model leaves is no white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
             "intervals allow for it; other causes than modes, or a mode that is not linear"
         )
     white_share = 1.0 / max(record.widened for record in ready.records) ** 2 if coloured else problem.white_share
-    aliased = _aliased(ready, problem)
     is_whole = isinstance(problem, Decays) or problem.thinned is None
-    doubts = Doubts(
-        limit_percent=sought.accepted_percent or ACCEPTED_PERCENT,
+    doubts = model_search.Doubts(
+        limit_percent=sought.accepted_percent or model_search.ACCEPTED_PERCENT,
         band_hz=sought.band_hz or problem.band_hz,
         record_s=problem.duration_s,
-        rival=rival_of(order, models.fits, problem.white_share),
-        aliased=aliased,
+        rival=model_search.rival_of(order, models.fits, problem.white_share),
+        aliased=_aliased(ready, problem),
+        white_share=white_share,
+        least=(0.0, 0.0) if is_whole else _FILTER_MOVES,
     )
-    least = (0.0, 0.0) if is_whole else _FILTER_MOVES
-    found = judged_modes(estimates_of(fit, _alone(problem, fit), others, aliased, white_share, least), doubts)
+    found = model_search.judged_modes(fit, _alone(problem, fit), others, doubts)
     left = float(np.sqrt(fit.sum_of_squares / squares)) if squares > 0.0 else 1.0
     return replace(
         without,
@@ -499,19 +462,19 @@ def _result(
     )
 
 
-def _fitted_records(ready: Prepared, problem: Taps | Decays) -> tuple[Record, ...]:
+def _fitted_records(ready: Prepared, problem: FitProblem) -> tuple[Record, ...]:
     """The records as they were fitted: thinned out, if they were."""
     if isinstance(problem, Decays) or problem.thinned is None:
         return ready.records
     thinned = problem.thinned
     parts = zip(ready.records, problem.responses, problem.forces, thinned.first_s, strict=True)
     return tuple(
-        replace(record, response=response, force_n=force, period_s=thinned.period_s, start_s=record.start_s + first_s)
-        for record, response, force, first_s in parts
+        replace(each, response=response, force_n=force, period_s=thinned.period_s, start_s=each.start_s + first_s)
+        for each, response, force, first_s in parts
     )
 
 
-def _thinned_note(ready: Prepared, problem: Taps | Decays, band_hz: tuple[float, float] | None) -> list[str]:
+def _thinned_note(ready: Prepared, problem: FitProblem, band_hz: tuple[float, float] | None) -> list[str]:
     thinned = problem.thinned if isinstance(problem, Taps) else None
     if thinned is None:
         return []
@@ -527,12 +490,8 @@ def _thinned_note(ready: Prepared, problem: Taps | Decays, band_hz: tuple[float,
     ]
 
 
-def _aliased(ready: Prepared, problem: Taps | Decays) -> Callable[[float], float]:
-    """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate.
-
-    Its height at half the rate, beyond noise, tells how much: a half sine falls with the square of the frequency, so
-    that two thirds of it fold down from both sides of the rate. A straight force without noise is no recording.
-    """
+def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
+    """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate."""
     if isinstance(problem, Decays):
         return lambda _hz: 0.0
     is_simulated = problem.force_noise_n == 0.0 and problem.hold != "band_limited"
@@ -545,6 +504,7 @@ def _aliased(ready: Prepared, problem: Taps | Decays) -> Callable[[float], float
     share = np.fft.rfftfreq(_SPECTRUM)
     highest = float(np.sqrt(np.mean(spectrum[share > HIGHEST_SHARE] ** 2)))
     noise = (ready.usable[0].force_noise_n or 0.0) * np.sqrt(len(pulse))
+    # A half sine falls with the square of the frequency: two thirds of it fold down from both sides of the rate.
     folded = _FOLDED * np.sqrt(max(highest**2 - 2.0 * noise**2, 0.0))
 
     def at(frequency_hz: float) -> float:
@@ -554,17 +514,17 @@ def _aliased(ready: Prepared, problem: Taps | Decays) -> Callable[[float], float
     return at
 
 
-def _alone(problem: Taps | Decays, fit: Fit) -> list[Fit]:
+def _alone(problem: FitProblem, fit: Fit) -> list[Fit]:
     """The same modes fitted to each record by itself; none if there is but one, or a record does not hold them."""
     if len(problem.responses) < 2:
         return []
     try:
-        return [problem.record(index).fit(starts_of(fit)) for index in range(len(problem.responses))]
+        return [problem.record(index).fit(model_search.starts_of(fit)) for index in range(len(problem.responses))]
     except _core.ArgumentError:
         return []
 
 
-def _mass_check(problem: Taps | Decays, fit: Fit) -> MassCheck | None:
+def _mass_check(problem: FitProblem, fit: Fit) -> MassCheck | None:
     """The equivalent mass by paper 003's way, from the first tap, where the model has one mode."""
     if isinstance(problem, Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
         return None

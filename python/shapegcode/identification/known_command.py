@@ -1,9 +1,7 @@
 """Modes from the record of any accelerometer beside a program whose command is known.
 
-The axis moves as commanded but for a smooth lag of its drive, and the sensor on what it carries shows the command's
-acceleration times 1 - sum of G s²/(s² + 2 zeta omega s + omega²). The logger runs on its own clock: where the program
-begins in the record and how much faster its clock runs is found from the record, part by part of the program. The clock
-is found within the parts: how long the control ramps and waits between them is not known, and is found too.
+But for a smooth lag of the drive the sensor shows the command's acceleration times 1 - sum of G s²/(s² + 2 zeta omega s
++ omega²). Start and clock of the logger, and the waits of the control, are found from the record, part by part.
 """
 
 from __future__ import annotations
@@ -24,7 +22,7 @@ from shapegcode.identification.across import with_moves
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
 from shapegcode.identification.parts import REST_S, Spectra, moving_parts, transforms
-from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, Sweep
+from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, as_sweep
 from shapegcode.identification.sweep_program import commanded
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_records
@@ -69,21 +67,13 @@ _LAGS_S = np.arange(-0.1, 0.1, 2.5e-4)
 
 @dataclass(frozen=True, eq=False)
 class KnownCommand:
-    """What a program commands one axis.
+    """What a program commands one axis."""
 
-    Attributes:
-        source: of the program.
-        axis: "x", "y" or "z": the one that moves.
-        times_s: (n,) instants of the set-points.
-        kicks: (n,) change of speed at each of them, m/s.
-        parts: begin and end of each part between rests, s.
-    """
-
-    source: str
-    axis: str
-    times_s: FloatArray
-    kicks: FloatArray
-    parts: tuple[tuple[float, float], ...]
+    source: str  # of the program
+    axis: str  # "x", "y" or "z": the one that moves
+    times_s: FloatArray  # (n,) instants of the set-points
+    kicks: FloatArray  # (n,) change of speed at each of them, m/s
+    parts: tuple[tuple[float, float], ...]  # begin and end of each part between rests, s
 
     @property
     def period_s(self) -> float:
@@ -128,10 +118,7 @@ def find_modes_of_command(
     *,
     across: bool = False,
 ) -> Identification:
-    """Find the modes in records beside a known command, with `across` what they move of the sensor's other axes too.
-
-    See `identify.identify`.
-    """
+    """Find the modes in records beside a known command, with `across` what they move of the sensor's other axes too."""
     if options.axis not in (None, command.axis):
         raise RecordError(
             f"axis {options.axis.upper()} is asked for, {command.source} moves {command.axis.upper()}: leave the axis "
@@ -141,27 +128,17 @@ def find_modes_of_command(
     aligned = [_aligned(command, source, options, sought.band_hz, across=across) for source in sources]
     ends = [[each.response.frequency_hz[end] for each in aligned] for end in (0, -1)]
     responses = [_between(each.response, max(ends[0]), min(ends[1])) for each in aligned]
-    names = tuple(_name(each) for each in sources)
+    names = tuple(each.source if isinstance(each, Record) else str(each) for each in sources)
     found = find_frf_modes(responses, names, replace(sought, phase_known=False))
-    first, lines = aligned[0], responses[0].frequency_hz
+    first, lines = aligned[0].record, responses[0].frequency_hz
     if across:
         others = [_between(one, max(ends[0]), min(ends[1])) for each in aligned for one in each.others]
         found = with_moves(found, others)
     found = replace(found, modes=tuple(_by_clock(each) for each in found.modes))
     rate = min(1.0 / each.record.period_s for each in aligned)
     looked = f"looked at from {lines[0]:.0f} to {lines[-1]:.0f} Hz; {rate:.0f} samples per second reach "
-    looked += f"{rate / _OVER_HALF:.0f} Hz"
-    return replace(
-        found,
-        notes=(*(note for each in aligned for note in each.notes), looked, *found.notes),
-        responses=(),
-        fitted_lines=(),
-        noise_rms=None,
-        sweep=Sweep(
-            first.record.source, command.axis, len(first.record.response), first.record.period_s, lines,
-            np.abs(responses[0].response), np.abs(found.fitted_lines[0]), command=command.source,
-        ),
-    )  # fmt: skip
+    notes = (*(note for each in aligned for note in each.notes), f"{looked}{rate / _OVER_HALF:.0f} Hz")
+    return as_sweep(found, notes, first.source, len(first.response), first.period_s, command.source)
 
 
 def _by_clock(mode: IdentifiedMode) -> IdentifiedMode:
@@ -169,10 +146,6 @@ def _by_clock(mode: IdentifiedMode) -> IdentifiedMode:
     known, own = mode.frequency_hz, _CLOCK_KNOWN * mode.frequency_hz.value
     below, above = (float(np.hypot(each, own)) for each in (known.value - known.low, known.high - known.value))
     return replace(mode, frequency_hz=Estimate(known.value, known.value - below, known.value + above))
-
-
-def _name(source: str | Path | Record) -> str:
-    return source.source if isinstance(source, Record) else str(source)
 
 
 def _between(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
@@ -218,10 +191,7 @@ def _held_at_ends(values: FloatArray) -> bool:
 
 
 class _Clock:
-    """A record and where the program is in it.
-
-    About the middle of each part, program time = middle + (logger's time - the part's place) * (1 + rate).
-    """
+    """A record; about the middle of each part, program time = middle + (logger's time - its place) * (1 + rate)."""
 
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
@@ -262,10 +232,7 @@ class _Clock:
         self.correlation = float(np.mean(self.shares))
 
     def _coarse(self) -> tuple[float, float, float, FloatArray]:
-        """Rate, start, wait, and squared correlation of each part, by what lies below 40 Hz and 40 % of the sampling.
-
-        The wait is what a part and the rest behind it last longer than simulated: ramps and waits of the control.
-        """
+        """Rate, start, wait, squared correlation of each part, by what lies below 40 Hz and 40 % of the sampling."""
         command, period = self.command, self.record.period_s
         thinner = max(1, int(0.4 / period / _COARSE_HZ))
         values = resample_poly(self.values, 1, thinner)
@@ -407,16 +374,17 @@ class _Clock:
         return rows
 
     def _whole(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-        """Those of the parts of which the other one of their two is there as well.
-
-        Of a part alone the ringing is cut off, or that of the part before is in it: both look like modes.
-        """
+        """Those of the parts of which the other of their two is there: else ringing is cut off, or another's."""
         alone = len(self.windows) - 1 if len(self.windows) % 2 else -1
         return self._recorded(rows[np.isin(rows ^ 1, rows) | (rows == alone)], 1)
 
     def _recorded(self, rows: npt.NDArray[np.intp], fewest: int) -> npt.NDArray[np.intp]:
-        """Those of the parts that the record holds until they rang down."""
-        inside = np.array([row for row in rows.tolist() if self._is_recorded(row)], dtype=np.intp)
+        """Those of the parts that the record holds from their begin until they rang down, or the next one begins."""
+        begins, ends = np.array(self.windows).T
+        until = np.minimum(ends, np.array(self.command.parts)[:, 1] + _RINGS_S)
+        first, last = (self.places_s + (each - self.middles) / (1.0 + self.rate) for each in (begins, until))
+        held = (first >= 0.0) & (last <= len(self.values) * self.record.period_s)
+        inside = np.intersect1d(rows, np.flatnonzero(held))
         if len(inside) < fewest:
             raise RecordError(
                 f"{self.record.source}: no two parts of {self.command.source} (1 and 2, 3 and 4, ...) are both in the "
@@ -424,14 +392,6 @@ class _Clock:
                 "such pair, a rise and fall of a sweep"
             )
         return inside
-
-    def _is_recorded(self, row: int) -> bool:
-        """Whether the record holds a part from its begin until it rang down, or the next one begins."""
-        begin, end = self.windows[row]
-        until = min(end, self.command.parts[row][1] + _RINGS_S)
-        place, middle, stretch = float(self.places_s[row]), float(self.middles[row]), 1.0 + self.rate
-        lasts_s = len(self.values) * self.record.period_s
-        return place + (begin - middle) / stretch >= 0.0 and place + (until - middle) / stretch <= lasts_s
 
     def _no_relation(self, found: str) -> str:
         axis = self.command.axis.upper()
@@ -442,11 +402,7 @@ class _Clock:
         )
 
     def _refine(self, rows: npt.NDArray[np.intp], furthest: float) -> None:
-        """The rate for which each part agrees best with the next one, wherever that begins, and the wait between them.
-
-        A rise and the fall behind it pass a frequency at two instants: their own distance is left free, since it
-        rests on ramps and waits of the control.
-        """
+        """Find the rate for which each part agrees best with the next, wherever that begins, and the wait between."""
         band_hz = _LOWEST_HZ, _CLOCK_HZ
 
         def shares(rate: float) -> Spectra:
@@ -538,11 +494,7 @@ def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.
 
 
 def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
-    """By how much the response of each part is later than the others say, s.
-
-    A rise outweighs the harmonics of the other parts in the band of its fall, and tells what is between the two; so the
-    median of that goes to all parts first. Then both are moved together, since each would hold the other where it is.
-    """
+    """By how much the response of each part is later than the others say, s."""
     power = np.abs(spectra.command) ** 2
     own = power > _OWN * np.max(power, axis=1, keepdims=True)
     each = [np.array([part]) for part in range(len(rows))]
@@ -555,6 +507,8 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
         return lags
 
     lags = moved(np.zeros(len(rows)), each, _LONGEST_LAG_S)
+    # A rise outweighs the harmonics of the other parts in the band of its fall, and tells what is between the two; the
+    # median of that goes to all parts first. Then both are moved together: each would hold the other where it is.
     between = [lags[pair[1]] - lags[pair[0]] for pair in pairs if len(pair) > 1]
     lags = np.asarray((float(np.median(between)) if between else 0.0) * (rows - np.mean(rows)), dtype=np.float64)
     lags = moved(lags, each, _IRREGULAR_S)

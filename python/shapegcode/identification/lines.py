@@ -25,10 +25,7 @@ _MOST_STEADY = 12
 
 
 def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, list[float]]:
-    """What oscillates with the same amplitude throughout a record (mains hum, a pump, a spindle), and its frequencies.
-
-    Looked for in two halves of the late part: what decays is smaller in the second.
-    """
+    """What oscillates with the same amplitude in both halves of the late part (hum, a pump), and its frequencies."""
     samples = len(response)
     half = int(samples * (1.0 - _LATE)) // 2
     first, second = response[samples - 2 * half : samples - half], response[samples - half :]
@@ -85,10 +82,9 @@ class Hits:
 def hits_of(
     usable: Sequence[Usable], responses: Sequence[FloatArray], low_hz: float, high_hz: float, applied_s: float | None
 ) -> Hits:
-    """Lines of all hits, each from the beginning of its pulse, with these responses.
+    """Lines of all hits, each from its pulse on; `applied_s`: time constant of a window that the responses have.
 
-    Behind the window exp(-t/tau) a system at rest answers at jw + 1/tau as it did at jw: no damping is added, and what
-    the record cuts off is a hundredth of what it was. `applied_s`: time constant of a window that the responses have.
+    Behind the window exp(-t/tau) a system at rest answers at jw + 1/tau as it did at jw: no damping is added.
     """
     period = usable[0].record.period_s
     starts = [max(0, each.hit.first - _LEAD) if each.hit else 0 for each in usable]

@@ -1,8 +1,4 @@
-"""How many modes the data hold, by models of growing order, and whether they support each: values, intervals, refusals.
-
-A search knows nothing of taps or decays: a `FitProblem` fits a number of modes to its records, or quickly (without what
-only the last digits need) to them or to what is left of them.
-"""
+"""How many modes the data hold, by models of growing order, and whether they support each: intervals, refusals."""
 
 from __future__ import annotations
 
@@ -10,24 +6,20 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 from scipy import stats
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
+from shapegcode.identification.problem import MIN_SWINGS, Fit, FitProblem, Starts
 from shapegcode.identification.result import ChartPole, Estimate, IdentifiedMode
 from shapegcode.io.record import FloatArray
-
-Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 
 # A further mode must explain this share of the response's energy: sensors are not linear beyond .1 % of amplitude.
 _MIN_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
 MAX_MODES = 8  # of a model, unless asked otherwise
-PEAKS = 2  # of the residual's spectrum that are tried
 _TWINS = 0.25  # of the half width of a resonance
 _STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of the chart: the model one order lower has the pole too
 _APART = np.pi  # rad: two modes must come half a turn apart in the record
@@ -36,37 +28,6 @@ _SAME_PLACE = 0.2  # of the half width of a resonance: two poles of the chart ar
 _SAME_DAMPING = 0.2  # and in the logarithm of their damping
 _MAX_DAMPING = 0.7  # of a pole to begin with
 _PATIENCE = 2  # Two models in a row that the data do not ask for end the search: one may only have missed its place
-
-
-Fit = _core.ModalFit | _core.DecayFit
-
-
-class FitProblem(Protocol):
-    """Records of one point over time."""
-
-    # ruff: noqa: D102
-    @property
-    def squares(self) -> float: ...
-    @property
-    def samples(self) -> int: ...
-    @property
-    def constants(self) -> int: ...
-    @property
-    def duration_s(self) -> float: ...
-    @property
-    def period_s(self) -> float: ...
-    @property
-    def band_hz(self) -> tuple[float, float]: ...
-    @property
-    def white_share(self) -> float: ...
-    @property
-    def chart_orders(self) -> int: ...
-    def fit(self, starts: Starts) -> Fit: ...
-    def fit_quickly(self, starts: Starts) -> Fit: ...
-    def fit_left(self, starts: Starts, last: Fit | None) -> Fit: ...
-    def peaks_left(self, last: Fit | None) -> Sequence[float]: ...
-    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]: ...
-    def rank(self, candidates: Starts, kept: int) -> Sequence[int]: ...
 
 
 @dataclass(frozen=True)
@@ -133,16 +94,11 @@ def evidence_of(problem: FitProblem, fit: Fit | None) -> float:
     return float(samples * np.log(max(squares / samples, tiny)) + (parameters + modes) * np.log(samples))
 
 
-def _chart_modes(problem: FitProblem) -> Iterator[Starts]:
+def chart_modes(problem: FitProblem) -> Iterator[Starts]:
     """Modes of the models of a stabilisation chart, by number of modes from 1."""
     for poles in problem.poles(max(1, min(_CHART_ORDERS, problem.chart_orders))):
         omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
         yield list(zip(map(float, omega), map(float, zeta), strict=True))
-
-
-def stabilisation_chart(problem: FitProblem) -> tuple[ChartPole, ...]:
-    """Poles of models with 1, 2, ... modes, each held against the model one order lower."""
-    return chart_of(enumerate(_chart_modes(problem), start=1))
 
 
 def chart_of(models: Iterable[tuple[int, Starts]]) -> tuple[ChartPole, ...]:
@@ -163,7 +119,7 @@ def _pool(problem: FitProblem) -> Starts:
     """Poles of the stabilisation chart that lie in the band, each mode once, as the models of higher order have it."""
     low, high = problem.band_hz
     kept: Starts = []
-    for w, z in reversed([mode for modes in _chart_modes(problem) for mode in modes]):
+    for w, z in reversed([mode for modes in chart_modes(problem) for mode in modes]):
         inside = z < _MAX_DAMPING and low <= w / (2.0 * np.pi) <= high
         if inside and not any(
             abs(w - v) < _SAME_PLACE * min(z, y) * w and abs(np.log(z / y)) < _SAME_DAMPING for v, y in kept
@@ -196,10 +152,7 @@ def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None
 
 
 def _has_twins(fit: Fit, record_s: float) -> bool:
-    """Whether two modes lie within a fraction of their width, or of what the record tells apart.
-
-    That is one mode, drawn twice to mend what is no mode: drift, hum, a delay between the channels.
-    """
+    """Whether two modes are one, drawn twice to make up for what is no mode: drift, hum, a delay between channels."""
     modes = sorted(starts_of(fit))
     return any(w2 - w1 < max(_TWINS * w1 * max(z1, z2), _APART / record_s) for (w1, z1), (w2, z2) in pairwise(modes))
 
@@ -223,7 +176,6 @@ ACCEPTED_PERCENT = 5.0
 _FREQUENCY_PERCENT = 2.0
 _NOT_AT_ALL_PERCENT = 1000.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
-MIN_SWINGS = 2.0  # Swings of a mode in the record: fewer do not tell its frequency
 #: What has not fallen to this share at the end of the record does not decay: mains hum, a pump, a turning spindle.
 LASTING = 0.8
 #: A model with one mode more counts as a rival while it fits better by more than chance alone does in one case of 20.
@@ -244,33 +196,25 @@ class Doubts:
     limit_percent: float  # least certainty of damping ratio and stiffness
     band_hz: tuple[float, float]  # frequencies that were searched
     record_s: float  # length of the longest record
-    rival: Fit | None = None  # another model of nearly the same evidence
-    aliased: Callable[[float], float] = lambda _hz: 0.0  # see `estimates_of`
+    rival: Fit | None  # another model of nearly the same evidence
+    aliased: Callable[[float], float]  # share of the force at a frequency that may be folded down
+    white_share: float  # of the samples, how many are independent
+    least: tuple[float, float]  # half intervals of ln f and ln zeta that nothing falls below
 
 
-def estimates_of(
-    fit: Fit,
-    alone: Sequence[Fit],
-    others: Sequence[Fit] = (),
-    aliased: Callable[[float], float] = lambda _hz: 0.0,
-    white_share: float = 1.0,
-    least: tuple[float, float] = (0.0, 0.0),
-) -> list[IdentifiedMode]:
-    """Values and 95 % intervals of each mode of a fit; one that moves against the push has that as its refusal.
-
-    The intervals are those of the fit's covariance, in logarithms. Where taps differ by more than that explains, their
-    scatter takes its place. What the force does between its samples is not known to the covariance: the intervals
-    reach as far as those of the other courses that the data allow, and by what may have been folded into its spectrum.
-    """
+def _estimates(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Doubts) -> list[IdentifiedMode]:
+    """Values and 95 % intervals of each mode of a fit; one that moves against the push has that as its refusal."""
+    white_share = doubts.white_share
     freedom = max(white_share * fit.samples - fit.parameters, 1.0)
     quantile = float(stats.t.ppf(0.975, freedom)) / np.sqrt(white_share)
     rows = [_logarithms(fit, mode) for mode in range(len(fit.omega_rad_s))]
     found = []
     for mode, row in enumerate(rows):
         spread = _half_widths(row, quantile)
-        spread[:2] = np.hypot(spread[:2], least)
+        spread[:2] = np.hypot(spread[:2], doubts.least)
         if len(row.values) > 2:
-            spread[2:] = np.hypot(spread[2:], aliased(float(np.exp(row.values[0]))))
+            spread[2:] = np.hypot(spread[2:], doubts.aliased(float(np.exp(row.values[0]))))
+        # What the force does between its samples is not known to the covariance.
         for other in others:
             apart = _logarithms(other, mode)
             spread = np.maximum(spread, np.abs(apart.values - row.values) + _half_widths(apart, quantile))
@@ -281,10 +225,7 @@ def estimates_of(
 
 
 def mode_estimates(values: FloatArray, spread: FloatArray, refusal: str = "") -> IdentifiedMode:
-    """A mode from logarithms of frequency (Hz), damping ratio, mass, viscous damping and stiffness, or the first two.
-
-    `spread`: half of their 95 % intervals.
-    """
+    """A mode from logarithms of f (Hz), damping ratio, m, c, k, or the first two, and half of their 95 % intervals."""
     estimates = [
         Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
         for value, half in zip(np.exp(values), np.minimum(spread, _UNKNOWN), strict=True)
@@ -310,16 +251,12 @@ class _Logarithms:
 def _logarithms(fit: Fit, mode: int) -> _Logarithms:
     omega, zeta = float(fit.omega_rad_s[mode]), float(fit.damping_ratio[mode])
     values = [np.log(omega / (2.0 * np.pi)), np.log(zeta)]
+    residue, scale, change = 1.0, np.array([1.0 / omega, 1.0 / zeta]), np.eye(2)
     if not isinstance(fit, _core.DecayFit):
-        residue = float(fit.inverse_mass[mode])
-        scale = np.array([1.0 / omega, 1.0 / zeta, 1.0 / residue])
-        change = LOGARITHMS
+        residue, change = float(fit.inverse_mass[mode]), LOGARITHMS
+        scale = np.append(scale, 1.0 / residue)
         mass = -np.log(abs(residue))
         values += [mass, np.log(2.0 * zeta * omega) + mass, 2.0 * np.log(omega) + mass]
-    else:
-        residue = 1.0
-        scale = np.array([1.0 / omega, 1.0 / zeta])
-        change = np.eye(2)
     size = len(scale)
     block = fit.covariance[size * mode : size * (mode + 1), size * mode : size * (mode + 1)]
     covariance = change @ (block * np.outer(scale, scale)) @ change.T
@@ -355,12 +292,12 @@ def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
     return larger if gain > by_chance else None
 
 
-def judged_modes(modes: Sequence[IdentifiedMode], doubts: Doubts) -> list[IdentifiedMode]:
+def judged_modes(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Doubts) -> list[IdentifiedMode]:
     """The modes by ascending frequency, each with its refusal if any, without drift and what lies outside the band."""
     low, high = doubts.band_hz
     found = [
         replace(mode, refusal=_refusal_of(mode, doubts))
-        for mode in modes
+        for mode in _estimates(fit, alone, others, doubts)
         if mode.damping_ratio.value <= _NO_VIBRATION and low <= mode.frequency_hz.value <= high
     ]
     return sorted(found, key=lambda mode: mode.frequency_hz.value)
@@ -386,14 +323,10 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
     # A rival that splits the mode in two or lacks it disagrees as much as one can.
     rows = [_logarithms(doubts.rival, i) for i in range(len(doubts.rival.omega_rad_s))]
     nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(frequency.value)))
-    for name, estimate, index in (
-        ("frequency", frequency, 0),
-        ("damping ratio", damping, 1),
-        ("stiffness", stiffness, 4),
-    ):
-        change = 0.0
-        if estimate is not None:
-            change = 100.0 * abs(float(np.expm1(nearest.values[index] - np.log(estimate.value))))
+    compared = ("frequency", frequency, 0), ("damping ratio", damping, 1), ("stiffness", stiffness, 4)
+    for name, estimate, index in compared:
+        moved = 0.0 if estimate is None else nearest.values[index] - np.log(estimate.value)
+        change = 100.0 * abs(float(np.expm1(moved)))
         if change > doubts.limit_percent:
             return (
                 f"{name} would change by {change:.0f} % with one mode more in the model, which the data cannot decide "

@@ -5,18 +5,11 @@ from __future__ import annotations
 import math
 import textwrap
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.identification.checks import (
-    DOUBLE_HIT,
-    EXCITED_HALF_SINE,
-    FOLDING,
-    MIN_FORCE,
-    MIN_LEAD,
-    MIN_PERIODS,
-    MIN_PULSE,
-)
+from shapegcode.identification import checks
 from shapegcode.machine import Machine
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
@@ -27,44 +20,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AxisRecording:
-    """How to record the modes of an axis.
+    """How to record the modes of an axis."""
 
-    Attributes:
-        axis: "X", "Y", "Z", or all of them.
-        modes_hz: those known, ascending; empty: the usual range is taken.
-        highest_hz: modes are looked for up to here.
-        samples_per_s: sampling rate.
-        duration_s: of one tap, from the trigger on.
-        pre_trigger_s: before it.
-        pulse_s: longest pulse of the force that still excites the highest frequency.
-        tip: of the hammer.
-    """
-
-    axis: str
-    modes_hz: tuple[float, ...]
-    highest_hz: float
-    samples_per_s: float
-    duration_s: float
-    pre_trigger_s: float
-    pulse_s: float
-    tip: str
+    axis: str  # "X", "Y", "Z", or all of them
+    modes_hz: tuple[float, ...]  # those known, ascending; empty: the usual range is taken
+    highest_hz: float  # modes are looked for up to here
+    samples_per_s: float  # sampling rate
+    duration_s: float  # of one tap, from the trigger on
+    pre_trigger_s: float  # before it
+    pulse_s: float  # longest pulse of the force that still excites the highest frequency
+    tip: str  # of the hammer
 
 
 @dataclass(frozen=True)
 class RapidStop:
-    """How to let an axis decay without a hammer.
+    """How to let an axis decay without a hammer."""
 
-    Attributes:
-        axis: "X", "Y" or "Z".
-        distance_mm: of each rapid.
-        dwell_s: rest after each, in which the decay is recorded.
-        program: that does it, in FANUC's dialect.
-    """
-
-    axis: str
-    distance_mm: float
-    dwell_s: float
-    program: str
+    axis: str  # "X", "Y" or "Z"
+    distance_mm: float  # of each rapid
+    dwell_s: float  # rest after each, in which the decay is recorded
+    program: str  # that does it, in FANUC's dialect
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -104,9 +79,7 @@ class TapPlan(Result):
         """How to record each axis."""
         columns = (
             Column("axis", text=True),
-            Column(
-                "modes known", "Hz", lambda row: ", ".join(f"{each:g}" for each in row.modes_hz) or "none", text=True
-            ),
+            Column("modes known", "Hz", lambda row: ", ".join(map("{:g}".format, row.modes_hz)) or "none", text=True),
             Column("look up to", "Hz", "highest_hz", digits=0),
             Column("samples/s", value="samples_per_s", digits=0),
             Column("record", "s", lambda row: f"{row.duration_s:g}"),
@@ -141,7 +114,6 @@ _AXES = ("X", "Y", "Z")
 _STOPS = 5
 _LONG_STOP_S = 2.0
 _WIDTH = 80
-_EXAMPLE_ROWS = ((0, "0.02", "-0.004"), (1, "0.01", "0.003"), (2, "35.6", "0.412"), (3, "118.3", "1.378"))
 
 
 def _round_up(value: float) -> float:
@@ -153,9 +125,9 @@ def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisReco
     """How to record."""
     known = modes or tuple((frequency, _USUAL_DAMPING) for frequency in _USUAL_HZ)
     highest = max(_LOOK_LEAST_HZ, _LOOK_ABOVE * max(frequency for frequency, _ in known))
-    pulse = EXCITED_HALF_SINE / highest
+    pulse = checks.EXCITED_HALF_SINE / highest
     limit, tip = next((limit, name) for limit, name in _TIPS if highest <= limit)
-    shortest = EXCITED_HALF_SINE / (limit if math.isfinite(limit) else highest)
+    shortest = checks.EXCITED_HALF_SINE / (limit if math.isfinite(limit) else highest)
     rate = _round_up(_PULSE_SAMPLES / shortest)
     fallen = max(math.log(1.0 / _FALLEN_TO) / (2.0 * math.pi * f * (z or _USUAL_DAMPING)) for f, z in known)
     duration = _round_up(max(fallen, _PERIODS / min(f for f, _ in known)))
@@ -178,9 +150,8 @@ def rapid_stop_program(axis: str, distance_mm: float, dwell_s: float) -> str:
     number = 7201 + _AXES.index(axis)
     there, back = (f"{sign * distance_mm:.3f}".rstrip("0") for sign in (1.0, -1.0))
     lines = ["%", f"O{number}(RAPID STOP {axis})", "(INCREMENTAL, AIR ONLY, ENDS WHERE IT BEGAN)", "G21 G91 G94"]
-    for _ in range(_STOPS):
-        lines += [f"G00 {axis}{there}", f"G04 P{round(1000.0 * dwell_s)}", f"G00 {axis}{back}"]
-        lines += [f"G04 P{round(1000.0 * dwell_s)}"]
+    dwell = f"G04 P{round(1000.0 * dwell_s)}"
+    lines += [f"G00 {axis}{there}", dwell, f"G00 {axis}{back}", dwell] * _STOPS
     return "\n".join([*lines, "G90", "M30", "%"]) + "\n"
 
 
@@ -194,109 +165,24 @@ def _stop_distance_mm(machine: Machine | None, index: int) -> float:
     return max(10.0, 10.0 * math.ceil(2.0 * rate * seconds / 10.0))
 
 
-def _bullets(*texts: str) -> list[str]:
-    """Each text as a paragraph of its own, with a star."""
-    style = textwrap.TextWrapper(_WIDTH, initial_indent="* ", subsequent_indent="  ", break_on_hyphens=False)
-    return [line for text in texts for line in style.wrap(text)]
-
-
-_MACHINE_PART = [
-    "1. THE MACHINE",
-    *_bullets(
-        "Warm, drives on, axes held in position by the controller (handle or MDI mode), spindle stopped, doors as "
-        "the safety rules say. Not with the emergency stop pressed: the drives are then off and the modes "
-        "are others.",
-        "Axis in the middle of its travel, the workpiece or one of its weight clamped on. Then again at both ends "
-        "and without a workpiece: the spread goes into frequency_over or frequency_uncertainty_percent.",
-        "Nothing else may shake it: pumps, fans and chip conveyor off where the machine allows.",
-    ),
-]
-_RECORDING_PART = [
-    "3. RECORDING",
-    *_bullets(
-        "Both channels at once, at the same rate, with the same anti-aliasing filters. Rate, length and "
-        f"pre-trigger: see the table. The pulse should have {_PULSE_SAMPLES} samples, never fewer than "
-        f"{MIN_PULSE}.",
-        "Trigger on the force. The pre-trigger tells noise and offset: it must be quiet.",
-        "Input ranges so that the largest value is at 30 to 70 % of the range. Look at every tap.",
-        f"{_TAPS} good taps per axis, at least 3: they are averaged, and the coherence shows where they agree. One "
-        "long recording with several taps is divided by itself; let the machine come to rest between them, a "
-        "second or more.",
-        "No window and no filter in the recorder. The force is set to 0 outside its pulse when it is read; an "
-        "exponential window on the response would be taken for damping.",
-    ),
-]
-_REFUSAL_PART = [
-    "6. WHAT IS REFUSED",
-    *_bullets(
-        "Overload: force or response cut off at its largest value.",
-        f"Double hit: a second pulse above {100 * DOUBLE_HIT:g} % of the first.",
-        f"No force, or less than {MIN_FORCE:g} times its noise.",
-        f"A record of fewer than {MIN_PERIODS:g} periods whose response has not decayed.",
-        f"Sampling too slow: the strongest vibration above {100 * FOLDING:g} % of half the rate.",
-        "A record that begins inside the pulse; gaps and repeats in the time; cells that are no numbers; frequency "
-        "responses without their time records.",
-    ),
-    *textwrap.wrap(
-        f"There are warnings for a pulse of fewer than {MIN_PULSE} samples, fewer than {MIN_LEAD} samples "
-        "before the hit, a tip too soft for the mode, and a machine that was not at rest.",
-        _WIDTH,
-    ),
-]
-
-
-def _sensor_part(how: AxisRecording) -> list[str]:
-    return [
-        "2. SENSOR AND HAMMER, FOR EACH AXIS",
-        *_bullets(
-            "Sensor (accelerometer) screwed, waxed or on a magnet, on what the axis moves: X and Y on the table or the "
-            "workpiece, Z on the spindle head; where the head or the column moves instead, there. Its arrow "
-            "along the axis.",
-            "Tap the same body right beside the sensor, or on the face opposite, along the axis. Mass and stiffness "
-            "are those at this point: it should be where the tool cuts, or as near as can be. The tool tip is a test "
-            "of its own, with a small hammer, a light sensor and some 20 times the sampling rate.",
-            f"Hammer of 0.5 to 1.5 kg for a machine, 0.1 kg for a tool. Tip: {how.tip} (up to {how.highest_hz:g} Hz). "
-            "The softest tip that reaches the highest frequency gives the most force to the low modes.",
-            "Short and square, then let the hammer bounce back. A tip that touches twice spoils the tap.",
-        ),
-    ]
-
-
-def _stop_part(stops: tuple[RapidStop, ...]) -> list[str]:
-    return [
-        "4. WITHOUT A HAMMER: DECAY AFTER A RAPID STOP",
-        *_bullets(
-            "Gives frequencies and damping only; mass and stiffness need the force.",
-            f"Sensor as above. This program stops X {2 * _STOPS} times. There must be room for the distance, in the "
-            "air, nothing near the tool. Record all of it, or each stop from the end of the motion on:",
-        ),
-        "",
-        *("    " + line for line in stops[0].program.splitlines()),
-        "",
-        *(
+def _instructions(about: str, recordings: tuple[AxisRecording, ...], stops: tuple[RapidStop, ...]) -> str:
+    """The text for the operator, in lines of 80 characters."""
+    text = (resources.files("shapegcode") / "data" / "tap_plan.txt").read_text(encoding="utf-8").format(
+        highest=max(recordings, key=lambda how: how.highest_hz), pulse_samples=_PULSE_SAMPLES, taps=_TAPS,
+        checks=checks, stop_count=2 * _STOPS, program=textwrap.indent(stops[0].program.rstrip("\n"), "    "),
+        others="\n".join(
             f"    {stop.axis}: the same with {stop.axis} and {stop.distance_mm:g} mm, O{7201 + index}"
             for index, stop in enumerate(stops[1:], start=1)
         ),
-        "",
-        *_bullets("Where the decay begins is found by itself; --start says it."),
-    ]
-
-
-def _file_part(how: AxisRecording) -> list[str]:
-    return [
-        "5. THE FILE",
-        *_bullets(
-            "CSV (comma, semicolon, tab or blanks; decimal point or comma), UFF dataset 58, or WAV. A header names the "
-            "columns, with their units; the time is evenly spaced:"
-        ),
-        "",
-        "    time_s,force_N,acc_x_m/s^2",
-        *(f"    {row / how.samples_per_s:.6g},{force},{response}" for row, force, response in _EXAMPLE_ROWS),
-        "    ...",
-        "",
-        *_bullets("One file per tap, or several taps in one. For each axis:"),
-        "    shapegcode identify x1.csv x2.csv x3.csv --axis x --update mine.toml",
-    ]
+        times=[row / recordings[0].samples_per_s for row in range(4)], double_hit=100 * checks.DOUBLE_HIT,
+        folding=100 * checks.FOLDING,
+    )  # fmt: skip
+    lines: list[str] = []
+    for line in f"{about}\n\n{text}".splitlines():
+        bullet = line.startswith("* ")
+        wrapped = textwrap.wrap(line, _WIDTH, subsequent_indent="  " if bullet else "", break_on_hyphens=not bullet)
+        lines += [line] if line.startswith("    ") else wrapped or [""]
+    return "\n".join(lines)
 
 
 def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
@@ -332,14 +218,5 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
         RapidStop(axis, way, dwell_s, rapid_stop_program(axis, way, dwell_s))
         for axis, way in zip(_AXES, ways, strict=True)
     )
-    parts = [
-        textwrap.wrap(about, _WIDTH),
-        _MACHINE_PART,
-        _sensor_part(max(recordings, key=lambda how: how.highest_hz)),
-        _RECORDING_PART,
-        _stop_part(stops),
-        _file_part(recordings[0]),
-        _REFUSAL_PART,
-    ]
-    text = "\n\n".join("\n".join(part) for part in parts)
+    text = _instructions(about, recordings, stops)
     return TapPlan(None if machine is None else machine.name, recordings, stops, text)

@@ -101,8 +101,7 @@ def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
     measured, model, title = _responses(found)
     seen = _seen(measured.frequency_hz, found)
     rows = 2 if measured.coherence is None else 3
-    panels = plot.grid(ax, rows, 1, size_inch=(9.0, 2.1 + 1.8 * rows), sharex="col", title=title)
-    column = [row[0] for row in panels]
+    column = plot.column(ax, rows, size_inch=(9.0, 2.1 + 1.8 * rows), title=title)
     magnitude, phase = column[:2]
     for each, style, colour, width, label in (
         (measured, "-", _MEASURED, 2.2, "measured"),
@@ -195,22 +194,19 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
     begin = 0 if record.force_n is None else int(np.argmax(np.abs(record.force_n)))
     record, model = (replace(each, response=each.response[begin:], force_n=None) for each in (record, model))
     name = f": {Path(record.source).name}" if len(found.taps) > 1 else ""
-    panels = plot.grid(
-        ax, len(frequencies), 1, size_inch=(9.0, 1.4 + 2.0 * len(frequencies)), sharex="col",
-        title=f"Decay: envelope of the {record.quantity} in the band of each mode{name}",
-    )  # fmt: skip
-    column = [row[0] for row in panels]
+    title = f"Decay: envelope of the {record.quantity} in the band of each mode{name}"
+    column = plot.column(ax, len(frequencies), size_inch=(9.0, 1.4 + 2.0 * len(frequencies)), title=title)
     left = replace(record, response=record.response - model.response)
     bands = (mode_envelopes(each, frequencies) for each in (record, model, left))
     time_s = record.time_s if found.decay else record.time_s - record.time_s[0]
     longest = 1
     for panel, frequency, measured, fitted, rest in zip(column, frequencies, *bands, strict=True):
-        top = float(measured.envelope.max())
-        noise = max(float(np.median(rest.envelope)), _MIN_SHOWN * top)
-        end = _first_below(fitted.envelope, _CLEAR * noise)
+        top = float(measured.max())
+        noise = max(float(np.median(rest)), _MIN_SHOWN * top)
+        end = _first_below(fitted, _CLEAR * noise)
         longest = max(longest, end)
-        panel.semilogy(time_s, measured.envelope, color=_MEASURED, linewidth=2.2, label="measured")
-        panel.semilogy(time_s[:end], fitted.envelope[:end], "--", color=_FITTED, linewidth=1.1, label="model")
+        panel.semilogy(time_s, measured, color=_MEASURED, linewidth=2.2, label="measured")
+        panel.semilogy(time_s[:end], fitted[:end], "--", color=_FITTED, linewidth=1.1, label="model")
         panel.axhline(noise, color="black", linewidth=0.8, linestyle=":", label="noise in the band")
         panel.set_ylim(_BELOW_NOISE * noise, 2.0 * top)
         panel.set_ylabel(f"{plot.number(frequency, 4)} Hz, {UNITS[record.quantity]}")
@@ -289,16 +285,9 @@ def _responses(found: Identification) -> tuple[FrequencyResponse, FrequencyRespo
         measured = found.responses[0]
         model = replace(measured, response=found.fitted_lines[0], coherence=None)
         return measured, model, f"Frequency response: {Path(measured.source).name}"
-    taps, quantity = len(found.taps), found.taps[0].quantity
-    both = [frf(records) for records in (found.fitted_records, _as_fitted(found))]
-    measured, model = (
-        FrequencyResponse(
-            found.taps[0].source, each.frequency_hz[1:], each.response[1:], quantity,
-            None if each.coherence is None else each.coherence[1:],
-        )
-        for each in both
-    )  # fmt: skip
-    return measured, model, f"Frequency response, {taps} {'tap' if taps == 1 else 'taps averaged'}"
+    taps = len(found.taps)
+    title = f"Frequency response, {taps} {'tap' if taps == 1 else 'taps averaged'}"
+    return frf(found.fitted_records), frf(_as_fitted(found)), title
 
 
 def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
@@ -325,8 +314,8 @@ def _seen(frequency_hz: FloatArray, found: Identification, peaks_hz: Sequence[fl
 
 def _mark_modes(column: list[Axes], found: Identification) -> None:
     """Thin lines at the modes, refused ones dotted, their frequencies above."""
-    for mode, style in [*((mode, "--") for mode in found.modes), *((mode, ":") for mode in found.refused)]:
-        hertz = mode.frequency_hz.value
+    for mode in (*found.modes, *found.refused):
+        hertz, style = mode.frequency_hz.value, ":" if mode.refusal else "--"
         for panel in column:
             panel.axvline(hertz, color="black", linewidth=0.6, linestyle=style)
         column[0].annotate(

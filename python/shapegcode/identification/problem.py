@@ -12,12 +12,15 @@ from scipy.signal import firwin, kaiserord, oaconvolve
 from shapegcode import _core
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import MIN_PULSE, Prepared
-from shapegcode.identification.model_search import MIN_SWINGS, PEAKS, Fit, Starts
 from shapegcode.identification.spectra import decay_spectrum
 from shapegcode.io.record import FloatArray
 
+Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
+Fit = _core.ModalFit | _core.DecayFit
+MIN_SWINGS = 2.0  # Swings of a mode in the record: fewer do not tell its frequency
 HIGHEST_SHARE = 0.45  # Of the sampling rate: the force between samples is known up to there
 _STEPS, _QUICK_STEPS = 60, 15  # of a fit; of one that only shows where a mode may be
+_PEAKS = 2  # of the residual's spectrum that are tried
 
 
 class _OverTime:
@@ -97,7 +100,7 @@ class _OverTime:
         frequency = np.fft.rfftfreq(length, self.period_s)
         power[(frequency < self.band_hz[0]) | (frequency > self.band_hz[1])] = 0.0
         inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
-        highest = inner[np.argsort(power[inner])[::-1][:PEAKS]]
+        highest = inner[np.argsort(power[inner])[::-1][:_PEAKS]]
         return [float(2.0 * np.pi * frequency[index]) for index in highest]
 
 
@@ -132,16 +135,13 @@ class Taps(_OverTime):
         return self.hold if self.thinned is None else "band_limited"
 
     def other_courses(self, near: Fit) -> list[Taps]:
-        """The same taps with every other course that the force may take between its samples.
-
-        An acceleration holds the force over the mass as it was at the samples, whatever its course between them. Where
-        a straight course was thinned out, what the two differ by is taken away from the response.
-        """
+        """The same taps with every other course that the force may take between its samples."""
         if self.thinned is None:
             return [replace(self, hold="linear"), replace(self, hold="impulse")]
         if self.hold == "impulse":
             return []
         straight, responses = self.thinned.straight, self.responses
+        # An acceleration holds the force over the mass as it was at the samples, whatever its course between them.
         if self.quantity == "acceleration" and isinstance(near, _core.ModalFit):
             free = float(np.sum(near.inverse_mass))
             parts = zip(responses, self.forces, straight, strict=True)
@@ -191,7 +191,10 @@ class Decays(_OverTime):
         return replace(self, responses=[self.responses[index]])
 
 
-def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: bool = False) -> Taps | Decays:
+FitProblem = Taps | Decays
+
+
+def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: bool = False) -> FitProblem:
     """The records of a fit, and the band to look in; a strong mode outside is part of what is measured within it."""
     first = ready.records[0]
     responses = [record.response for record in ready.records]
@@ -209,16 +212,10 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
         return Decays(responses, first.period_s, band, 1.0 / widest**2)
     forces = [record.force_n for record in ready.records if record.force_n is not None]
     noise = [each.force_noise_n for each in ready.usable if each.force_noise_n is not None]
+    noise_n = float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0
+    in_pulse = any(force[0] != 0.0 for force in forces)
     taps = Taps(
-        forces,
-        responses,
-        first.period_s,
-        band,
-        first.quantity,
-        float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0,
-        "band_limited",
-        starts_in_pulse=any(force[0] != 0.0 for force in forces),
-        widened=widest,
+        forces, responses, first.period_s, band, first.quantity, noise_n, "band_limited", None, in_pulse, widest
     )
     thinned = thin(ready, highest_of_interest_hz(ready, None if band_hz is None else band_hz[1]))
     if thinned is None:
@@ -252,7 +249,6 @@ class Thinned:
     forces: list[FloatArray]  # (n,) each, of a recorder's force
     straight: list[FloatArray]  # (n,) each, of a force that runs straight from sample to sample
     period_s: float  # time between two samples
-    factor: int  # of how many samples one is left
     # share of the band up to half the new rate that the filter lets pass, in power: what is left of white noise
     white_share: float
     noise_correlation: float  # between two samples on end of white noise behind the filter
@@ -277,12 +273,7 @@ def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
 
 
 def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
-    """Leave out samples that the band does not need.
-
-    Force and response pass the same filter of linear phase, whose delay is taken away: their ratio stays what it was.
-    The record is taken as at rest before its first sample; where the pulse comes soon after it, it begins earlier by as
-    much as the filter spreads the pulse.
-    """
+    """Leave out samples that the band does not need, behind one filter of linear phase for force and response."""
     period = ready.records[0].period_s
     factor = int(_BAND / (highest_hz * period)) if highest_hz > 0.0 else 1
     longest = max(len(record.response) for record in ready.records)
@@ -296,7 +287,7 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
         force = record.force_n
         assert force is not None
         acts = np.flatnonzero(force)
-        # Samples to put before the record, so that nothing of the pulse is spread beyond it.
+        # Samples at rest to put before the record, so that nothing of the pulse is spread beyond it.
         before = max(0, 2 * reach + factor - int(acts[0]))
         lead = np.zeros(before)
         places = slice(reach, before + len(force) - reach, factor)
@@ -310,17 +301,9 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
         first_s.append((reach - before) * period)
         widths.append((acts[-1] - acts[0] + 1) / np.count_nonzero(near))
     whole = float(np.sum(plain**2))
-    return Thinned(
-        responses,
-        forces,
-        courses,
-        period * factor,
-        factor,
-        whole * factor,
-        float(np.sum(plain[factor:] * plain[:-factor])) / whole,
-        float(np.sqrt(np.mean(widths))) / factor,
-        first_s,
-    )
+    correlation = float(np.sum(plain[factor:] * plain[:-factor])) / whole
+    force_noise = float(np.sqrt(np.mean(widths))) / factor
+    return Thinned(responses, forces, courses, period * factor, whole * factor, correlation, force_noise, first_s)
 
 
 def are_blows(ready: Prepared) -> bool:

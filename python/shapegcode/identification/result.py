@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
+
+import numpy as np
 
 from shapegcode.identification.checks import Prepared, RecordUse
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
@@ -108,10 +110,7 @@ def _decimals(half: float) -> int:
 
 
 def estimate_cell(estimate: Estimate | None, factor: float) -> str:
-    """An estimate times a factor, ``46.02 ± 0.05``, with as many digits as the interval is worth.
-
-    Both ends where it is skewed; empty where there is none.
-    """
+    """An estimate times a factor, ``46.02 ± 0.05``, as many digits as are known; both ends where it is skewed."""
     if estimate is None:
         return ""
     value, low, high = (factor * each for each in (estimate.value, estimate.low, estimate.high))
@@ -138,17 +137,11 @@ class ChartPole:
 
 @dataclass(frozen=True)
 class MassCheck:
-    """The equivalent mass by the method of Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md).
+    """The equivalent mass by the method of Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md)."""
 
-    Attributes:
-        closed_form_kg: one simulation; the RMS of the response is proportional to 1/m.
-        bisection_kg: the paper's search.
-        halvings: of the search.
-    """
-
-    closed_form_kg: float
-    bisection_kg: float
-    halvings: int
+    closed_form_kg: float  # one simulation; the RMS of the response is proportional to 1/m
+    bisection_kg: float  # the paper's search
+    halvings: int  # of the search
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,17 +161,11 @@ class Sweep:
 
 @dataclass(frozen=True)
 class MachineFile:
-    """A machine file that took the modes.
+    """A machine file that took the modes."""
 
-    Attributes:
-        path: as named.
-        axis: "x", "y" or "z".
-        notes: what was replaced, kept, removed and added, one sentence each.
-    """
-
-    path: str
-    axis: str
-    notes: tuple[str, ...]
+    path: str  # as named
+    axis: str  # "x", "y" or "z"
+    notes: tuple[str, ...]  # what was replaced, kept, removed and added, one sentence each
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
@@ -395,6 +382,18 @@ class Identification(Result):
         Of a frequency response without time record `-response` and `-stabilisation`, of a sweep `-sweep`.
         """
         return self._drawn_beside() if self.fitted or self.fitted_lines or self.sweep is not None else {}
+
+
+def as_sweep(
+    found: Identification, notes: Iterable[str], source: str, samples: int, period_s: float, command: str,
+    kind: str = Sweep.kind,
+) -> Identification:  # fmt: skip
+    """Modes of a response to a known command as those of a sweep, which has no records of taps and no noise of them."""
+    measured, fitted = found.responses[0], np.abs(found.fitted_lines[0])
+    lines = measured.frequency_hz, np.abs(measured.response), fitted
+    sweep = Sweep(source, measured.axis, samples, period_s, *lines, command, kind)
+    notes = (*notes, *found.notes)
+    return replace(found, notes=notes, responses=(), fitted_lines=(), noise_rms=None, sweep=sweep)
 
 
 def _estimate(name: str, factor: float = 1.0) -> Any:

@@ -1,4 +1,4 @@
-"""Spectra of taps and decays: averaged FRF, coherence, auto spectra, peaks with labels, envelopes."""
+"""Spectra of taps and decays: averaged FRF with coherence, peaks with labels, envelopes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from scipy import fft, signal
 
 from shapegcode.errors import RecordError
-from shapegcode.io.frequency_response import ComplexArray
+from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.record import FloatArray, Record
 
 _PEAK_SHARE = 0.01  # A peak counts above this share of the largest (-40 dB)
@@ -22,24 +22,8 @@ _BAND_SHARE = 0.25
 _BAND_ORDER = 2
 
 
-@dataclass(frozen=True, eq=False)
-class Frf:
-    """Frequency response of several taps of the same point."""
-
-    frequency_hz: FloatArray  # (m,), from 0 to half the sampling rate
-    response: ComplexArray  # (m,) complex, H1: response over force, in the unit of the response per N
-    coherence: FloatArray | None  # (m,) 0 to 1; None: one tap, whose coherence is 1 whatever it holds
-    force_spectrum: FloatArray  # (m,) energy spectral density of the force, mean of the taps, (N·s)²
-    response_spectrum: FloatArray  # (m,) of the response, (unit·s)²
-    taps: int  # number of taps
-
-
-def frf(records: Sequence[Record]) -> Frf:
-    """Averaged frequency response, H1 = sum(conj(F) X) / sum(|F|²): noise of the response averages out.
-
-    No window beside the one of the force that `checks.prepare` applied; a response that has not decayed at the end of
-    its record leaks. Records of different length are filled up with zeros.
-    """
+def frf(records: Sequence[Record]) -> FrequencyResponse:
+    """Frequency response above 0 Hz, averaged over taps (H1); coherence: None of one tap, which has always 1."""
     if not records:
         raise RecordError("no record: an FRF needs at least one tap")
     period = records[0].period_s
@@ -50,25 +34,18 @@ def frf(records: Sequence[Record]) -> Frf:
             raise RecordError(f"{record.source}: no force: an FRF needs it")
         if not np.isclose(record.period_s, period, rtol=1e-5):
             raise RecordError(f"{record.source}: a sample every {record.period_s:g} s, the first has {period:g} s")
-        forces.append(fft.rfft(record.force_n, count) * period)
-        responses.append(fft.rfft(record.response, count) * period)
+        forces.append(fft.rfft(record.force_n, count)[1:] * period)
+        responses.append(fft.rfft(record.response, count)[1:] * period)
     force, response = np.array(forces), np.array(responses)
     cross = np.mean(np.conj(force) * response, axis=0)
-    force_power = np.mean(np.abs(force) ** 2, axis=0)
-    response_power = np.mean(np.abs(response) ** 2, axis=0)
-    tiny = np.finfo(np.float64).tiny
+    power, tiny = np.mean(np.abs(force) ** 2, axis=0), np.finfo(np.float64).tiny
     coherence = None
     if len(records) > 1:
-        coherence = np.abs(cross) ** 2 / np.maximum(force_power * response_power, tiny)
-        coherence = np.minimum(coherence, 1.0)
-    return Frf(
-        frequency_hz=np.asarray(fft.rfftfreq(count, period), dtype=np.float64),
-        response=np.asarray(cross / np.maximum(force_power, tiny), dtype=np.complex128),
-        coherence=coherence,
-        force_spectrum=np.asarray(force_power, dtype=np.float64),
-        response_spectrum=np.asarray(response_power, dtype=np.float64),
-        taps=len(records),
-    )
+        both = power * np.mean(np.abs(response) ** 2, axis=0)
+        coherence = np.minimum(np.abs(cross) ** 2 / np.maximum(both, tiny), 1.0)
+    ratio = np.asarray(cross / np.maximum(power, tiny), dtype=np.complex128)
+    hertz = np.asarray(fft.rfftfreq(count, period)[1:], dtype=np.float64)
+    return FrequencyResponse(records[0].source, hertz, ratio, records[0].quantity, coherence)
 
 
 @dataclass(frozen=True)
@@ -87,30 +64,18 @@ class Spectrum:
     frequency_hz: FloatArray  # (m,), from 0 to half the sampling rate
     amplitude: FloatArray  # (m,) in the unit of the response: the amplitude of a steady sine that would give the same
     peaks: tuple[Peak, ...]  # the largest first
-    window: str  # what the samples were multiplied by
-    resolution_hz: float  # 1 / duration: peaks closer than this are one
 
 
 def decay_spectrum(record: Record) -> Spectrum:
-    """Amplitude spectrum of the response of a decay, with its peaks.
-
-    The window falls from 1 at the first sample to 0 after the last (half of a Hann window): the beginning of a decay
-    counts fully and the end of the record leaves no side lobes. Filled up with zeros to four times the length.
-    """
+    """Amplitude spectrum of the response of a decay behind half a Hann window, 1 at its first sample, and its peaks."""
     response = record.response - np.mean(record.response)
     samples = len(response)
     window = 0.5 * (1.0 + np.cos(np.pi * np.arange(samples) / samples))
     count = fft.next_fast_len(_PADDING * samples, real=True)
     amplitude = np.abs(fft.rfft(response * window, count)) * 2.0 / float(np.sum(window))
     frequency = np.asarray(fft.rfftfreq(count, record.period_s), dtype=np.float64)
-    resolution = 1.0 / (samples * record.period_s)
-    return Spectrum(
-        frequency_hz=frequency,
-        amplitude=np.asarray(amplitude, dtype=np.float64),
-        peaks=_peaks(frequency, amplitude, resolution),
-        window="half Hann, 1 at the first sample",
-        resolution_hz=resolution,
-    )
+    peaks = _peaks(frequency, amplitude, 1.0 / (samples * record.period_s))
+    return Spectrum(frequency, np.asarray(amplitude, dtype=np.float64), peaks)
 
 
 def _peaks(frequency: FloatArray, amplitude: FloatArray, resolution_hz: float) -> tuple[Peak, ...]:
@@ -132,32 +97,16 @@ def _peaks(frequency: FloatArray, amplitude: FloatArray, resolution_hz: float) -
     return tuple(peaks[:_MAX_PEAKS])
 
 
-@dataclass(frozen=True, eq=False)
-class Envelope:
-    """A response within a band, and its envelope."""
-
-    time_s: FloatArray  # (n,)
-    response: FloatArray  # (n,) within the band, without phase shift, in the unit of the record
-    envelope: FloatArray  # (n,) magnitude of the analytic signal
-    band_hz: tuple[float, float] | None  # limits of the band; None: the whole response
-
-
-def envelope(record: Record, band_hz: tuple[float, float] | None = None) -> Envelope:
-    """Envelope of a response by the Hilbert transform, of a band by a Butterworth filter run both ways (order 4)."""
-    response = np.asarray(record.response - np.mean(record.response), dtype=np.float64)
-    if band_hz is not None:
-        low, high = band_hz
-        half = 0.5 / record.period_s
-        if not 0.0 < low < high < half:
-            raise RecordError(f"{record.source}: band {low:g} to {high:g} Hz: must lie between 0 and {half:g} Hz")
-        sections = signal.butter(_BAND_ORDER, (low, high), "bandpass", fs=1.0 / record.period_s, output="sos")
-        response = np.asarray(signal.sosfiltfilt(sections, response), dtype=np.float64)
-    count = fft.next_fast_len(2 * len(response))
-    analytic = signal.hilbert(response, count)[: len(response)]
-    return Envelope(record.time_s, response, np.asarray(np.abs(analytic), dtype=np.float64), band_hz)
+def _envelope(record: Record, low_hz: float, high_hz: float) -> FloatArray:
+    """(n,) Envelope in a band: a Butterworth filter run both ways (order 4), then the Hilbert transform."""
+    response = record.response - np.mean(record.response)
+    sections = signal.butter(_BAND_ORDER, (low_hz, high_hz), "bandpass", fs=1.0 / record.period_s, output="sos")
+    response = np.asarray(signal.sosfiltfilt(sections, response), dtype=np.float64)
+    analytic = signal.hilbert(response, fft.next_fast_len(2 * len(response)))[: len(response)]
+    return np.asarray(np.abs(analytic), dtype=np.float64)
 
 
-def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[Envelope]:
+def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[FloatArray]:
     """The envelope of each mode in a band of its own: a quarter to either side, at most half way to the next mode."""
     half = 0.5 / record.period_s
     found = []
@@ -168,5 +117,5 @@ def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[Enve
         above = [each for each in frequencies_hz if each > frequency]
         low = max([(1.0 - _BAND_SHARE) * frequency, *(0.5 * (each + frequency) for each in below)])
         high = min([(1.0 + _BAND_SHARE) * frequency, *(0.5 * (each + frequency) for each in above), 0.99 * half])
-        found.append(envelope(record, (low, high)))
+        found.append(_envelope(record, low, high))
     return found

@@ -1,22 +1,20 @@
 """Frequency and damping from a resonance sweep without force, as the firmware Klipper drives and records it.
 
-The machine shakes its own axis: pulses of acceleration whose amplitude grows with their frequency, which rises slowly.
-So the command's spectrum grows as f between the ends of the sweep, harmonics included, and what the sensor on the axis
-shows beyond that is the transmissibility 1 - sum of G s²/(s² + 2 zeta omega s + omega²). Only its magnitude is known:
-when the sweep began is not in the file.
+The command's spectrum grows as f between the ends of the sweep; what the sensor on the axis shows beyond that is the
+magnitude of the transmissibility 1 - sum of G s²/(s² + 2 zeta omega s + omega²).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.model_search import Sought
-from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, Sweep, by_support
+from shapegcode.identification.model_search import Sought, mode_estimates
+from shapegcode.identification.result import Identification, IdentifiedMode, Sweep, by_support
 from shapegcode.io.record import FloatArray, Record
 
 SWEPT_HZ = (10.0, 130.0)  # What Klipper sweeps unless told otherwise is 5 to 133 Hz; its ends are no steady sweep
@@ -164,22 +162,20 @@ def _judge_mode(best: _Model, other: _Model, index: int, bins: int) -> Identifie
     for at, least in ((place + 1, _MIN_FREQUENCY), (place + 2, _MIN_DAMPING)):
         apart = abs(float(other.parameters[at] - best.parameters[at]))
         halves.append(max(least, quantile * float(np.sqrt(max(best.covariance[at, at], 0.0))), apart))
-    share, omega, zeta = np.exp(best.parameters[place : place + 3])
-    frequency, damping = (
-        Estimate(value, value * np.exp(-min(half, 7.0)), value * np.exp(min(half, 7.0)))
-        for value, half in zip((omega / (2.0 * np.pi), zeta), halves, strict=True)
-    )
+    share, _, zeta = np.exp(best.parameters[place : place + 3])
+    logarithms = best.parameters[place + 1 : place + 3] - np.array([np.log(2.0 * np.pi), 0.0])
+    mode = mode_estimates(logarithms, np.array(halves))
     refusal = ""
     if share < _MIN_SHARE:
         refusal = f"{100.0 * share:.2g} % of the axis' motion only (limit {100.0 * _MIN_SHARE:g} %)"
     elif zeta > _NO_VIBRATION:
         refusal = f"damping ratio {zeta:.2g}: no vibration that stands out (limit {_NO_VIBRATION:g})"
     for name, estimate, limit in (
-        ("frequency", frequency, _FREQUENCY_LIMIT), ("damping ratio", damping, _DAMPING_LIMIT),
+        ("frequency", mode.frequency_hz, _FREQUENCY_LIMIT), ("damping ratio", mode.damping_ratio, _DAMPING_LIMIT),
     ):  # fmt: skip
         if not refusal and not estimate.uncertainty_percent <= limit:
             refusal = (
                 f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} % of a sweep): a "
                 "slower sweep, more acceleration, or a tap"
             )
-    return IdentifiedMode(frequency, damping, refusal=refusal)
+    return replace(mode, refusal=refusal)

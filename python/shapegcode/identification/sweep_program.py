@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -218,18 +218,8 @@ def plan_sweep(
             f"{len(text)} bytes are more than the memory of {machine.controller.program_memory_bytes} bytes holds "
             "(controller.program_memory_bytes): run it from a card, or state less time (--seconds)"
         )
-    found = SweepProgram(
-        machine.name,
-        axis,
-        str(file),
-        swept,
-        limit,
-        100.0 * acceleration_share,
-        len(command) * period_s,
-        len(text),
-        tuple(warnings),
-    )
-    return found, text
+    sizes = 100.0 * acceleration_share, len(command) * period_s, len(text)
+    return SweepProgram(machine.name, axis, str(file), swept, limit, *sizes, tuple(warnings)), text
 
 
 def commanded(program: Program, machine: Machine) -> tuple[FloatArray, float]:
@@ -252,17 +242,15 @@ class _Planner:
         limits = getattr(machine.axes, axis)
         self._machine, self._model, self._travel_mm = machine, MachineModel(machine), travel_mm
         self._axis = "xyz".index(axis)
-        self._feed = limits.max_feed_mm_per_min
-        controller = machine.controller
+        self._feed, controller = limits.max_feed_mm_per_min, machine.controller
         if controller.motion == "look_ahead" and controller.corner_rule == "speed_difference":
             # Such a reversal needs no ramp: strokes last length over feed, whatever the time constants really are.
             at_once = _OF_STEP * getattr(controller.corner_speed_difference_mm_per_min, axis)
             if at_once >= _LEAST_AT_ONCE:
                 self._feed = min(self._feed, at_once)
-        self.allowed = share * limits.max_acceleration_mm_s2
-        self.wanted = self.allowed
-        self._block_s = max(machine.controller.block_time_s, 2.0 * machine.controller.interpolation_period_s)
-        self._least_mm = _MIN_INCREMENTS * machine.controller.least_increment_mm
+        self.allowed = self.wanted = share * limits.max_acceleration_mm_s2
+        self._block_s = max(controller.block_time_s, 2.0 * controller.interpolation_period_s)
+        self._least_mm = _MIN_INCREMENTS * controller.least_increment_mm
 
     def plan(self, low: float, high: float) -> tuple[list[_Stroke], str]:
         """Strokes from the lowest frequency to the highest that can be reached, and what limits it."""
@@ -293,40 +281,32 @@ class _Planner:
 
     def _stroke(self, hertz: float) -> tuple[_Stroke, float]:
         """The stroke with the wanted amplitude, or the largest there is, and its amplitude in mm/s²."""
-        half_s = 0.5 / hertz
-        top = min(self._feed, 60.0 * self._travel_mm / half_s)
-        tried: list[tuple[_Stroke, float]] = []
-        for feed in np.geomspace(top / 100.0, top, _FEEDS):
-            length = self._length(float(feed), half_s)
-            stroke = _Stroke(hertz, length, float(feed))
-            tried.append((stroke, self._amplitude(stroke)))
+        top = min(self._feed, 60.0 * self._travel_mm / (0.5 / hertz))
+        tried = [self._tried(hertz, float(feed)) for feed in np.geomspace(top / 100.0, top, _FEEDS)]
         largest = max(amplitude for _, amplitude in tried)
         goal = min(self.wanted, _ENOUGH * largest)
         place = next(k for k, (_, amplitude) in enumerate(tried) if amplitude >= goal)
         if place and tried[place][1] > goal:
             (below, low), (above, high) = tried[place - 1], tried[place]
             share = (math.log(goal) - math.log(low)) / (math.log(high) - math.log(low))
-            feed = below.feed_mm_per_min ** (1.0 - share) * above.feed_mm_per_min**share
-            stroke = _Stroke(hertz, self._length(feed, half_s), feed)
-            tried[place] = stroke, self._amplitude(stroke)
+            tried[place] = self._tried(hertz, below.feed_mm_per_min ** (1.0 - share) * above.feed_mm_per_min**share)
         stroke, amplitude = tried[place]
         if amplitude > self.wanted:  # The lowest feed asks for too much: shorter strokes would be faster ones
-            factor = self.wanted / amplitude
-            stroke = _Stroke(
-                hertz, self._length(stroke.feed_mm_per_min * factor, half_s), stroke.feed_mm_per_min * factor
-            )
-            amplitude = self._amplitude(stroke)
+            return self._tried(hertz, stroke.feed_mm_per_min * (self.wanted / amplitude))
         return stroke, amplitude
 
-    def _length(self, feed: float, half_s: float) -> float:
-        """Length of a stroke that lasts half a cycle."""
+    def _tried(self, hertz: float, feed: float) -> tuple[_Stroke, float]:
+        """The stroke that lasts half a cycle, and its amplitude."""
+        half_s = 0.5 / hertz
         low, high = 0.0, min(feed / 60.0 * half_s, self._travel_mm)
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             few, many = (len(self._motion(middle, feed, count)) for count in _TRIED)
             lasts_s = (many - few) * self._model.period_s / (_TRIED[1] - _TRIED[0])
             low, high = (middle, high) if lasts_s < half_s else (low, middle)
-        return high
+        x = self._motion(high, feed, _TRIED[1])
+        size = amplitude(x, self._model.period_s, (0.8 * hertz, 1.2 * hertz), _TRIED[1] / 2 / hertz)
+        return _Stroke(hertz, high, feed), size
 
     def _motion(self, length_mm: float, feed: float, count: int) -> FloatArray:
         """Set-points of strokes there and back, (n,) mm."""
@@ -336,13 +316,6 @@ class _Planner:
         path = _core.Path([_core.Segment.line(ends[k % 2], ends[(k + 1) % 2], feed / 60.0) for k in range(count)])
         read = self._model.ordinary.stream(path, self._model.options(), 0.0).read(_LONGEST)
         return np.asarray(read.command_mm[:, self._axis], dtype=np.float64)
-
-    def _amplitude(self, stroke: _Stroke) -> float:
-        """Amplitude of the commanded acceleration at the frequency of a stroke, mm/s²."""
-        x = self._motion(stroke.length_mm, stroke.feed_mm_per_min, _TRIED[1])
-        return amplitude(
-            x, self._model.period_s, (0.8 * stroke.hertz, 1.2 * stroke.hertz), _TRIED[1] / 2 / stroke.hertz
-        )
 
 
 def amplitude(command_mm: FloatArray, period_s: float, band_hz: tuple[float, float], lasts_s: float) -> float:
@@ -357,9 +330,7 @@ def amplitude(command_mm: FloatArray, period_s: float, band_hz: tuple[float, flo
 
 def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[list[_Stroke]]:
     """Strokes there and back of each rise and each fall, on increments and digits of the control."""
-    hertz, length, feed = (
-        np.array([getattr(each, name) for each in strokes]) for name in ("hertz", "length_mm", "feed_mm_per_min")
-    )
+    hertz, length, feed = np.array([astuple(each) for each in strokes]).T
     octaves = math.log2(hertz[-1] / hertz[0])
     edges = np.geomspace(hertz[0], hertz[-1], 1 + math.ceil(_BANDS_PER_OCTAVE * octaves))
     lasts_s = 0.5 * seconds / (len(edges) - 1)
@@ -375,12 +346,10 @@ def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[lis
         rising, now_s = [], 0.0
         while now_s < lasts_s:
             at = low * (high / low) ** (now_s / lasts_s)
-            exact = math.exp(np.interp(math.log(at), np.log(hertz), np.log(length))) + carried
-            rounded = max(round(exact / step), 1) * step
-            carried = exact - rounded
-            rising.append(
-                _Stroke(at, rounded, round(math.exp(np.interp(math.log(at), np.log(hertz), np.log(feed))), digits))
-            )
+            size, speed = (math.exp(np.interp(math.log(at), np.log(hertz), np.log(each))) for each in (length, feed))
+            rounded = max(round((size + carried) / step), 1) * step
+            carried = size + carried - rounded
+            rising.append(_Stroke(at, rounded, round(speed, digits)))
             now_s += 1.0 / at
         found += [rising, rising[::-1]]
     return found

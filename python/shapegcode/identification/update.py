@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +21,7 @@ from shapegcode.errors import ArgumentError, MachineError
 from shapegcode.identification.across import LEAST_MOVE, told_moves
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, MachineFile
 from shapegcode.machine import Machine, check_axes
-from shapegcode.settings.edit import (
-    Entry,
-    commented_key,
-    commented_table,
-    entry_of,
-    is_blank,
-    own_end,
-    parse_exactly,
-    take_tail,
-    with_origin_table,
-    with_remarks,
-    without_origins,
-)
+from shapegcode.settings import edit
 from shapegcode.settings.keys import toml
 from shapegcode.settings.load import read_text
 from shapegcode.settings.remarks import remarks_of
@@ -114,13 +103,10 @@ def update_modes(
     rigid: str = "",
     file: str = "<text>",
 ) -> MachineUpdate:
-    """The text of a machine file with the modes of one axis replaced by identified ones.
+    """The text of a machine file with the modes of one axis replaced by identified ones; twice gives the same text.
 
-    A mode whose frequency is within 10 % of one in the file takes its table: values and uncertainties change where
-    they stand, participation, `frequency_over` and every comment line stay, and so does an uncertainty of the
-    frequency that somebody stated wider than it was measured. A mode of the file that the test shows, but does not
-    support, stays as it is. Other tables of the axis' modes go, other modes get a table of their own, whose
-    participation is its share of the residues. Putting the same modes in twice gives the same text.
+    A mode within 10 % of one in the file takes its table, in which everything that was not measured stays, as does a
+    mode that the test shows, but does not support. Other tables of the axis' modes go, other modes get their own.
     """
     if axis not in ("x", "y", "z"):
         raise ArgumentError(f"axis {axis!r}: must be x, y or z")
@@ -196,20 +182,15 @@ def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[
             notes.append(f"{parts[1].upper()}: kept, though not measured here ({said})")
         return marked
 
-    return with_remarks(text, remark), notes
+    return edit.with_remarks(text, remark), notes
 
 
 _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
 _SUM_SLACK = 1e-3  # of the participations: rounding
 _KEYS = (
-    "frequency_hz",
-    "damping_ratio",
-    "frequency_uncertainty_percent",
-    "damping_uncertainty_percent",
-    "mass_kg",
-    "mass_uncertainty_percent",
-    "source",
+    *("frequency_hz", "damping_ratio", "frequency_uncertainty_percent", "damping_uncertainty_percent"),
+    *("mass_kg", "mass_uncertainty_percent", "source"),
 )
 
 
@@ -219,24 +200,21 @@ class ModeTables:
     def __init__(self, text: str, axis: str, source: str, file: str) -> None:
         """Find them."""
         self._remarks = remarks_of(text)
-        text = without_origins(text)
+        text = edit.without_origins(text)
         self.newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
         self._last_end = "" if text.endswith("\n") else self.newline
-        self.document = parse_exactly(text + self._last_end, file)
+        self.document = edit.parse_exactly(text + self._last_end, file)
         self.data: dict[str, Any] = tomllib.loads(text)
         self.axis, self.source, self.file = axis, source, file
         self.notes: list[str] = []  # what was replaced, kept, removed and added, one sentence each
-        self._gap: list[Entry] = []  # the blank line behind the first table, if that went
+        self._gap: list[edit.Entry] = []  # the blank line behind the first table, if that went
         self.name = f"axes.{self.axis}.modes"
         self.old: list[dict[str, Any]] = list(self.data["axes"][self.axis].get("modes", []))
         self.expected: list[dict[str, Any]] = []
-        self._said: dict[int, dict[str, str]] = {}
-        """Of a table, by its identity: where the values that were put into it come from."""
+        self._said: dict[int, dict[str, str]] = {}  # by identity of a table: origins of values that were put into it
         self.home = self._axis_table()
-        self.tables: list[Table] = next(
-            (item.body for key, item in self.home.value.body if isinstance(item, AoT) and _is_modes(key, item)),
-            [],
-        )
+        held = (item.body for key, item in self.home.value.body if isinstance(item, AoT) and _is_modes(key, item))
+        self.tables: list[Table] = next(held, [])
         self._before = list(self.tables)
         if len(self.tables) != len(self.old):
             raise ArgumentError(
@@ -276,9 +254,7 @@ class ModeTables:
             self.notes.append("it was said to be rigid: that is taken back")
         if said or (said is False and self._remarks.get(f"axes.{self.axis}.rigid", "").startswith("assumed")):
             self._say_rigid(False, "a mode was measured")
-        text = self.document.as_string()
-        self._check(text)
-        return self._with_origins(text, [*stay, *added])
+        return self._finished([*stay, *added])
 
     def make_rigid(self) -> str:
         """The text without modes of the axis, which is said to be rigid."""
@@ -287,12 +263,12 @@ class ModeTables:
         place = next((n for n, (key, item) in enumerate(entries) if _is_modes(key, item)), len(entries))
         entries[place : place + 1] = [(None, item) for _, item in left]
         self._say_rigid(True, "decided: no mode of it counts")
-        text = self.document.as_string()
-        self._check(text, rigid=True)
-        return self._with_origins(text, [])
+        return self._finished([], rigid=True)
 
-    def _with_origins(self, text: str, tables: Sequence[Table]) -> str:
-        """The new text with the origins of the modes where they are now."""
+    def _finished(self, tables: Sequence[Table], *, rigid: bool = False) -> str:
+        """The new text, checked, with the origins of the modes where they are now."""
+        text = self.document.as_string()
+        self._check(text, rigid)
         found = {key: remark for key, remark in self._remarks.items() if not key.startswith(self.name)}
         before = {id(table): number for number, table in enumerate(self._before, start=1)}
         for number, table in enumerate(tables, start=1):
@@ -303,7 +279,7 @@ class ModeTables:
             gone = held - table.keys()
             said = {key: remark for key, remark in old.items() if key not in gone} | self._said.get(id(table), {})
             found |= {f"{self.name}.{number}.{key}": remark for key, remark in said.items() if remark}
-        return with_origin_table(text, found)
+        return edit.with_origin_table(text, found)
 
     def _say_rigid(self, rigid: bool, remark: str) -> None:
         self._remarks[f"axes.{self.axis}.rigid"] = remark
@@ -311,10 +287,10 @@ class ModeTables:
 
     def _old_tables(
         self, kept: Mapping[int, IdentifiedMode], seen: Mapping[int, IdentifiedMode], why: str = "which was not found"
-    ) -> tuple[list[Table], list[Entry]]:
+    ) -> tuple[list[Table], list[edit.Entry]]:
         """Change the tables of the file."""
         stay: list[Table] = []
-        left: list[Entry] = []
+        left: list[edit.Entry] = []
         for number, (table, old) in enumerate(zip(self.tables, self.old, strict=True)):
             if number in kept:
                 self._change(table, old, kept[number])
@@ -324,17 +300,17 @@ class ModeTables:
                 self.notes.append(f"kept {old_hz} Hz as it is: the test shows it at {new_hz:.6g} Hz, not well enough")
             else:
                 self.notes.append(f"removed {toml(old['frequency_hz'])} Hz, {why}: {toml(old)}")
-                tail = take_tail(table)
-                blank = tail[:1] if tail and is_blank(tail[0]) else []
+                tail = edit.take_tail(table)
+                blank = tail[:1] if tail and edit.is_blank(tail[0]) else []
                 left += tail[len(blank) :]
                 self._gap = blank if number == 0 else self._gap
                 continue
-            table.trivia.indent = _text(left) + table.trivia.indent
+            table.trivia.indent = "".join(item.as_string() for _, item in left) + table.trivia.indent
             left = []
             stay.append(table)
         return stay, left
 
-    def _check(self, text: str, *, rigid: bool = False) -> None:
+    def _check(self, text: str, rigid: bool) -> None:
         """The new text must say what is meant, and nothing else may have changed."""
         wanted = copy.deepcopy(self.data)
         axis = wanted["axes"][self.axis]
@@ -344,8 +320,8 @@ class ModeTables:
         try:
             found = tomllib.loads(text)
             found["axes"][self.axis].setdefault("modes", [])
-            found["axes"][self.axis]["modes"].sort(key=_frequency)
-            wanted["axes"][self.axis]["modes"].sort(key=_frequency)
+            for each in (found, wanted):
+                each["axes"][self.axis]["modes"].sort(key=itemgetter("frequency_hz"))
         except (tomllib.TOMLDecodeError, KeyError, AttributeError):
             found = {}
         if found != wanted:
@@ -382,20 +358,20 @@ class ModeTables:
             + "; ".join(kept)
         )
 
-    def _put(self, entries: list[Entry], values: Mapping[str, tuple[Any, str]]) -> None:
+    def _put(self, entries: list[edit.Entry], values: Mapping[str, tuple[Any, str]]) -> None:
         """Values in place of those that a table has, or of its commented keys, else behind them."""
         below = next((n for n, (_, item) in enumerate(entries) if isinstance(item, Table)), len(entries))
-        places = {commented_key(entry): place for place, entry in enumerate(entries[:below])}
+        places = {edit.commented_key(entry): place for place, entry in enumerate(entries[:below])}
         places |= {key.key: place for place, (key, _) in enumerate(entries[:below]) if key is not None}
         added = []
         for key, (value, remark) in values.items():
-            entry = entry_of(_line(key, value, remark) + self.newline)
+            entry = edit.entry_of(_line(key, value, remark) + self.newline)
             if key in places:
                 entry[1].trivia.indent = entries[places[key]][1].trivia.indent
                 entries[places[key]] = entry
             else:
                 added.append(entry)
-        place = own_end(entries[:below])
+        place = edit.own_end(entries[:below])
         entries[place:place] = added
 
     def _values(self, mode: IdentifiedMode) -> dict[str, tuple[Any, str]]:
@@ -421,7 +397,7 @@ class ModeTables:
         others = ", ".join(
             f"{letter} {each.low:.3g} ... {each.high:.3g}" for letter, each in told.items() if letter != self.axis
         )
-        return {"moves": ({letter: float(f"{each.value:.4g}") for letter, each in told.items()}, f"95 %: {others}")}
+        return {"moves": ({letter: _rounded(each.value, 4) for letter, each in told.items()}, f"95 %: {others}")}
 
     def _table(self, mode: IdentifiedMode, share: float, meaning: str) -> Table:
         """A new table."""
@@ -447,7 +423,7 @@ class ModeTables:
                 f"of one point sum to 1 when the axis moves; by the shares of the modes found they would be {shares}"
             )
 
-    def _insert(self, stay: list[Table], added: list[Table], left: list[Entry]) -> None:
+    def _insert(self, stay: list[Table], added: list[Table], left: list[edit.Entry]) -> None:
         """Put new tables behind the last one that stays, or where the first one was, or where the axis ends."""
         for table in added:
             table.trivia.indent = self.newline
@@ -455,7 +431,7 @@ class ModeTables:
             self._insert_first(added)
             return
         if stay:
-            behind = take_tail(stay[-1]) + left
+            behind = edit.take_tail(stay[-1]) + left
         else:
             added[0].trivia.indent = self.tables[0].trivia.indent.rstrip(" \t")
             behind = self._gap + left
@@ -467,13 +443,13 @@ class ModeTables:
         entries = self.home.value.body
         modes = (SingleKey("modes"), AoT(added, "modes", parsed=True))
         for place, entry in enumerate(entries):
-            if commented_table(entry) == self.name:
+            if edit.commented_table(entry) == self.name:
                 end = place + 1
-                while end < len(entries) and commented_key(entries[end]):
+                while end < len(entries) and edit.commented_key(entries[end]):
                     end += 1
                 entries[place:end] = [modes]
                 return
-        added[-1].value.body.extend(take_tail(self.home))
+        added[-1].value.body.extend(edit.take_tail(self.home))
         entries.append(modes)
 
 
@@ -481,13 +457,8 @@ def _is_modes(key: Key | None, item: object) -> bool:
     return key is not None and key.key == "modes" and isinstance(item, AoT)
 
 
-def _text(entries: Sequence[Entry]) -> str:
-    """Comments and blank lines as they stand in the file."""
-    return "".join(item.as_string() for _, item in entries)
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+def _rounded(value: float, digits: int = _DIGITS) -> float:
+    return float(f"{value:.{digits}g}")
 
 
 def _rounded_up(value: float) -> float:
@@ -503,10 +474,6 @@ def _line(key: str, value: object, remark: str) -> str:
     return f"{key} = {toml(value)}" + (f"  # {remark}" if remark else "")
 
 
-def _frequency(mode: dict[str, Any]) -> float:
-    return float(mode["frequency_hz"])
-
-
 SAME_MODE = 0.1  # Two frequencies, relative to the old one, within which a mode is taken as the one that the file has
 
 _NO_PAIR = 1e3
@@ -517,13 +484,9 @@ def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
     """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes."""
     masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
     if len(masses) < len(modes):
-        return [_share(1.0 / len(modes))] * len(modes), "equal shares"
+        return [_rounded(1.0 / len(modes), _SHARE_DIGITS)] * len(modes), "equal shares"
     total = sum(1.0 / mass for mass in masses)
-    return [_share(1.0 / mass / total) for mass in masses], "share of the residues 1/m"
-
-
-def _share(value: float) -> float:
-    return float(f"{value:.{_SHARE_DIGITS}g}")
+    return [_rounded(1.0 / mass / total, _SHARE_DIGITS) for mass in masses], "share of the residues 1/m"
 
 
 def matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:

@@ -21,15 +21,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Sides(Generic[T]):
-    """A figure of both sides of the travel.
+    """A figure of both sides of the travel."""
 
-    Attributes:
-        left: of the left one.
-        right: of the right one.
-    """
-
-    left: T
-    right: T
+    left: T  # of the left one
+    right: T  # of the right one
 
     def both(self) -> tuple[T, T]:
         """Left and right."""
@@ -38,57 +33,34 @@ class Sides(Generic[T]):
 
 @dataclass(frozen=True)
 class SidedError:
-    """How far a track leaves the programmed path, in µm; a vertical deviation is above or below, not left or right.
+    """How far a track leaves the programmed path, in µm; a vertical deviation is above or below, not left or right."""
 
-    Attributes:
-        max: distance, any side.
-        rms: root mean square over the time in which the command moves.
-        left: largest to the left of the travel.
-        right: largest to the right of it.
-        above: largest above it.
-        below: largest below it.
-    """
-
-    max: float
-    rms: float
-    left: float
-    right: float
-    above: float
-    below: float
+    max: float  # distance, any side
+    rms: float  # root mean square over the time in which the command moves
+    left: float  # largest to the left of the travel
+    right: float  # largest to the right of it
+    above: float  # largest above it
+    below: float  # largest below it
 
     @classmethod
     def of(cls, stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> SidedError:
         """The figures of one or several runs together; all zero without any. The core's are in mm."""
         whole = ContourError.of(stats)
-        return cls(
-            whole.max,
-            whole.rms,
-            left=max((each.left_mm for each in sides), default=0.0) * 1e3,
-            right=max((each.right_mm for each in sides), default=0.0) * 1e3,
-            above=max((each.above_mm for each in sides), default=0.0) * 1e3,
-            below=max((each.below_mm for each in sides), default=0.0) * 1e3,
-        )
+        names = ("left_mm", "right_mm", "above_mm", "below_mm")
+        largest = (max((getattr(each, name) for each in sides), default=0.0) * 1e3 for name in names)
+        return cls(whole.max, whole.rms, *largest)
 
 
 @dataclass(frozen=True)
 class FittedCircle:
-    """A circle through what was moved or cut on an arc.
+    """A circle through what was moved or cut on an arc."""
 
-    Attributes:
-        nominal_radius_mm: as programmed; of a wall with the tool's radius.
-        fitted_radius_mm: circle of least squares.
-        radius_deviation_um: fitted less nominal.
-        mean_radius_deviation_um: mean distance from the programmed centre less nominal.
-        centre_offset_um: of the fitted centre from the programmed one, in the plane of the arc.
-        form_error_um: largest less smallest radial distance.
-    """
-
-    nominal_radius_mm: float
-    fitted_radius_mm: float
-    radius_deviation_um: float
-    mean_radius_deviation_um: float
-    centre_offset_um: tuple[float, float]
-    form_error_um: float
+    nominal_radius_mm: float  # as programmed; of a wall with the tool's radius
+    fitted_radius_mm: float  # circle of least squares
+    radius_deviation_um: float  # fitted less nominal
+    mean_radius_deviation_um: float  # mean distance from the programmed centre less nominal
+    centre_offset_um: tuple[float, float]  # of the fitted centre from the programmed one, in the plane of the arc
+    form_error_um: float  # largest less smallest radial distance
 
     @classmethod
     def of(cls, arc: _core.ArcFigures | None, nominal_mm: float, centre_mm: FloatArray) -> FittedCircle | None:
@@ -102,23 +74,14 @@ class FittedCircle:
 
 @dataclass(frozen=True)
 class MeasuredArc:
-    """What only an arc has.
+    """What only an arc has."""
 
-    Attributes:
-        nominal_radius_mm: as programmed.
-        command: circle through the set-points; arcs of 10 degrees on, else None.
-        response: through the table's positions, likewise.
-        inside_wall: through the wall towards the centre; None where there is none.
-        outside_wall: through the other wall, likewise.
-        orbit_error_percent: area between track and arc over the sector; None where it is not known.
-    """
-
-    nominal_radius_mm: float
-    command: FittedCircle | None
-    response: FittedCircle | None
-    inside_wall: FittedCircle | None
-    outside_wall: FittedCircle | None
-    orbit_error_percent: Tracks[float | None]
+    nominal_radius_mm: float  # as programmed
+    command: FittedCircle | None  # circle through the set-points; arcs of 10 degrees on, else None
+    response: FittedCircle | None  # through the table's positions, likewise
+    inside_wall: FittedCircle | None  # through the wall towards the centre; None where there is none
+    outside_wall: FittedCircle | None  # through the other wall, likewise
+    orbit_error_percent: Tracks[float | None]  # area between track and arc over the sector; None where it is not known
 
     @classmethod
     def of(cls, figures: _core.SectionFigures, tool_diameter_mm: float) -> MeasuredArc:
@@ -126,33 +89,21 @@ class MeasuredArc:
         nominal, centre, radius = figures.nominal_radius_mm, figures.nominal_centre_mm, tool_diameter_mm / 2.0
         walls = (figures.left_wall_arc, figures.right_wall_arc)
         inside, outside = walls if figures.turns_left else walls[::-1]
-        return cls(
-            nominal_radius_mm=nominal,
-            command=FittedCircle.of(figures.command_arc, nominal, centre),
-            response=FittedCircle.of(figures.response_arc, nominal, centre),
-            inside_wall=FittedCircle.of(inside, nominal - radius, centre),
-            outside_wall=FittedCircle.of(outside, nominal + radius, centre),
-            orbit_error_percent=Tracks(figures.command_orbit_percent, figures.response_orbit_percent),
-        )
+        arcs = (figures.command_arc, 0.0), (figures.response_arc, 0.0), (inside, -radius), (outside, radius)
+        command, response, inner, outer = (FittedCircle.of(arc, nominal + beside, centre) for arc, beside in arcs)
+        orbit_error_percent = Tracks(figures.command_orbit_percent, figures.response_orbit_percent)
+        return cls(nominal, command, response, inner, outer, orbit_error_percent)
 
 
 @dataclass(frozen=True)
 class WallDeviation:
-    """A wall from where the programmed path cuts it, in µm, positive to the left of the travel; None without a wall.
+    """A wall from where the programmed path cuts it, in µm, positive to the left of the travel; None without a wall."""
 
-    Attributes:
-        min: least.
-        mean: of all stations.
-        max: largest.
-        band: largest less least.
-        stations: places at which it was measured.
-    """
-
-    min: float | None
-    mean: float | None
-    max: float | None
-    band: float | None
-    stations: int
+    min: float | None  # least
+    mean: float | None  # of all stations
+    max: float | None  # largest
+    band: float | None  # largest less least
+    stations: int  # places at which it was measured
 
     @classmethod
     def of(cls, wall: _core.WallFigures) -> WallDeviation:
@@ -164,21 +115,13 @@ class WallDeviation:
 
 @dataclass(frozen=True)
 class Width:
-    """From wall to wall, in mm; None where there are no two walls.
+    """From wall to wall, in mm; None where there are no two walls."""
 
-    Attributes:
-        nominal: the tool's diameter.
-        min: least.
-        mean: of all stations.
-        max: largest.
-        stations: places at which it was measured.
-    """
-
-    nominal: float
-    min: float | None
-    mean: float | None
-    max: float | None
-    stations: int
+    nominal: float  # the tool's diameter
+    min: float | None  # least
+    mean: float | None  # of all stations
+    max: float | None  # largest
+    stations: int  # places at which it was measured
 
     @classmethod
     def of(cls, width: _core.WallFigures, tool_diameter_mm: float) -> Width:
@@ -190,21 +133,13 @@ class Width:
 
 @dataclass(frozen=True)
 class WallRoughness:
-    """Roughness and waviness of a wall (ISO 4287, ISO 21920-2).
+    """Roughness and waviness of a wall (ISO 4287, ISO 21920-2)."""
 
-    Attributes:
-        ra_um: arithmetic mean height of the roughness.
-        rz_um: mean of highest less deepest over sampling lengths.
-        wa_um: arithmetic mean height of the waviness.
-        cutoff_mm: cut-off λc.
-        evaluated_mm: length that the figures speak of.
-    """
-
-    ra_um: float
-    rz_um: float
-    wa_um: float
-    cutoff_mm: float
-    evaluated_mm: float
+    ra_um: float  # arithmetic mean height of the roughness
+    rz_um: float  # mean of highest less deepest over sampling lengths
+    wa_um: float  # arithmetic mean height of the waviness
+    cutoff_mm: float  # cut-off λc
+    evaluated_mm: float  # length that the figures speak of
 
     @classmethod
     def of(cls, figures: _core.Roughness | None) -> WallRoughness | None:
@@ -230,43 +165,25 @@ class WallProfile:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSection:
-    """One section of the path: a line, an arc, a curve of short moves, or the lines that one asked for.
+    """One section of the path: a line, an arc, a curve of short moves, or the lines that one asked for."""
 
-    Attributes:
-        region: cutting region in which it is, from 1.
-        kind: "line", "arc" or "curve".
-        lines: first and last of the nominal program, from 1.
-        begin_mm: distance from the region's start.
-        length_mm: of the section.
-        time_s: while the command moves in it.
-        peak_vibration_um: largest |response - command| of each axis while the command moves.
-        residual_vibration_um: the same once it rests; None: it does not stop here.
-        settling_time_s: from then until it stays within the band; null: not while it was looked at; None: no stop.
-        observed_rest_s: how long the rest was looked at; None: no stop.
-        contour_error_um: distance of command and response from the path.
-        arc: what only arcs have; None for others.
-        wall_deviation_um: of both walls.
-        width_mm: from wall to wall.
-        roughness: of both walls; None where a wall is too short.
-        walls: the profiles; None where so many stations are not kept.
-    """
-
-    region: int
-    kind: str
-    lines: tuple[int, int]
-    begin_mm: float
-    length_mm: float
-    time_s: float
-    peak_vibration_um: Xyz[float]
-    residual_vibration_um: Xyz[float] | None
+    region: int  # cutting region in which it is, from 1
+    kind: str  # "line", "arc" or "curve"
+    lines: tuple[int, int]  # first and last of the nominal program, from 1
+    begin_mm: float  # distance from the region's start
+    length_mm: float  # of the section
+    time_s: float  # while the command moves in it
+    peak_vibration_um: Xyz[float]  # largest |response - command| of each axis while the command moves
+    residual_vibration_um: Xyz[float] | None  # the same once it rests; None: it does not stop here
+    # from then until it stays within the band; null: not while it was looked at; None: no stop
     settling_time_s: Xyz[float | None] | None
-    observed_rest_s: float | None
-    contour_error_um: Tracks[SidedError]
-    arc: MeasuredArc | None
-    wall_deviation_um: Sides[WallDeviation]
-    width_mm: Width
-    roughness: Sides[WallRoughness | None]
-    walls: WallProfile | None = field(metadata=hidden())
+    observed_rest_s: float | None  # how long the rest was looked at; None: no stop
+    contour_error_um: Tracks[SidedError]  # distance of command and response from the path
+    arc: MeasuredArc | None  # what only arcs have; None for others
+    wall_deviation_um: Sides[WallDeviation]  # of both walls
+    width_mm: Width  # from wall to wall
+    roughness: Sides[WallRoughness | None]  # of both walls; None where a wall is too short
+    walls: WallProfile | None = field(metadata=hidden())  # the profiles; None where so many stations are not kept
 
     @classmethod
     def of(
@@ -274,6 +191,9 @@ class MeasuredSection:
     ) -> MeasuredSection:
         """From the core's figures, and with what tool the walls were cut."""
         section, rest = figures.section, figures.rest
+        settling = None
+        if rest is not None:
+            settling = Xyz(*(float(value) if math.isfinite(value) else None for value in rest.settling_s))
         return cls(
             region=region,
             kind=section.kind.name,
@@ -283,9 +203,7 @@ class MeasuredSection:
             time_s=figures.time_s,
             peak_vibration_um=largest_xyz_um([figures.peak_mm]),
             residual_vibration_um=None if rest is None else largest_xyz_um([rest.residual_mm]),
-            settling_time_s=None
-            if rest is None
-            else Xyz(*(float(value) if math.isfinite(value) else None for value in rest.settling_s)),
+            settling_time_s=settling,
             observed_rest_s=None if rest is None else rest.observed_s,
             contour_error_um=Tracks(
                 SidedError.of([figures.command], [figures.command_sides]),

@@ -1,8 +1,6 @@
 """Virtual metrology: what the response of the machine would measure on the part, section by section of the path.
 
-Programs are simulated as the controller would, and the response is measured against the programmed path: vibration,
-contour, radius, the walls that a round tool leaves, their roughness. The tool is a disc that removes what it sweeps:
-cutting forces, the tool's deflection and the marks of its teeth are not in it.
+The tool is a disc that removes what it sweeps: cutting forces, its deflection and the marks of its teeth are not in it.
 """
 
 from __future__ import annotations
@@ -109,27 +107,19 @@ def measure(
     limit_um = machine.tolerance.contour_um
     beside = [(each.source, ours, (against or each).source) for each, ours in zip(several, shaped, strict=True)]
     measured = []
-    for program, is_shaped, counts in zip(several, shaped, _judged(beside), strict=True):
-        nominal = against or program
-        jobs = jobs_of(program, nominal, machine, lines)
-        regions = list(_measured_regions(jobs, machine, plant, options, one_done))
-        measured.append(
-            MeasuredProgram.of(
-                regions,
-                program=program.source,
-                shaped=is_shaped,
-                measured_against=nominal.source,
-                limit_um=limit_um if counts else None,
-                warnings=[
-                    *program.warnings,
-                    *machine_warnings(machine),
-                    *region_range_warnings(program.regions, machine),
-                    *(why for _, why in shaped_warnings(program, machine)),
-                    *_spacing_warnings(regions, station_spacing_mm),
-                    *_section_warnings(jobs),
-                ],
-            )
+    for program, about, counts in zip(several, beside, _judged(beside), strict=True):
+        jobs = jobs_of(program, against or program, machine, lines)
+        regions = tuple(_measured_regions(jobs, machine, plant, options, one_done))
+        warnings = (
+            *program.warnings,
+            *machine_warnings(machine),
+            *region_range_warnings(program.regions, machine),
+            *(why for _, why in shaped_warnings(program, machine)),
+            *_coarse_warnings(regions, station_spacing_mm, jobs),
         )
+        measured.append(MeasuredProgram.of(about, regions, limit_um if counts else None, warnings))
+    names = [Path(program.source).name for program in several]
+    second = several[1] if len(several) > 1 else None
     return Measurement(
         machine=machine.name,
         plant=plant,
@@ -140,37 +130,24 @@ def measure(
         roughness_lambda_s_mm=lambda_s_mm,
         contour_tolerance_um=limit_um,
         programs=tuple(measured),
-        simulated=_simulated(several, machine, plant),
+        simulated=SimulatedPrograms(several[0], machine, second, labels=(names[0], names[-1]), plant=plant),
     )
 
 
-def _simulated(programs: Sequence[Program], machine: Machine, plant: str) -> SimulatedPrograms:
-    """The first two programs, under the names of their files."""
-    names = [Path(program.source).name for program in programs]
-    second = programs[1] if len(programs) > 1 else None
-    return SimulatedPrograms(programs[0], machine, second, labels=(names[0], names[-1]), plant=plant)
-
-
 def _judged(programs: Sequence[tuple[str, bool, str]]) -> list[bool]:
-    """Which programs are held against the tolerance; each: its name, whether it is shaped, against what it is measured.
-
-    Shaped programs beside the programmed path; what they are compared with only stands beside them. Without such a
-    program the others. A shaped program's own path is not the programmed one: it is not judged against that.
-    """
+    """Which programs are held against the tolerance; each: name, whether it is shaped, against what it is measured."""
+    # Shaped ones beside the programmed path, if there are any; the own path of a shaped one is not the programmed one.
     beside = [shaped and against != name for name, shaped, against in programs]
     return beside if any(beside) else [not shaped for _, shaped, _ in programs]
 
 
-def _spacing_warnings(regions: Iterable[MeasuredRegion], asked_mm: float) -> Iterator[str]:
+def _coarse_warnings(regions: Iterable[MeasuredRegion], asked_mm: float, jobs: Iterable[Job]) -> Iterator[str]:
     for region in regions:
         if region.station_spacing_mm > asked_mm:
             yield (
                 f"lines {region.lines[0]} to {region.lines[1]}: so long a path that its walls are measured every "
                 f"{region.station_spacing_mm:.3g} mm, not every {asked_mm:g} mm"
             )
-
-
-def _section_warnings(jobs: Iterable[Job]) -> Iterator[str]:
     joined_mm = max((job.joined_mm for job in jobs), default=0.0)
     if joined_mm > 0.0:
         yield (
@@ -270,12 +247,10 @@ def _measured(
     for command, response in chunks:
         metrology.feed(command, response)
     walls = [_wall(metrology, index) if keep_walls else None for index in range(len(sections))]
-    figures = metrology.finish()
-    found = (
-        MeasuredSection.of(each, region, 2.0 * options.tool_radius_mm, wall)
-        for each, wall in zip(figures.sections, walls, strict=True)
-    )
-    return MeasuredRegion(lines, path, figures, tuple(found), metrology.station_spacing_mm)
+    figures, diameter_mm = metrology.finish(), 2.0 * options.tool_radius_mm
+    both = zip(figures.sections, walls, strict=True)
+    found = tuple(MeasuredSection.of(each, region, diameter_mm, wall) for each, wall in both)
+    return MeasuredRegion(lines, path, figures, found, metrology.station_spacing_mm)
 
 
 def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
@@ -306,9 +281,7 @@ class Job:
     nominal: _core.Region
     path: _core.Path
     sections: list[_core.PathSection]
-    joined_mm: float = (
-        0.0  # runs shorter than this are one curve, because there were too many of them; 0: as everywhere
-    )
+    joined_mm: float = 0.0  # runs shorter than this are one curve, as there were too many; 0: as everywhere
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
@@ -334,17 +307,11 @@ def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequenc
 
 
 def _joined(pairs: Sequence[tuple[_core.Region, _core.Region]], machine: Machine, *, own_blocks: bool) -> float:
-    """How many times longer than elsewhere runs must be to stand alone, so that a program has a number of sections
-    that somebody may look at; a region has one at least."""
-    most = max(_MAX_SECTIONS, len(pairs))
+    """How many times longer than elsewhere runs must be to stand alone, so that somebody may look at all sections."""
+    most = max(_MAX_SECTIONS, len(pairs))  # a region has one at least
+    shortest = [(region.path, _short_mm(region.path, machine, own_blocks=own_blocks)) for _, region in pairs]
     factor = 1.0
-    while factor < _MAX_FACTOR:
-        count = sum(
-            len(_core.path_sections(region.path, factor * _short_mm(region.path, machine, own_blocks=own_blocks)))
-            for _, region in pairs
-        )
-        if count <= most:
-            break
+    while factor < _MAX_FACTOR and sum(len(_core.path_sections(path, factor * mm)) for path, mm in shortest) > most:
         factor *= 2.0
     return factor
 

@@ -125,12 +125,8 @@ def _mark_sections(panels: list[Axes], region: MeasuredRegion) -> None:
 
 def _worst_region(measurement: Measurement) -> int | None:
     """The region whose walls leave their place most in any program, of those whose walls were kept in all."""
-    count = min(len(program.regions) for program in measurement.programs)
-    found: dict[int, float] = {}
-    for index in range(count):
-        regions = [program.regions[index] for program in measurement.programs]
-        if all(_walls(region) for region in regions):
-            found[index] = max(_largest_um(region) for region in regions)
+    beside = enumerate(zip(*(program.regions for program in measurement.programs), strict=False))
+    found = {index: max(map(_largest_um, regions)) for index, regions in beside if all(map(_walls, regions))}
     return max(found, key=lambda index: found[index], default=None)
 
 
@@ -161,9 +157,8 @@ def _joined(region: MeasuredRegion) -> WallProfile:
 
 
 def _largest_um(region: MeasuredRegion) -> float:
-    return max(
-        float(np.nanmax(np.abs(np.concatenate([wall.left_um, wall.right_um])), initial=0.0)) for wall in _walls(region)
-    )
+    walls = (np.concatenate([wall.left_um, wall.right_um]) for wall in _walls(region))
+    return max(float(np.nanmax(np.abs(each), initial=0.0)) for each in walls)
 
 
 def _edge(wall: WallProfile, deviation_mm: FloatArray, side_mm: float) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -37,18 +37,14 @@ class _Row:
 
 def _program_columns(names: Sequence[str]) -> tuple[Column, ...]:
     """One per program; the values of more than two wrap, so that they fit beside each other."""
-    return tuple(
-        Column(name, value=partial(_value, rank), style=partial(_style, rank), text=len(names) > 2)
-        for rank, name in enumerate(names)
-    )
 
+    def column(rank: int, name: str) -> Column:
+        def style(row: _Row) -> str:
+            return "bold red" if row.out and row.out[rank] else ""
 
-def _value(rank: int, row: _Row) -> str:
-    return row.values[rank] if row.values else ""
+        return Column(name, value=lambda row: row.values[rank] if row.values else "", style=style, text=len(names) > 2)
 
-
-def _style(rank: int, row: _Row) -> str:
-    return "bold red" if row.out and row.out[rank] else ""
+    return tuple(column(rank, name) for rank, name in enumerate(names))
 
 
 # --- the worst of every figure ----------------------------------------------------------------------------------------
@@ -72,17 +68,13 @@ def summary_table(
 
 def _worst(sections: Sections, values: Values) -> str:
     """The largest value and its place; empty where no section has the figure."""
-    found = [
-        (value, -number, section)
-        for number, section in enumerate(sections, start=1)
-        for value in values(section)
-        if value is not None
-    ]
+    numbered = enumerate(sections, start=1)
+    found = [(value, -number) for number, each in numbered for value in values(each) if value is not None]
     if not found:
         return ""
-    value, number, section = max(found, key=lambda each: each[:2])
+    value, number = max(found)
     text = "not settled" if math.isinf(value) else f"{value:.2f}"
-    return f"{text} ({-number}, {section.place})"
+    return f"{text} ({-number}, {sections[-number - 1].place})"
 
 
 def _figures(band_um: float) -> Iterator[tuple[str, Values]]:
@@ -92,11 +84,8 @@ def _figures(band_um: float) -> Iterator[tuple[str, Values]]:
         for axis in "xyz":
             yield f"{name} {axis.upper()} µm", partial(_of_axis, key, axis)
     yield f"settling to {band_um:g} µm, ms", _settling_ms
-    yield "fitted radius off µm", lambda s: [_radius_off(s, "response")]
-    yield (
-        "inside, outside wall radius off µm",
-        lambda s: [_radius_off(s, "inside_wall"), _radius_off(s, "outside_wall")],
-    )
+    yield "fitted radius off µm", partial(_radii_off, ("response",))
+    yield "inside, outside wall radius off µm", partial(_radii_off, ("inside_wall", "outside_wall"))
     yield "orbit error of response %", lambda s: [None if s.arc is None else s.arc.orbit_error_percent.response]
     yield "cut-width band µm", lambda s: [wall.band for wall in s.wall_deviation_um.both()]
     yield "width off µm", _width_off_um
@@ -117,9 +106,9 @@ def _settling_ms(section: MeasuredSection) -> list[float | None]:
     return [math.inf if value is None else 1e3 * value for value in section.settling_time_s or ()]
 
 
-def _radius_off(section: MeasuredSection, key: str) -> float | None:
-    circle: FittedCircle | None = None if section.arc is None else getattr(section.arc, key)
-    return None if circle is None else abs(circle.radius_deviation_um)
+def _radii_off(keys: Sequence[str], section: MeasuredSection) -> list[float | None]:
+    circles: list[FittedCircle | None] = [getattr(section.arc, key, None) for key in keys]
+    return [None if circle is None else abs(circle.radius_deviation_um) for circle in circles]
 
 
 def _width_off_um(section: MeasuredSection) -> list[float | None]:
@@ -175,13 +164,9 @@ def _section_rows(sections: Sections, limit_um: float | None, band_um: float) ->
 def _contour_rows(sections: Sections, limit_um: float | None) -> Iterator[_Row]:
     response = [section.contour_error_um.response for section in sections]
     command = [section.contour_error_um.command for section in sections]
-    yield _Row(
-        "contour error µm",
-        tuple(f"{each.max:.2f}" for each in response),
-        "0",
-        "" if limit_um is None else f"{limit_um:g}",
-        tuple(limit_um is not None and each.max > limit_um for each in response),
-    )
+    limit = "" if limit_um is None else f"{limit_um:g}"
+    out = tuple(limit_um is not None and each.max > limit_um for each in response)
+    yield _Row("contour error µm", tuple(f"{each.max:.2f}" for each in response), "0", limit, out)
     yield _Row("  left / right µm", tuple(_pair((each.left, each.right), 2) for each in response))
     if _off_the_level(response):
         yield _Row("  above / below µm", tuple(_pair((each.above, each.below), 2) for each in response))
@@ -274,61 +259,42 @@ class MeasuredRegion:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredProgram:
-    """One program, measured.
+    """One program, measured."""
 
-    Attributes:
-        program: its name.
-        shaped: simulated as one that shapegcode wrote: block by block at its feed.
-        measured_against: name of the program whose path is the nominal one; its own name for its own path.
-        ok: the response stays within the tolerance of the path; None: it is not judged.
-        cutting_time_s: of all regions, until the set-points rest.
-        contour_error_um: of all regions; missed corners count.
-        residual_vibration_um: largest |response - command| of each axis at the stops.
-        sections: of all regions, in order.
-        warnings: about the program and the machine.
-        regions: in order.
-    """
-
-    program: str
-    shaped: bool
-    measured_against: str
-    ok: bool | None
-    cutting_time_s: float
-    contour_error_um: Tracks[SidedError]
-    residual_vibration_um: Xyz[float]
-    sections: tuple[MeasuredSection, ...]
-    warnings: tuple[str, ...]
-    regions: tuple[MeasuredRegion, ...] = field(metadata=hidden())
+    program: str  # its name
+    shaped: bool  # simulated as one that shapegcode wrote: block by block at its feed
+    measured_against: str  # name of the program whose path is the nominal one; its own name for its own path
+    ok: bool | None  # the response stays within the tolerance of the path; None: it is not judged
+    cutting_time_s: float  # of all regions, until the set-points rest
+    contour_error_um: Tracks[SidedError]  # of all regions; missed corners count
+    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis at the stops
+    sections: tuple[MeasuredSection, ...]  # of all regions, in order
+    warnings: tuple[str, ...]  # about the program and the machine
+    regions: tuple[MeasuredRegion, ...] = field(metadata=hidden())  # in order
 
     @classmethod
     def of(
         cls,
-        regions: Iterable[MeasuredRegion],
-        *,
-        program: str,
-        shaped: bool,
-        measured_against: str,
+        about: tuple[str, bool, str],
+        regions: tuple[MeasuredRegion, ...],
         limit_um: float | None,
-        warnings: Iterable[str] = (),
+        warnings: tuple[str, ...],
     ) -> MeasuredProgram:
-        """The figures of its regions together."""
-        kept = tuple(regions)
-        figures = [region.figures for region in kept]
+        """The figures of its regions together; about: program, whether it is shaped, what it is measured against."""
+        figures = [region.figures for region in regions]
         contour = Tracks(
             SidedError.of([each.command for each in figures], [each.command_sides for each in figures]),
             SidedError.of([each.response for each in figures], [each.response_sides for each in figures]),
         )
         return cls(
-            program=program,
-            shaped=shaped,
-            measured_against=measured_against,
+            *about,
             ok=None if limit_um is None else contour.response.max <= limit_um,
             cutting_time_s=sum(each.duration_s for each in figures),
             contour_error_um=contour,
             residual_vibration_um=largest_xyz_um(each.rest.residual_mm for each in figures),
-            sections=tuple(section for region in kept for section in region.sections),
-            warnings=tuple(warnings),
-            regions=kept,
+            sections=tuple(section for region in regions for section in region.sections),
+            warnings=warnings,
+            regions=regions,
         )
 
     @property
@@ -454,10 +420,7 @@ class Measurement(Result):
             judged = any(program.ok is not None for program in beside)
             limit_um = self.contour_tolerance_um if judged else None
             sections = {name: program.sections for name, program in by_name.items()}
-            whole = {
-                name: (program.cutting_time_s, program.contour_error_um.response.max)
-                for name, program in by_name.items()
-            }
+            whole = {name: (each.cutting_time_s, each.contour_error_um.response.max) for name, each in by_name.items()}
             on = f"{self.machine}, tool of {self.tool_diameter_mm:g} mm, {self.plant} plant"
             if any(sections.values()):
                 found.append(summary_table(f"worst figures on {on}", sections, whole, self.settling_band_um))

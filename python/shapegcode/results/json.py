@@ -12,9 +12,11 @@ from __future__ import annotations
 import dataclasses
 import enum
 import hashlib
+import inspect
 import io
 import json
 import math
+import re
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
@@ -245,8 +247,11 @@ def _object(
     }
 
 
+_FIELD = re.compile(r" {4}(\w+): .*?(?:  # (.*))?")
+
+
 def _meanings(cls: type) -> dict[str, str]:
-    """What the docstrings of a class and its bases say under `Attributes:`, and those of the properties."""
+    """What a class and its bases say of their fields: under `Attributes:`, else in comments; and of the properties."""
     found: dict[str, str] = {}
     for name in getattr(cls, "json_extra", {}):
         member = getattr(cls, name, None)
@@ -255,6 +260,8 @@ def _meanings(cls: type) -> dict[str, str]:
     for base in reversed(cls.__mro__):
         lines = (base.__doc__ or "").splitlines()
         at = next((rank for rank, line in enumerate(lines) if line.strip() == "Attributes:"), len(lines))
+        if at == len(lines) and dataclasses.is_dataclass(base):
+            found |= _comments(base)
         name = ""
         for line in lines[at + 1 :]:
             if not line.strip():
@@ -264,6 +271,20 @@ def _meanings(cls: type) -> dict[str, str]:
                 name, found[head] = head, rest
             elif name:
                 found[name] += " " + line.strip()
+    return found
+
+
+def _comments(cls: type) -> dict[str, str]:
+    """What stands behind the fields of a class in its source, or in the lines above them."""
+    found: dict[str, str] = {}
+    above: list[str] = []
+    for line in inspect.getsource(cls).splitlines():
+        if line.startswith("    # "):
+            above.append(line[6:])
+            continue
+        if (field := _FIELD.fullmatch(line)) and (said := [*above, *filter(None, [field[2]])]):
+            found[field[1]] = " ".join(said) + "."
+        above = []
     return found
 
 

@@ -1,13 +1,12 @@
 """A test cut: tool, cutting conditions and measuring passes, and the side file that keeps them for the fit.
 
-Every measuring pass goes along +X at a constant Y and leaves a straight wall. The material in front of it has an edge
-whose height above that wall is known over X, so the radial depth is known wherever the tool's axis is.
+A pass goes along +X at a constant Y; over X the height of the material's edge above the wall that it leaves is known.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,6 +15,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from scipy.ndimage import grey_dilation
 
 from shapegcode import _core
+from shapegcode.cutting.tool import COEFFICIENTS
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import DataFile
 from shapegcode.io.record import FloatArray
@@ -28,24 +28,15 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 @dataclass(frozen=True)
 class CuttingLaw:
-    """The seven coefficients of the force law, as in the tool file's ``[cutting]``; see docs/concepts/cutting_force.md.
+    """The coefficients of the force law, as in the tool file's ``[cutting]``; see docs/concepts/cutting_force.md."""
 
-    Attributes:
-        specific_n_per_mm2: specific cutting force k1 at a chip 1 mm thick.
-        specific_exponent: of the chip thickness in k1.
-        ratio: of radial to tangential force, k2, at a chip 1 mm thick.
-        ratio_exponent: of the chip thickness in k2.
-        tangential_edge_n_per_mm: tangential force of the edge per length, K_te.
-        radial_edge_n_per_mm: radial force of the edge per length, K_re.
-        chip_thickness: to which the exponents belong, "mean" of the engagement or "local".
-    """
-
-    specific_n_per_mm2: float
-    specific_exponent: float = 0.0
-    ratio: float = 0.0
-    ratio_exponent: float = 0.0
-    tangential_edge_n_per_mm: float = 0.0
-    radial_edge_n_per_mm: float = 0.0
+    specific_n_per_mm2: float  # specific cutting force k1 at a chip 1 mm thick
+    specific_exponent: float = 0.0  # of the chip thickness in k1
+    ratio: float = 0.0  # of radial to tangential force, k2, at a chip 1 mm thick
+    ratio_exponent: float = 0.0  # of the chip thickness in k2
+    tangential_edge_n_per_mm: float = 0.0  # tangential force of the edge per length, K_te
+    radial_edge_n_per_mm: float = 0.0  # radial force of the edge per length, K_re
+    # to which the exponents belong, "mean" of the engagement or "local"
     chip_thickness: Literal["mean", "local"] = "mean"
 
     @classmethod
@@ -60,27 +51,15 @@ class CuttingLaw:
         return _core.CuttingCoefficients(**values, thickness=_core.ChipThickness.__members__[self.chip_thickness])
 
 
-COEFFICIENTS = tuple(each.name for each in fields(CuttingLaw) if each.name != "chip_thickness")
-"""Names of the numbers of a force law."""
-
-
 @dataclass(frozen=True)
 class CutTool:
-    """The end mill of a test cut.
+    """The end mill of a test cut."""
 
-    Attributes:
-        diameter_mm: as it turns, measured.
-        flutes: their number.
-        helix_deg: right-hand helix.
-        runout_mm: how far each flute stands out; empty: not known.
-        cutting: the force law that is known before.
-    """
-
-    diameter_mm: _Positive
-    flutes: Annotated[int, Field(gt=0)]
-    helix_deg: _Finite
-    runout_mm: tuple[_Finite, ...] = ()
-    cutting: CuttingLaw = CuttingLaw(0.0)
+    diameter_mm: _Positive  # as it turns, measured
+    flutes: Annotated[int, Field(gt=0)]  # their number
+    helix_deg: _Finite  # right-hand helix
+    runout_mm: tuple[_Finite, ...] = ()  # how far each flute stands out; empty: not known
+    cutting: CuttingLaw = CuttingLaw(0.0)  # the force law that is known before
 
     @property
     def radius_mm(self) -> float:
@@ -90,22 +69,16 @@ class CutTool:
 
 @dataclass(frozen=True)
 class MeasuringPass:
-    """One pass whose force is recorded.
+    """One pass whose force is recorded."""
 
-    Attributes:
-        name: what is special about it.
-        start_mm: X of the tool's axis at its start, in the air.
-        end_mm: X at its end, in the air.
-        edge_x_mm: ascending X of the edge's corner points, from one end of the stock to the other.
-        edge_height_mm: how high the edge stands there above the wall that the pass leaves; straight between them.
-        feeds: pairs (X up to which it holds, feed in mm/min), ascending.
-    """
-
-    name: str
-    start_mm: _Finite
-    end_mm: _Finite
+    name: str  # what is special about it
+    start_mm: _Finite  # X of the tool's axis at its start, in the air
+    end_mm: _Finite  # X at its end, in the air
+    # ascending X of the edge's corner points, from one end of the stock to the other
     edge_x_mm: Annotated[tuple[_Finite, ...], Field(min_length=2)]
+    # how high the edge stands there above the wall that the pass leaves; straight between them
     edge_height_mm: Annotated[tuple[_Finite, ...], Field(min_length=2)]
+    # pairs (X up to which it holds, feed in mm/min), ascending
     feeds: Annotated[tuple[tuple[_Finite, _Positive], ...], Field(min_length=1)]
 
     @property
@@ -140,81 +113,49 @@ class MeasuringPass:
 
 @dataclass(frozen=True)
 class TaperDetails:
-    """What is special about a taper.
+    """What is special about a taper."""
 
-    Attributes:
-        radial_depth_mm: at the begin and at the end of the stock.
-        length_mm: of the stock.
-    """
-
-    radial_depth_mm: tuple[float, float]
-    length_mm: float
+    radial_depth_mm: tuple[float, float]  # at the begin and at the end of the stock
+    length_mm: float  # of the stock
 
 
 @dataclass(frozen=True)
 class Deepest:
-    """Where a pass meets most.
+    """Where a pass meets most."""
 
-    Attributes:
-        max: radial depth, mm.
-        at_mm: X of the tool's axis.
-    """
-
-    max: float
-    at_mm: float
+    max: float  # radial depth, mm
+    at_mm: float  # X of the tool's axis
 
 
 @dataclass(frozen=True)
 class DeeperStretch:
-    """Where passes meet more than the corner has, by more than 1 µm, as the tool that mills the edge is round.
+    """Where passes meet more than the corner has, by more than 1 µm, as the tool that mills the edge is round."""
 
-    Attributes:
-        from_mm: X at its begin.
-        to_mm: X at its end.
-        most_mm: how much more.
-    """
-
-    from_mm: float
-    to_mm: float
-    most_mm: float
+    from_mm: float  # X at its begin
+    to_mm: float  # X at its end
+    most_mm: float  # how much more
 
 
 @dataclass(frozen=True)
 class CornerDetails:
-    """What is special about an unrolled corner.
+    """What is special about an unrolled corner."""
 
-    Attributes:
-        allowance_mm: radial depth on the walls.
-        rough_radius_mm: of the rough corner.
-        finish_radius_mm: of the finished corner.
-        interval_mm: length of a block with a feed of its own.
-        corner_begins_at_mm: X.
-        radial_depth_mm: the deepest place.
-        deeper_than_corner: where more is met than the corner has; None: nowhere.
-    """
-
-    allowance_mm: float
-    rough_radius_mm: float
-    finish_radius_mm: float
-    interval_mm: float
-    corner_begins_at_mm: float
-    radial_depth_mm: Deepest
-    deeper_than_corner: DeeperStretch | None
+    allowance_mm: float  # radial depth on the walls
+    rough_radius_mm: float  # of the rough corner
+    finish_radius_mm: float  # of the finished corner
+    interval_mm: float  # length of a block with a feed of its own
+    corner_begins_at_mm: float  # X
+    radial_depth_mm: Deepest  # the deepest place
+    deeper_than_corner: DeeperStretch | None  # where more is met than the corner has; None: nowhere
 
 
 @dataclass(frozen=True)
 class IntervalDetails:
-    """What is special about an interval test.
+    """What is special about an interval test."""
 
-    Attributes:
-        radial_depth_mm: everywhere.
-        intervals_mm: length of the blocks of each pass.
-        steps_begin_at_mm: X of the first change of the feed.
-    """
-
-    radial_depth_mm: float
-    intervals_mm: tuple[_Positive, ...]
-    steps_begin_at_mm: float
+    radial_depth_mm: float  # everywhere
+    intervals_mm: tuple[_Positive, ...]  # length of the blocks of each pass
+    steps_begin_at_mm: float  # X of the first change of the feed
 
 
 @dataclass(frozen=True)
@@ -286,11 +227,9 @@ def read_test_cut(path: str | Path) -> TestCut:
         raise ArgumentError(f"{path}: {where}: {first['msg']}: write the test cut again") from error
     if type(cut.about) is not FIGURES[cut.kind]:
         raise ArgumentError(f"{path}: the figures in 'about' are not those of a {cut.kind}: write the test cut again")
-    for number, each in enumerate(cut.passes, start=1):
-        if not each.consistent:
-            raise ArgumentError(
-                f"{path}: pass {number}: edge, feeds and ends do not fit together: write the test cut again"
-            )
+    wrong = next((number for number, each in enumerate(cut.passes, start=1) if not each.consistent), None)
+    if wrong is not None:
+        raise ArgumentError(f"{path}: pass {wrong}: edge, feeds and ends do not fit together: write the test cut again")
     return cut
 
 
@@ -313,27 +252,21 @@ class Edge:
         x, y = self.x_mm, self.height_mm
         inside = np.interp(x_mm, x, y)
         first, last = ((y[k + 1] - y[k]) / (x[k + 1] - x[k]) for k in (0, -2))
-        return np.asarray(
-            inside
-            + np.where(x_mm < x[0], (x_mm - x[0]) * first, 0.0)
-            + np.where(x_mm > x[-1], (x_mm - x[-1]) * last, 0.0)
-        )
+        before, behind = np.where(x_mm < x[0], x_mm - x[0], 0.0), np.where(x_mm > x[-1], x_mm - x[-1], 0.0)
+        return np.asarray(inside + before * first + behind * last)
 
 
 def unrolled_edge(
     s_mm: FloatArray, radial_depth_mm: FloatArray, radius_mm: float, stock_mm: float, at_mm: float
 ) -> Edge:
-    """The edge on which a straight pass meets the radial depth of another path at each distance.
-
-    Where the axis stands at X, the front of the tool comes out of the edge at X + sqrt(R² - (R - depth)²), as high
-    above the wall as the depth: these points are the edge.
-    """
+    """The edge on which a straight pass meets the radial depth of another path at each distance."""
     depth = radial_depth_mm
     if depth.max() >= radius_mm:
         raise ArgumentError(
             f"the radial depth reaches {depth.max():.3f} mm, the tool's radius is {radius_mm:g} mm: such a corner "
             "cannot be unrolled on a straight line"
         )
+    # Where the axis stands at s, the tool's front comes out of the edge there, as high above the wall as the depth.
     x = s_mm + at_mm + np.sqrt(radius_mm**2 - (radius_mm - depth) ** 2)
     back = np.flatnonzero(np.diff(x) <= 0.0)
     if back.size:
@@ -346,11 +279,7 @@ def unrolled_edge(
 
 
 def offset_line(line: Edge, radius: float, start: float, end: float, *, inwards: bool = False) -> Edge:
-    """Outermost height over X, in mm, of circles about the points of a line, within 0.1 µm.
-
-    Outwards: the path of the axis of a tool that mills an edge without cutting into it. Inwards: the edge that a tool
-    leaves whose axis follows a path.
-    """
+    """Path of a tool's axis that mills an edge, within 0.1 µm; inwards: the edge that a tool on such a path leaves."""
     side = -1.0 if inwards else 1.0
     if len(line.x_mm) == 2:
         slope = float(np.diff(line.height_mm)[0] / np.diff(line.x_mm)[0])

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -87,11 +89,9 @@ class CutConditions:
 
     def _cut_tool(self) -> CutTool:
         """The tool as the side file holds it."""
-        cutter = self.tool.tool
-        runout = tuple(0.001 * value for value in cutter.runout_um or ())
-        return CutTool(
-            cutter.diameter_mm, cutter.flutes, cutter.helix_deg, runout, CuttingLaw.of(self.tool.coefficients())
-        )
+        mill, law = self.tool.tool, CuttingLaw.of(self.tool.coefficients())
+        runout = tuple(0.001 * value for value in mill.runout_um or ())
+        return CutTool(mill.diameter_mm, mill.flutes, mill.helix_deg, runout, law)
 
     def _check_feeds(self, feeds_mm_per_min: Sequence[float]) -> None:
         """Refuse what the machine or the tool cannot do."""
@@ -214,13 +214,8 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     excess = met - np.interp(x, s + straight, depth)
     more = np.flatnonzero(excess > _FEW_UM)
     deeper = DeeperStretch(float(x[more[0]]), float(x[more[-1]]), float(excess.max())) if more.size else None
-    about = CornerDetails(
-        *sizes,
-        interval_mm=interval,
-        corner_begins_at_mm=straight,
-        radial_depth_mm=Deepest(float(met.max()), float(x[int(np.argmax(met))])),
-        deeper_than_corner=deeper,
-    )
+    deepest = Deepest(float(met.max()), float(x[int(np.argmax(met))]))
+    about = CornerDetails(*sizes, interval, straight, deepest, deeper)
     modified = [(begin, given.feed_mm_per_min), *blocks, constant]
     passes = [("CONSTANT FEED", [constant]), ("MODIFIED FEED", modified)]
     return _design(given, wanted_edge, stock, passes, about, met=edge)
@@ -308,14 +303,8 @@ def _measuring_pass(
     air = max(_MIN_AIR_MM, math.ceil(_AIR_REVS * max(feed for _, feed in blocks) / given.spindle))
     air += given.tool.radius_mm
     end = round(stock_mm + air, 3)
-    return MeasuringPass(
-        name=name,
-        start_mm=round(-air, 3),
-        end_mm=end,
-        edge_x_mm=tuple(x.tolist()),
-        edge_height_mm=tuple(edge.at(x).tolist()),
-        feeds=tuple((end if until is None else until, feed) for until, feed in blocks),
-    )
+    feeds = tuple((end if until is None else until, feed) for until, feed in blocks)
+    return MeasuringPass(name, round(-air, 3), end, tuple(x.tolist()), tuple(edge.at(x).tolist()), feeds)
 
 
 def _corner_feeds(given: CutConditions, radial_depth_mm: FloatArray) -> FloatArray:
@@ -331,9 +320,8 @@ def _blocks(
     x_mm: FloatArray, feed: FloatArray, interval_mm: float, begin: float, end: float
 ) -> list[tuple[float, float]]:
     """Blocks of one length, each with the least feed within it."""
-    count = max(1, math.ceil((end - begin) / interval_mm - 1e-9))
     blocks = []
-    for k in range(count):
+    for k in range(max(1, math.ceil((end - begin) / interval_mm - 1e-9))):
         low, high = begin + k * interval_mm, begin + (k + 1) * interval_mm
         within = feed[(x_mm >= low - 1e-9) & (x_mm <= high + 1e-9)]
         blocks.append((round(high, 3), round(float(within.min()), 1)))
@@ -399,8 +387,7 @@ def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> C
 def program_text(design: CutDesign, number: int = 7101) -> str:
     """The program of a test cut."""
     writer = _Writer(design)
-    lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})"]
-    lines += [f"({line})" for line in writer.head()]
+    lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})", *(f"({line})" for line in writer.head())]
     lines += ["G21 G17 G90 G94 G64 G40 G49 G80", "G54"]
     lines += [f"S{design.cut.spindle_rev_per_min:g} M03", "G04 P3000", f"G00 Z{_text(_CLEAR_Z_MM)}"]
     for k in range(len(design.cut.passes)):
@@ -420,37 +407,22 @@ class _Writer:
         self.decimals = max(1, round(-math.log10(self.controller.least_increment_mm)))
         self.radius = self.cut.tool.radius_mm
         self.side = -1.0 if not self.cut.up else 1.0  # of the material, along Y: what lies within the raw edge
-        self.walls: list[float] = []  # how far each wall lies within the raw edge
-        depth = 0.0
-        for each in self.cut.passes:
-            depth += round(max(each.edge_height_mm) + _SKIM_MM, 3)
-            self.walls.append(depth)
+        # How far each wall lies within the raw edge.
+        self.walls = list(accumulate(round(max(each.edge_height_mm) + _SKIM_MM, 3) for each in self.cut.passes))
 
     def head(self) -> Iterator[str]:
         """Instructions, in lines that any control shows."""
-        cut, tool = self.cut, self.cut.tool
-        left, right = min(each.start_mm for each in cut.passes), max(each.end_mm for each in cut.passes)
-        edge = "REAR EDGE" if self.side < 0.0 else "FRONT EDGE"
-        rate = math.ceil(_SAMPLES_PER_TOOTH * tool.flutes * cut.spindle_rev_per_min / _PER_MINUTE / 10.0) * 10
+        cut = self.cut
+        ends = self.side * (-_RAW_MM - 3.0 * self.radius), self.side * self.walls[-1]
+        rate = math.ceil(_SAMPLES_PER_TOOTH * cut.tool.flutes * cut.spindle_rev_per_min / _PER_MINUTE / 10.0) * 10
+        text = (resources.files("shapegcode") / "data" / "testcut_head.txt").read_text(encoding="ascii")
         yield from _PURPOSES[cut.kind]
-        yield f"TESTCUT BY SHAPEGCODE FOR {_plain(cut.machine)}"
-        yield f"TOOL IN SPINDLE: D{tool.diameter_mm:g} MM, {tool.flutes} FLUTES,"
-        yield f"HELIX {tool.helix_deg:g} DEG, FLUTES OVER {cut.axial_depth_mm:g} MM LONG"
-        yield f"STOCK: X {self.design.stock_mm:g} MM LONG, {edge} FREE,"
-        yield f"AT LEAST {math.ceil(self.walls[-1] + 5.0)} MM WIDE BEYOND THE CLAMPS,"
-        yield f"FREE FROM TOP TO {math.ceil(cut.axial_depth_mm + 2.0)} MM BELOW"
-        yield "CLAMP IT ON THE DYNAMOMETER, EDGE ALONG X WITHIN 0.1 MM"
-        yield f"ZERO G54: X LEFT END, Y {edge}, Z TOP OF STOCK,"
-        yield "Z WITH THIS TOOL: NO LENGTH OFFSET IS CALLED"
-        far = self.side * (-_RAW_MM - 3.0 * self.radius), self.side * self.walls[-1]
-        yield f"TOOL AXIS: X{left:g} TO {right:g}, Y{min(far):.1f} TO {max(far):.1f},"
-        yield f"Z-{cut.axial_depth_mm:g} TO {_CLEAR_Z_MM:g}: KEEP IT FREE OF CLAMPS"
-        yield OVERRIDE.comment
-        yield "NO LOOK-AHEAD MODE THAT CHANGES F"
-        yield f"AT EACH M00: START A NEW RECORD, FX FY, {rate} HZ OR MORE,"
-        yield "FX ALONG +X, FY ALONG +Y, THEN CYCLE START;"
-        yield "STOP THE RECORD AT THE NEXT STOP. ONE FILE PER PASS"
-        yield "FIRST RUN: DRY, ABOVE THE STOCK"
+        yield from text.format(
+            cut=cut, machine=_plain(cut.machine), stock_mm=self.design.stock_mm, rate=rate, clear_z_mm=_CLEAR_Z_MM,
+            edge="REAR EDGE" if self.side < 0.0 else "FRONT EDGE", near=min(ends), far=max(ends),
+            wide=math.ceil(self.walls[-1] + 5.0), deep=math.ceil(cut.axial_depth_mm + 2.0), override=OVERRIDE.comment,
+            left=min(each.start_mm for each in cut.passes), right=max(each.end_mm for each in cut.passes),
+        ).splitlines()  # fmt: skip
         if isinstance(cut.about, CornerDetails) and cut.about.deeper_than_corner is not None:
             deeper = cut.about.deeper_than_corner
             yield f"X{deeper.from_mm:.2f} TO {deeper.to_mm:.2f}: UP TO {deeper.most_mm:.3f} MM DEEPER"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -317,17 +318,13 @@ def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> Interval
         measuring = cut.passes[number - 1]
         records[number] = place_samples(record, cut, measuring, expected(cut, measuring))
     found = sorted((_followed(cut, number, record) for number, record in records.items()), key=lambda p: p.interval_mm)
-    good: float | None = None
-    for each in reversed(found):
-        if not each.ok:
-            break
-        good = each.interval_mm
+    good = [each.interval_mm for each in takewhile(lambda each: each.ok, reversed(found))]
     fastest = max(feed for each in cut.passes for _, feed in each.feeds)
     lag = float(np.median([each.lag_s for each in found]))
     return IntervalResult(
         program=cut.program,
         machine=cut.machine,
-        interval_mm=good,
+        interval_mm=good[-1] if good else None,
         lag_interval_mm=lag * math.log(10.0) * fastest / _PER_MINUTE,
         passes=tuple(found),
         warnings=tuple(note for each in found for note in records[each.number].notes),
@@ -351,10 +348,8 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
     time, size = record.time_s[within], force[within]
 
     def course(lag: float) -> FloatArray:
-        if record.by_time:
-            speed = _speeds(measuring, time - entry, lag)
-        else:
-            speed = _speeds_at(measuring, record.x_mm[within], lag)
+        by_time = record.by_time
+        speed = _speeds(measuring, time - entry, lag) if by_time else _speeds_at(measuring, record.x_mm[within], lag)
         return turned(np.interp(speed, feeds, levels)[:, None], record.samples)[:, 0]
 
     errors = [float(np.mean((course(lag) - size) ** 2)) for lag in _LAGS_S]

@@ -13,9 +13,10 @@ import numpy.typing as npt
 from scipy.optimize import nnls
 
 from shapegcode import _core
+from shapegcode.cutting.tool import COEFFICIENTS
 from shapegcode.errors import ArgumentError
 from shapegcode.io.record import FloatArray
-from shapegcode.testcut.cut import COEFFICIENTS, CuttingLaw, CutTool, MeasuringPass, TestCut
+from shapegcode.testcut.cut import CuttingLaw, CutTool, MeasuringPass, TestCut
 
 
 @dataclass(frozen=True)
@@ -29,9 +30,7 @@ class Engagement:
     @classmethod
     def joined(cls, several: Sequence[Engagement]) -> Engagement:
         """Several behind each other."""
-        return cls(
-            *(np.concatenate(columns) for columns in zip(*(vars(each).values() for each in several), strict=True))
-        )
+        return cls(*map(np.concatenate, zip(*(vars(each).values() for each in several), strict=True)))
 
 
 def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up: bool) -> Engagement:
@@ -133,16 +132,9 @@ class ForceLaw:
 def mean_chip_mm(
     tool: CutTool, spindle_rev_per_min: float, axial_depth_mm: float, met: Engagement, feed_mm_per_min: FloatArray
 ) -> FloatArray:
-    """Mean chip thickness that the force law gives each engagement its coefficients by.
-
-    The law itself gives it: with the exponent 1 the force is the mean chip thickness times the force with exponent 0.
-    """
-    once, twice = (
-        ForceLaw(tool, CuttingLaw(1.0, exponent), spindle_rev_per_min, axial_depth_mm)
-        .forces(met, feed_mm_per_min)
-        .mean_torque_nm
-        for exponent in (0.0, 1.0)
-    )
+    """Mean chip thickness as the law has it for each engagement: the force with exponent 1 over that with 0."""
+    laws = (ForceLaw(tool, CuttingLaw(1.0, exponent), spindle_rev_per_min, axial_depth_mm) for exponent in (0.0, 1.0))
+    once, twice = (law.forces(met, feed_mm_per_min).mean_torque_nm for law in laws)
     return np.asarray(np.divide(twice, once, out=np.zeros_like(once), where=once > 0.0))
 
 
@@ -221,11 +213,7 @@ class ForceModel:
         k_te, k_re = edge or (0.0, 0.0)
         return CuttingLaw(factors[0], k1_exponent, factors[1], k2_exponent, k_te, k_re, self.thickness)
 
-    def forces(self, parameters: FloatArray) -> FloatArray:
-        """(n, 2 or 3) forces with the coefficients of parameters."""
-        return self.forces_of(self.law(parameters))
-
-    def forces_of(self, law: CuttingLaw) -> FloatArray:
+    def forces(self, law: CuttingLaw) -> FloatArray:
         """(n, 2 or 3) forces along the feed, to its left, and the torque's where it was measured."""
         found = np.zeros(self.measured.shape)
         for speed, at, met in _by_speed(self.data):
@@ -254,21 +242,13 @@ _UNITS = ("N/mm²", "", "", "", "N/mm", "N/mm")  # of COEFFICIENTS
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One value with its 95 % interval.
+    """One value with its 95 % interval."""
 
-    Attributes:
-        name: key of ``[cutting]``.
-        value: the best.
-        low: lower end.
-        high: upper end.
-        unit: of all three.
-    """
-
-    name: str
-    value: float
-    low: float
-    high: float
-    unit: str
+    name: str  # key of ``[cutting]``
+    value: float  # the best
+    low: float  # lower end
+    high: float  # upper end
+    unit: str  # of all three
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +287,7 @@ def fit_coefficients(
     for _ in range(_ROUNDS):
         before = parameters
         parameters, left, _ = _solved(model, parameters, robust / noise**2)
-        noise = noise_of(left, model.forces(parameters), data.revolutions, robust)
+        noise = noise_of(left, model.forces(model.law(parameters)), data.revolutions, robust)
         scaled = np.abs(left) / noise
         robust = np.minimum(1.0, _HUBER / np.maximum(scaled, 1e-12))
         if np.all(np.abs(parameters - before) < _SETTLED * np.maximum(np.abs(parameters), 1.0)):
@@ -321,17 +301,10 @@ def fit_coefficients(
     kept = left[~outlier, :2]
     size = np.linalg.norm(data.force_n[~outlier], axis=1)
     free = int((weights > 0.0).sum()) - count
+    factors, at_chip = (_with_intervals(model, parameters, covariance, free, each) for each in (1.0, model.reference))
+    rms_n, percent = np.sqrt(np.mean(kept**2, axis=0)), 100.0 * float(np.sqrt(np.sum(kept**2) / np.sum(size**2)))
     return CoefficientFit(
-        _with_intervals(model, parameters, covariance, free, 1.0),
-        thickness,
-        model.reference,
-        _with_intervals(model, parameters, covariance, free, model.reference)[:4:2],
-        chip,
-        predicted,
-        outlier,
-        np.sqrt(np.mean(kept**2, axis=0)),
-        100.0 * float(np.sqrt(np.sum(kept**2) / np.sum(size**2))),
-        correlation,
+        factors, thickness, model.reference, at_chip[:4:2], chip, predicted, outlier, rms_n, percent, correlation
     )
 
 
@@ -371,8 +344,8 @@ def _check(data: MeanForces, chip: FloatArray, count: int, edge: bool) -> None:
 
 def _start(model: ForceModel, data: MeanForces, count: int) -> FloatArray:
     """Constant k1 and k2 that fit best: with exponent 0 the force is linear in k1 and k1 k2."""
-    along = model.forces_of(CuttingLaw(1.0, chip_thickness=model.thickness))
-    across = model.forces_of(CuttingLaw(1.0, ratio=1.0, chip_thickness=model.thickness)) - along
+    along = model.forces(CuttingLaw(1.0, chip_thickness=model.thickness))
+    across = model.forces(CuttingLaw(1.0, ratio=1.0, chip_thickness=model.thickness)) - along
     columns = np.column_stack([along.ravel(), across.ravel()])
     weight = np.repeat(1.0 / np.maximum(np.linalg.norm(data.force_n, axis=1), 1e-9), model.measured.shape[1])
     (tangential, radial), *_ = np.linalg.lstsq(columns * weight[:, None], model.measured.ravel() * weight, rcond=None)
@@ -397,13 +370,16 @@ def _solved(model: ForceModel, start: FloatArray, weights: FloatArray) -> tuple[
     to_law[3, 1] = -1.0
     to_limited = np.linalg.inv(to_law)
 
+    def left_by(parameters: FloatArray) -> FloatArray:
+        return np.asarray(model.measured - model.forces(model.law(parameters)))
+
     def misfit(limited: FloatArray) -> FloatArray:
-        return np.asarray((root * (model.measured - model.forces(to_law @ limited))).ravel())
+        return np.asarray((root * left_by(to_law @ limited)).ravel())
 
     bounds = _LOWEST[: len(start)], _HIGHEST[: len(start)]
     found = least_squares(misfit, to_limited @ start, bounds=bounds, x_scale="jac", max_nfev=_MAX_STEPS)
     parameters = to_law @ found.x
-    return parameters, model.measured - model.forces(parameters), np.asarray(found.jac @ to_limited)
+    return parameters, left_by(parameters), np.asarray(found.jac @ to_limited)
 
 
 def _covariance(weighted: FloatArray, left: FloatArray, weights: FloatArray, correlation: float) -> FloatArray:
@@ -422,7 +398,7 @@ def _of_position(model: ForceModel, parameters: FloatArray, weighted: FloatArray
         return found
     there = dataclasses.replace(data, met=data.displaced)
     moved = ForceModel(model.tool, model.depth, there, model.thickness, model.reference)
-    change = moved.forces(parameters) - model.forces(parameters)
+    change = moved.forces(model.law(parameters)) - model.forces(model.law(parameters))
     root = np.sqrt(weights)
     inverse = np.linalg.pinv(weighted)
     for group in np.unique(data.group):

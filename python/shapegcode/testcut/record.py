@@ -43,9 +43,7 @@ class ForceRecord:
     torque_nm: FloatArray | None = None  # (n,) magnitude as measured; None: not recorded
     time_s: FloatArray | None = None  # (n,), evenly spaced; None: not recorded
     position_mm: FloatArray | None = None  # (n,) X of the tool's axis in the program's coordinates; None: not recorded
-    radial_depth_mm: FloatArray | None = (
-        None  # (n,) of means at known depths; None: the test cut's description states it
-    )
+    radial_depth_mm: FloatArray | None = None  # (n,) of means at known depths; None: the test cut states it
     feed_mm_per_min: FloatArray | None = None  # (n,) where the file states it
 
     def __len__(self) -> int:
@@ -174,10 +172,8 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
     size = np.linalg.norm(turned(force, samples), axis=1)
     x = _positions(record, measuring, forecast, size, time, moved, (begin, end), notes)
     named = tuple(f"{record.file}: {note}" for note in notes)
-    by_time = record.position_mm is None
-    return PlacedRecord(
-        record.file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, by_time, named
-    )
+    found = time, x, force, torque, samples, speed, offset, drift
+    return PlacedRecord(record.file, cut, measuring, *found, record.position_mm is None, named)
 
 
 def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
@@ -255,22 +251,18 @@ def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
         )
     begin, end = int(cutting[0]), int(cutting[-1])
     if begin < air or end > len(smooth) - air:
-        where = "before" if begin < air else "after"
-        raise ArgumentError(
-            f"{record.file}: no air {where} the cut: record at least {_MIN_AIR_REVS} revolutions more there"
-        )
+        where = f"no air {'before' if begin < air else 'after'} the cut"
+        raise ArgumentError(f"{record.file}: {where}: record at least {_MIN_AIR_REVS} revolutions more there")
     return begin, end
 
 
 def _without_offset(force: FloatArray, begin: int, end: int, guard: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Force without what the air before and after shows, in between on a straight line; offset and drift."""
-    places, levels = [], []
-    for low, high in ((0, max(begin - guard, 1)), (min(end + guard, len(force) - 1), len(force))):
-        places.append(0.5 * (low + high))
-        levels.append(force[low:high].mean(axis=0))
-    at = np.arange(len(force), dtype=np.float64)
-    share = ((at - places[0]) / (places[1] - places[0]))[:, None]
-    return force - (levels[0] * (1.0 - share) + levels[1] * share), levels[0], levels[1] - levels[0]
+    air = (0, max(begin - guard, 1)), (min(end + guard, len(force) - 1), len(force))
+    first, second = (0.5 * (low + high) for low, high in air)
+    before, after = (force[low:high].mean(axis=0) for low, high in air)
+    share = ((np.arange(len(force), dtype=np.float64) - first) / (second - first))[:, None]
+    return force - (before * (1.0 - share) + after * share), before, after - before
 
 
 def _positions(
@@ -372,10 +364,8 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     turns = int((inside[-1] - inside[0]) / record.samples)
     edges = inside[0] + np.arange(turns + 1) * record.samples
     size = np.linalg.norm(record.force_n, axis=1)
-    columns = [record.force_n, size[:, None], size[:, None] ** 2, x[:, None]]
-    if record.torque_nm is not None:
-        columns.append(record.torque_nm)
-    table = np.hstack(columns)
+    torque_nm = [] if record.torque_nm is None else [record.torque_nm]
+    table = np.hstack([record.force_n, size[:, None], size[:, None] ** 2, x[:, None], *torque_nm])
     means = _sums(table, edges[:-1], edges[1:]) / record.samples
     peaks = np.maximum.reduceat(size[: int(edges[-1])], edges[:-1].astype(np.intp))
     middle = means[:, 4]

@@ -80,51 +80,31 @@ RATIO_LIMIT = 0.10  # By how much the measured effect of the feed may differ fro
 
 @dataclass(frozen=True)
 class ChipRange:
-    """Mean chip thicknesses of the mean forces.
+    """Mean chip thicknesses of the mean forces."""
 
-    Attributes:
-        min: thinnest, mm.
-        max: thickest, mm.
-        middle: geometric mean, mm.
-    """
-
-    min: float
-    max: float
-    middle: float
+    min: float  # thinnest, mm
+    max: float  # thickest, mm
+    middle: float  # geometric mean, mm
 
 
 @dataclass(frozen=True)
 class TaperPass:
-    """What the record of one pass showed.
+    """What the record of one pass showed."""
 
-    Attributes:
-        file: where it was read.
-        feed_mm_per_min: between entry and exit.
-        spindle_rev_per_min: as the record shows it, or as commanded.
-        offset_n: force along the feed and to its left that was shown in the air before the cut.
-        drift_n: change of it until after the cut.
-    """
-
-    file: str
-    feed_mm_per_min: float
-    spindle_rev_per_min: float
-    offset_n: tuple[float, float]
-    drift_n: tuple[float, float]
+    file: str  # where it was read
+    feed_mm_per_min: float  # between entry and exit
+    spindle_rev_per_min: float  # as the record shows it, or as commanded
+    offset_n: tuple[float, float]  # force along the feed and to its left that was shown in the air before the cut
+    drift_n: tuple[float, float]  # change of it until after the cut
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A part of a pass with chatter.
+    """A part of a pass with chatter."""
 
-    Attributes:
-        number: of the pass, from 1.
-        from_mm: X at its begin.
-        to_mm: X at its end.
-    """
-
-    number: int
-    from_mm: float
-    to_mm: float
+    number: int  # of the pass, from 1
+    from_mm: float  # X at its begin
+    to_mm: float  # X at its end
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -243,38 +223,23 @@ class TaperResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class CornerPass:
-    """Largest resultant of a pass within the stock, mean over a revolution and momentary.
+    """Largest resultant of a pass within the stock, mean over a revolution and momentary."""
 
-    Attributes:
-        number: of the pass, from 1.
-        measured_mean_n: largest mean, as recorded.
-        measured_peak_n: largest magnitude, as recorded.
-        expected_mean_n: largest mean of the force law.
-        expected_peak_n: largest magnitude of the force law.
-        record: what was recorded, by revolution.
-        forecast: what the force law lets expect.
-    """
-
-    number: int
-    measured_mean_n: float
-    measured_peak_n: float
-    expected_mean_n: float
-    expected_peak_n: float
-    record: Revolutions = field(metadata=hidden())
-    forecast: Expected = field(metadata=hidden())
+    number: int  # of the pass, from 1
+    measured_mean_n: float  # largest mean, as recorded
+    measured_peak_n: float  # largest magnitude, as recorded
+    expected_mean_n: float  # largest mean of the force law
+    expected_peak_n: float  # largest magnitude of the force law
+    record: Revolutions = field(metadata=hidden())  # what was recorded, by revolution
+    forecast: Expected = field(metadata=hidden())  # what the force law lets expect
 
 
 @dataclass(frozen=True)
 class ForceRatio:
-    """Largest mean resultant with the modified feed over that with the constant one.
+    """Largest mean resultant with the modified feed over that with the constant one."""
 
-    Attributes:
-        measured: as recorded.
-        expected: of the force law.
-    """
-
-    measured: float
-    expected: float
+    measured: float  # as recorded
+    expected: float  # of the force law
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -341,33 +306,20 @@ class CornerResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class FollowedPass:
-    """How the controller followed the feeds of one pass.
+    """How the controller followed the feeds of one pass."""
 
-    Attributes:
-        number: of the pass, from 1.
-        interval_mm: length of its blocks.
-        deviation: largest |measured - commanded| force at the end of a block, as a share of commanded.
-        at_mm: X of the end of that block.
-        noise: standard deviation of such a mean where the feed does not change, as a share of it.
-        lag_s: time constant with which the feed follows best.
-        ok: whether it is followed: the deviation is within 5 % and twice the noise.
-        time_s: (m,) of the record.
-        force_n: (m,) mean over a revolution, scaled to what is expected on the straight part.
-        immediate_n: (m,) expected if the feed follows at once.
-        lagging_n: (m,) expected with the lag.
-    """
-
-    number: int
-    interval_mm: float
-    deviation: float
-    at_mm: float
-    noise: float
-    lag_s: float
-    ok: bool
-    time_s: FloatArray = field(metadata=hidden())
+    number: int  # of the pass, from 1
+    interval_mm: float  # length of its blocks
+    deviation: float  # largest |measured - commanded| force at the end of a block, as a share of commanded
+    at_mm: float  # X of the end of that block
+    noise: float  # standard deviation of such a mean where the feed does not change, as a share of it
+    lag_s: float  # time constant with which the feed follows best
+    ok: bool  # whether it is followed: the deviation is within 5 % and twice the noise
+    time_s: FloatArray = field(metadata=hidden())  # (m,) of the record
+    # (m,) mean over a revolution, scaled to what is expected on the straight part
     force_n: FloatArray = field(metadata=hidden())
-    immediate_n: FloatArray = field(metadata=hidden())
-    lagging_n: FloatArray = field(metadata=hidden())
+    immediate_n: FloatArray = field(metadata=hidden())  # (m,) expected if the feed follows at once
+    lagging_n: FloatArray = field(metadata=hidden())  # (m,) expected with the lag
 
 
 @dataclass(frozen=True, repr=False, eq=False)

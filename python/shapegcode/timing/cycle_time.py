@@ -1,8 +1,7 @@
 """How long a program takes on a machine, and where the time goes: in closed form, and by giving every set-point.
 
-The closed form costs one formula per block: of Lee, Ro, Song and Oh, 2022 (paper 004) for acceleration after
-interpolation, of the planner in look-ahead. The full interpolation simulates the same program sample by sample, and is
-the check of it.
+The closed form is of Lee, Ro, Song and Oh, 2022 (paper 004) for acceleration after interpolation, of the planner in
+look-ahead; the full interpolation is the check of it.
 """
 
 from __future__ import annotations
@@ -157,16 +156,9 @@ def _blocks(rows: npt.NDArray[Any], program: Program) -> Iterator[BlockTime]:
     for line, kind, start_s, duration_s, reached in zip(*columns, strict=True):
         queue = moves[line, kind == _RAPID] if kind in (_CUTTING, _RAPID) else None
         length, feed = queue.popleft() if queue else (0.0, 0.0)
-        yield BlockTime(
-            line,
-            _KINDS[kind],
-            start_s,
-            duration_s,
-            length,
-            feed * 60.0 if kind == _CUTTING else None,
-            length / duration_s * 60.0 if duration_s > 0.0 else 0.0,
-            reached * 60.0,
-        )
+        programmed = feed * 60.0 if kind == _CUTTING else None
+        mean = length / duration_s * 60.0 if duration_s > 0.0 else 0.0
+        yield BlockTime(line, _KINDS[kind], start_s, duration_s, length, programmed, mean, reached * 60.0)
 
 
 def _moves(program: Program) -> dict[tuple[int, bool], deque[tuple[float, float]]]:

@@ -20,30 +20,19 @@ CUTS, BETWEEN, RUNS = "cuts of a tool, by themselves", "between cuts, by themsel
 
 @dataclass(frozen=True)
 class OpenPart:
-    """What one source contributes to the interval of a time.
+    """What one source contributes to the interval of a time."""
 
-    Attributes:
-        name: a parameter, the kind of look-ahead, or a scatter.
-        half_width_s: half of the 95 % interval that it alone would give, s.
-        share: of the variance, 0 to 1.
-    """
-
-    name: str
-    half_width_s: float
-    share: float
+    name: str  # a parameter, the kind of look-ahead, or a scatter
+    half_width_s: float  # half of the 95 % interval that it alone would give, s
+    share: float  # of the variance, 0 to 1
 
 
 @dataclass(frozen=True)
 class LogNext:
-    """A program that one could run with a log, and calibrate with next.
+    """A program that one could run with a log, and calibrate with next."""
 
-    Attributes:
-        program: name of it.
-        half_width_s: half of the 95 % interval that would be left of the program that is timed, s.
-    """
-
-    program: str
-    half_width_s: float
+    program: str  # name of it
+    half_width_s: float  # half of the 95 % interval that would be left of the program that is timed, s
 
 
 # What a program must hold that tells a parameter, by a word of its name; the first that fits.
@@ -95,11 +84,7 @@ class TimeInterval:
         return text.format(move=self.mean_move_mm)
 
     def after_logging(self, other: TimeInterval) -> float:
-        """Half of the interval once the time of another program is known to what scatters of it, s.
-
-        The directions are independent and of one standard deviation each, so what both programs share of them shrinks
-        as in least squares.
-        """
+        """Half of the interval once the time of another program is known to what scatters of it, s (least squares)."""
         common = sum(value * other.steps.get(name, 0.0) for name, value in self.steps.items())
         known = sum(value**2 for value in (*other.steps.values(), *other.scatters.values()))
         left = sum(value**2 for value in self.steps.values()) - (common**2 / known if known > 0.0 else 0.0)

@@ -14,13 +14,8 @@ from shapegcode.timing.result import LABELS, PARTS, CycleTime, tool_name
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_COLOUR = dict(
-    zip(
-        ("acceleration_s", "cutting_s", "dwell_s", "in_position_s", "rapid_s", "tool_change_s", "function_s"),
-        plot.COLOURS,
-        strict=True,
-    )
-)
+_COLOURED = ("acceleration_s", "cutting_s", "dwell_s", "in_position_s", "rapid_s", "tool_change_s", "function_s")
+_COLOUR = dict(zip(_COLOURED, plot.COLOURS, strict=True))
 _REGIONS = 10
 _TOOLS = 16
 

@@ -47,69 +47,40 @@ PARTS = tuple(field.name for field in fields(TimeParts))  # Names of the parts, 
 
 @dataclass(frozen=True)
 class ToolTime(TimeParts):
-    """All uses of one tool together.
+    """All uses of one tool together."""
 
-    Attributes:
-        duration_s: the whole.
-        tool: T number; None before the first tool is known.
-        first_line: of its first use, from 1.
-    """
-
-    duration_s: float
-    tool: int | None
-    first_line: int
+    duration_s: float  # the whole
+    tool: int | None  # T number; None before the first tool is known
+    first_line: int  # of its first use, from 1
 
 
 @dataclass(frozen=True)
 class RegionTime:
-    """A run of cutting moves between two stops.
+    """A run of cutting moves between two stops."""
 
-    Attributes:
-        lines: first and last line, from 1.
-        tool: T number in use; None where it is not known.
-        start_s: since the start of the program.
-        duration_s: from rest to rest, the wait of an exact stop at its end included.
-        programmed_s: its length at the programmed feeds and the override, nothing rounded or limited.
-        cutting_s: its blocks at their feed, in whole interpolation periods.
-        acceleration_s: what acceleration adds.
-        in_position_s: wait of an exact stop at its end.
-        length_mm: length of its path.
-    """
-
-    lines: tuple[int, int]
-    tool: int | None
-    start_s: float
-    duration_s: float
-    programmed_s: float
-    cutting_s: float
-    acceleration_s: float
-    in_position_s: float
-    length_mm: float
+    lines: tuple[int, int]  # first and last line, from 1
+    tool: int | None  # T number in use; None where it is not known
+    start_s: float  # since the start of the program
+    duration_s: float  # from rest to rest, the wait of an exact stop at its end included
+    programmed_s: float  # its length at the programmed feeds and the override, nothing rounded or limited
+    cutting_s: float  # its blocks at their feed, in whole interpolation periods
+    acceleration_s: float  # what acceleration adds
+    in_position_s: float  # wait of an exact stop at its end
+    length_mm: float  # length of its path
 
 
 @dataclass(frozen=True)
 class BlockTime:
-    """One cutting block, rapid, dwell, or block with M codes.
+    """One cutting block, rapid, dwell, or block with M codes."""
 
-    Attributes:
-        line: from 1.
-        kind: "cutting", "rapid", "dwell", "tool_change" or "function".
-        start_s: since the start of the program.
-        duration_s: until the next one starts; the last block of a run has the run's acceleration and wait.
-        length_mm: 0 for what does not move.
-        programmed_feed_mm_per_min: F as programmed; None for what is no cutting block.
-        mean_feed_mm_per_min: length over duration.
-        reached_feed_mm_per_min: highest speed along the path; 0 for what does not move.
-    """
-
-    line: int
-    kind: str
-    start_s: float
-    duration_s: float
-    length_mm: float
-    programmed_feed_mm_per_min: float | None
-    mean_feed_mm_per_min: float
-    reached_feed_mm_per_min: float
+    line: int  # from 1
+    kind: str  # "cutting", "rapid", "dwell", "tool_change" or "function"
+    start_s: float  # since the start of the program
+    duration_s: float  # until the next one starts; the last block of a run has the run's acceleration and wait
+    length_mm: float  # 0 for what does not move
+    programmed_feed_mm_per_min: float | None  # F as programmed; None for what is no cutting block
+    mean_feed_mm_per_min: float  # length over duration
+    reached_feed_mm_per_min: float  # highest speed along the path; 0 for what does not move
 
 
 LABELS = {

@@ -77,15 +77,12 @@ def fit_servo(
                 on_progress((rank + share) / len(record.axes))
 
         found.append(_axis(trace.liveliest(_MAX_SAMPLES), record.period_s, drive, tell))
-    written: dict[str, float] = {}
     warnings = list(record.notes)
     samples = record.axes[0].samples
     if samples > _MAX_SAMPLES:
         warnings.append(f"of {samples} samples those {_MAX_SAMPLES} were taken where an axis changes its speed most")
-    fitted = machine
-    if machine is not None:
-        fitted, written, unknown = _machine_with(machine, found, places)
-        warnings += unknown
+    fitted, written, unknown = (None, {}, []) if machine is None else _machine_with(machine, found, places)
+    warnings += unknown
     duration = sum(each[-1] - each[0] for each in record.axes[0].time_s)
     return ServoFit(
         source=record.source,
@@ -175,13 +172,11 @@ def _two_lags(trace: ServoTrace, speeds: Sequence[FloatArray], top: float) -> st
 
 
 def _halves(speeds: Sequence[FloatArray], period_s: float) -> tuple[Masks, Masks]:
-    """Which samples lie in the half of all changes of speed that comes first; and which count: not the first of a
-    stretch, since what the axis did before it is not known.
-    """
+    """Which samples lie in the half of all changes of speed that comes first; and which count."""
     changes = [np.abs(np.diff(each, prepend=each[:1])) for each in speeds]
     done = np.cumsum(np.concatenate(changes))
     early = np.split(done < done[-1] / 2.0, np.cumsum([len(each) for each in speeds])[:-1])
-    settle = round(SETTLE_S / period_s)
+    settle = round(SETTLE_S / period_s)  # what the axis did before a stretch is not known
     return tuple(early), tuple(np.arange(len(each)) >= settle for each in speeds)
 
 

@@ -2,9 +2,7 @@
 
 Servo lag: the command r reaches the loop τ later; the loop is the core's `ServoLag`, x' = K (r − x) + f r'. So the lag
 at constant speed is τ + (1 − f)/K. A Sinumerik with speed feed-forward balances it by a dead time (MD32620 = 3, 4).
-
-Feed drive: a rigid axis of 1 kg stands for it. What it does depends on forces over mass alone, which is all that
-positions can tell. Masses, lead and stiffness of the screw do not follow from them.
+Feed drive: a rigid axis of 1 kg, since positions tell forces over mass alone.
 """
 
 from __future__ import annotations
@@ -149,11 +147,7 @@ def _steady_lag(trace: ServoTrace, use: Masks, period_s: float) -> float:
 def lag_estimates(
     fit: LoopFit, halves: Sequence[LoopFit], trace: ServoTrace, use: Masks, period_s: float
 ) -> tuple[ServoEstimate, ...]:
-    """Parameters of a servo lag behind a dead time, with 95 % intervals.
-
-    The interval is that of least squares with as many independent samples as the autocorrelation of what is left
-    allows, and never narrower than what the fits to the halves differ by.
-    """
+    """Parameters of a servo lag behind a dead time, with 95 % intervals no narrower than what the halves differ by."""
 
     def model(values: FloatArray) -> FloatArray:
         late = values[0] / period_s
@@ -174,33 +168,30 @@ def lag_estimates(
     inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-12) / np.outer(scale, scale)
     covariance = inverse * float(np.mean(left**2)) * _correlated_samples(left)
 
-    def half(gradient: Sequence[float], take: Sequence[float]) -> float:
-        slope = np.asarray(gradient)
+    def half(name: str, *gradient: float) -> float:
+        slope, take = np.array(gradient), [float(getattr(each, name)) for each in halves]
         formal = 1.96 * math.sqrt(max(float(slope @ covariance @ slope), 0.0))
         return max(formal, (max(take) - min(take)) / 2.0)
 
     gain, rest = fit.gain_per_s, fit.rest
-    lag = half([1.0, -rest / gain**2, 1.0 / gain, 0.0], [each.lag_s for each in halves])
-    dead = half([1.0, 0.0, 0.0, 0.0], [each.dead_s for each in halves])
-    gains = half([0.0, 1.0, 0.0, 0.0], [each.gain_per_s for each in halves])
-    forward = half([0.0, 0.0, 1.0, 0.0], [each.rest for each in halves])
+    lag = half("lag_s", 1.0, -rest / gain**2, 1.0 / gain, 0.0)
+    dead, gains, forward = (
+        half(name, *row) for name, row in zip(("dead_s", "gain_per_s", "rest"), np.eye(4), strict=False)
+    )
     ends = max(0.0, 1.0 - rest - forward), min(1.0, 1.0 - rest + forward)
-    lags = (
-        ServoEstimate("lag at constant speed", fit.lag_s, fit.lag_s - lag, fit.lag_s + lag, "s"),
-        ServoEstimate("dead time", fit.dead_s, max(0.0, fit.dead_s - dead), fit.dead_s + dead, "s"),
+    why = "the feed-forward leaves no lag that tells it"
+    loop = (
+        ServoEstimate("position gain", None, None, None, "1/s", why),
+        ServoEstimate("feed-forward", None, *ends, "1", why),
     )
     if gains < 0.5 * gain and forward < rest:
         why = "of a first-order loop that lags alike; the control's setting may be another"
-        return (
-            *lags,
-            ServoEstimate("position gain", gain, gain - gains, gain + gains, "1/s", why),
-            ServoEstimate("feed-forward", 1.0 - rest, *ends, "1"),
-        )
-    why = "the feed-forward leaves no lag that tells it"
+        gain_estimate = ServoEstimate("position gain", gain, gain - gains, gain + gains, "1/s", why)
+        loop = gain_estimate, ServoEstimate("feed-forward", 1.0 - rest, *ends, "1")
     return (
-        *lags,
-        ServoEstimate("position gain", None, None, None, "1/s", why),
-        ServoEstimate("feed-forward", None, *ends, "1", why),
+        ServoEstimate("lag at constant speed", fit.lag_s, fit.lag_s - lag, fit.lag_s + lag, "s"),
+        ServoEstimate("dead time", fit.dead_s, max(0.0, fit.dead_s - dead), fit.dead_s + dead, "s"),
+        *loop,
     )
 
 
@@ -310,10 +301,7 @@ def range_of_three(name: str, values: Sequence[float], unit: str) -> ServoEstima
 def torque_friction(
     trace: ServoTrace, lag_s: float, uses: Sequence[Masks], period_s: float
 ) -> tuple[ServoEstimate, ...]:
-    """Friction over mass from the torque, which the models of the position loop do not see.
-
-    The torque is T_c sign(v) + J a + T_v v + T_0, of the command as late as the axis lags; what is told is T_c/J.
-    """
+    """Friction over mass, T_c/J, from the torque: T_c sign(v) + J a + T_v v + T_0 of the command, late by the lag."""
     if trace.torque is None:
         return ()
     torque = trace.torque

@@ -16,41 +16,26 @@ from shapegcode.results.table import Column, Table
 
 @dataclass(frozen=True)
 class ServoEstimate:
-    """A parameter.
+    """A parameter."""
 
-    Attributes:
-        name: of it.
-        value: null where the record does not tell it.
-        low: lower end of the interval (95 %; of the drive: the range of the fits to the halves and to all).
-        high: upper end.
-        unit: of the three.
-        note: why it is not known, or what it rests on.
-    """
-
-    name: str
-    value: float | None
-    low: float | None
-    high: float | None
-    unit: str
-    note: str = ""
+    name: str  # of it
+    value: float | None  # null where the record does not tell it
+    low: float | None  # lower end of the interval (95 %; of the drive: the range of the fits to the halves and to all)
+    high: float | None  # upper end
+    unit: str  # of the three
+    note: str = ""  # why it is not known, or what it rests on
 
 
 @dataclass(frozen=True)
 class ServoModel:
-    """A model of the loop, held against the record.
+    """A model of the loop, held against the record."""
 
-    Attributes:
-        name: "servo lag", "dead time and servo lag", "drive".
-        rest: root mean square of what it leaves of the following error in samples that it was not fitted to, in mm or
-            degrees.
-        rest_fitted: the same where it was fitted to all samples.
-        explained_percent: share of the mean square of the control's contour deviation that it explains in samples that
-            it was not fitted to; null where there is none. Negative: the control's own model is better.
-    """
-
-    name: str
+    name: str  # "servo lag", "dead time and servo lag", "drive"
+    # root mean square of what it leaves of the following error in samples that it was not fitted to, in mm or degrees
     rest: float
-    rest_fitted: float
+    rest_fitted: float  # the same where it was fitted to all samples
+    # share of the mean square of the control's contour deviation that it explains in samples that it was not fitted to;
+    # null where there is none. Negative: the control's own model is better
     explained_percent: float | None
 
 

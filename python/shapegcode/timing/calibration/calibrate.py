@@ -16,6 +16,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.timing.calibration import open_times
 from shapegcode.timing.calibration.motion import (
     FAMILIES,
     FunctionFit,
@@ -39,15 +40,6 @@ from shapegcode.timing.calibration.observed import (
     rapid_rate,
     timed_program,
     with_override,
-)
-from shapegcode.timing.calibration.open_times import (
-    cut_scatter,
-    function_rows,
-    is_rival,
-    kind_row,
-    kind_weights,
-    motion_rows,
-    run_scatter,
 )
 from shapegcode.timing.calibration.result import (
     TOLERANCE_PERCENT,
@@ -76,9 +68,13 @@ class _Learned:
     functions: FunctionFit
     machine: Machine
 
+    @classmethod
+    def of(cls, runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> _Learned:
+        return cls(motion, fit_functions(runs, motion, machine), machine)
+
     def starts(self, run: ObservedRun) -> FloatArray:
-        values = self.functions.values
-        model = whole_model(self.machine, self.motion, values, self.functions.last_tool_in_spindle)
+        functions = self.functions
+        model = whole_model(self.machine, self.motion, functions.values, functions.last_tool_in_spindle)
         return _predicted_starts(run, model)
 
 
@@ -129,12 +125,12 @@ def learn_clock(
         if order[index] < _BETTER * order[best]:
             best = index
     motion = fits[best]
-    learned = _Learned(motion, fit_functions(fitted, motion, machine), machine)
-    weights = kind_weights(order, best)
+    learned = _Learned.of(fitted, motion, machine)
+    weighted = zip(fits, open_times.kind_weights(order, best), strict=True)
     rivals = [
-        (fit, fit_functions(fitted, fit, machine), weight)
-        for fit, weight in zip(fits, weights, strict=True)
-        if fit is not motion and is_rival(weight)
+        (_Learned.of(fitted, fit, machine), weight)
+        for fit, weight in weighted
+        if fit is not motion and weight >= open_times.MIN_WEIGHT
     ]
     others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
     rows, warnings = _rows(observed, learned, others)
@@ -243,8 +239,7 @@ def _left_out(
     found = {}
     for fold in folds:
         rest = [run for run in runs if run not in fold]
-        part = fit_motion(rest, motion.family, machine, rate)
-        other = _Learned(part, fit_functions(rest, part, machine), machine)
+        other = _Learned.of(rest, fit_motion(rest, motion.family, machine, rate), machine)
         found.update({id(run): other for run in fold})
     return found
 
@@ -302,7 +297,7 @@ def _scatters(rows: Sequence[LearnedRun], observed: Sequence[ObservedRun], learn
             late[row.program].append((share.measured_s - share.predicted_s) / math.sqrt(max(1, len(run.cut_sections))))
     # The same codes come again and again: where they err together, whole programs show it.
     together = float(np.sqrt(np.mean([np.mean(each) ** 2 for each in late.values()]))) if late else 0.0
-    return max(learned.functions.scatter_s, together), run_scatter(ratios)
+    return max(learned.functions.scatter_s, together), open_times.run_scatter(ratios)
 
 
 def _with_interval(row: LearnedRun, run: ObservedRun, machine: Machine) -> LearnedRun:
@@ -361,11 +356,8 @@ def _held_rapids(run: ObservedRun) -> list[_Hold]:
         if not is_low:
             continue
         at = int(np.searchsorted(run.time_s, end, side="right")) - 1
-        if (
-            at >= 0
-            and cutting[run.line[at]]
-            and not run.timed.rapid[run.line[at] : run.line[min(at + 1, len(run.line) - 1)] + 1].any()
-        ):
+        following = run.line[min(at + 1, len(run.line) - 1)]
+        if at >= 0 and cutting[run.line[at]] and not run.timed.rapid[run.line[at] : following + 1].any():
             continue
         if found and begin - (found[-1][0] + found[-1][1]) < 0.5:
             found[-1] = (found[-1][0], float(end) - found[-1][0], found[-1][2])
@@ -395,11 +387,11 @@ def _shares(
     if end_s is None:
         return (), ()
     tools = run.timed.tools[1:-1]
-    changes = [1, *(int(each) + 2 for each in np.flatnonzero(np.diff(tools) != 0) if tools[each] >= 0)]
-    seen = [0.0, *(_began(run, line) for line in changes[1:]), end_s]
-    expected = [0.0, *(float(starts[line]) for line in changes[1:]), float(starts[-1])]
+    changes = [int(each) + 2 for each in np.flatnonzero(np.diff(tools) != 0) if tools[each] >= 0]
+    seen = [0.0, *(_began(run, line) for line in changes), end_s]
+    expected = [0.0, *(float(starts[line]) for line in changes), float(starts[-1])]
     shares: dict[str, tuple[float, float]] = {}
-    for index, until in enumerate([*(line - 1 for line in changes[1:]), len(tools)]):
+    for index, until in enumerate([*(line - 1 for line in changes), len(tools)]):
         tool = int(tools[until - 1])
         name = f"T{tool}" if tool >= 0 else "no tool"
         measured, predicted = shares.get(name, (0.0, 0.0))
@@ -413,12 +405,8 @@ def _shares(
             begin_s, until_s = run.time_s[ends].tolist()
             cut_measured += until_s - begin_s - _held(holds, begin_s, until_s)
             cut_predicted += float(np.diff(starts[run.line[ends]])[0])
-    kinds = (
-        LearnedShare("cuts", cut_measured, cut_predicted),
-        LearnedShare(
-            "between cuts", end_s - _held(holds, 0.0, end_s) - cut_measured, float(starts[-1]) - cut_predicted
-        ),
-    )
+    between = end_s - _held(holds, 0.0, end_s) - cut_measured, float(starts[-1]) - cut_predicted
+    kinds = LearnedShare("cuts", cut_measured, cut_predicted), LearnedShare("between cuts", *between)
     return tuple(LearnedShare(name, *both) for name, both in shares.items()), kinds
 
 
@@ -446,14 +434,13 @@ def _feed_override(run: ObservedRun) -> float:
 def learned_machine(
     learned: _Learned,
     runs: Sequence[ObservedRun],
-    rivals: Sequence[tuple[MotionFit, FunctionFit, float]],
+    rivals: Sequence[tuple[_Learned, float]],
     scatters: tuple[float, float],
 ) -> tuple[Machine, dict[str, str], list[LearnedNumber], list[str]]:
     """The machine with the calibrated parameters, and what the logs leave open of them."""
     motion, functions, machine = learned.motion, learned.functions, learned.machine
     source = f"logs of {len(runs)} runs"
-    values = motion.file_values()
-    values.update(_function_values(functions, runs))
+    values = motion.file_values() | _function_values(functions, runs)
     covariance, variances = parameter_covariance(motion, runs, machine)
     numbers, remarks = _motion_numbers(machine, motion, variances, source)
     if math.isfinite(motion.rapid_mm_per_s):
@@ -469,14 +456,15 @@ def learned_machine(
     if not math.isfinite(motion.rapid_mm_per_s):
         not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
     values["times.scatter"] = {
-        "cuts_percent": round(100.0 * cut_scatter(runs, motion, machine), 3),
+        "cuts_percent": round(100.0 * open_times.cut_scatter(runs, motion, machine), 3),
         "between_cuts_s": round(scatters[0], 3),
         "runs_percent": round(100.0 * scatters[1], 3),
     }
-    rows = motion_rows(motion, covariance, runs, machine)
-    rows += function_rows(functions, partial(_function_values, runs=runs), lambda name: _meaning(name)[1])
-    for other, its_functions, weight in rivals:
-        rows += kind_row(other.family.name, weight, values, other.file_values() | _function_values(its_functions, runs))
+    rows = open_times.motion_rows(motion, covariance, runs, machine)
+    rows += open_times.function_rows(functions, partial(_function_values, runs=runs), lambda name: _meaning(name)[1])
+    for other, weight in rivals:
+        its_values = other.motion.file_values() | _function_values(other.functions, runs)
+        rows += open_times.open_row(f"kind of look-ahead ({other.motion.family.name})", values, its_values, weight)
     values["times.open"] = rows
     for key in values:
         if key != "times.open":  # beside each value of its rows, once is enough: times.scatter says it

@@ -231,10 +231,7 @@ def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
 
 
 def starts_of(model: _core.FanucModel) -> Callable[[ObservedRun, float], FloatArray]:
-    """When each line begins on a model, by run and feed override: (line_count + 2,), the last is the program's end.
-
-    Simulated once for each program and its overrides.
-    """
+    """When each line begins on a model, by run and feed override: (line_count + 2,), the last is the program's end."""
     found: dict[tuple[int, float, float], FloatArray] = {}
 
     def starts(run: ObservedRun, feed_override: float) -> FloatArray:
@@ -350,11 +347,10 @@ def fit_motion(
 def parameter_covariance(
     fit: MotionFit, runs: Sequence[ObservedRun], machine: Machine
 ) -> tuple[FloatArray, FloatArray]:
-    """(n, n) Covariance of the logarithms of a fit's parameters, and (n,) variances; 1.96 deviations are 95 %.
+    """(n, n) Covariance of the logarithms of a fit's parameters, and (n,) variances by the runs alone.
 
     From the derivatives of what windows of some seconds take; the scatter is that of the sections, each of which
-    counts as one (a sandwich of clusters), so that an error of the model is in it. In the covariance what the runs do
-    not exercise keeps the spread of a usual machine; the variances are those of the runs alone.
+    counts as one (a sandwich of clusters). In the covariance what no run shows keeps the spread of a usual machine.
     """
     from scipy.stats import t as student
 
@@ -553,8 +549,8 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     pull = np.array([0.0 if name.endswith("from") else _RIDGE for name in names]) / _READING_S
 
     def errors(point: FloatArray) -> FloatArray:
-        model = whole_model(machine, motion, dict(zip(names, point.tolist(), strict=True)), kept)
-        starts = starts_of(model)
+        values = dict(zip(names, point.tolist(), strict=True))
+        starts = starts_of(whole_model(machine, motion, values, kept))
         taken = [
             starts(span.run, 1.0)[span.end] - (starts(span.run, 1.0)[span.begin] if span.begin > 0 else 0.0)
             for span in spans

@@ -88,11 +88,8 @@ def timed_program(program: Program) -> TimedProgram:
     """Which lines of a program cut, move in rapid, or hold machine functions."""
     core = program.core
     count = core.line_count
-    feed = np.full(count + 2, np.nan)
-    radius = np.full(count + 2, np.inf)
-    free = np.zeros(count + 2, dtype=bool)
-    rapid = np.zeros(count + 2, dtype=bool)
-    function = np.zeros(count + 2, dtype=bool)
+    feed, radius = np.full(count + 2, np.nan), np.full(count + 2, np.inf)
+    free, rapid, function = np.zeros((3, count + 2), dtype=bool)
     for region in program.regions:
         for index in range(len(region.path)):
             segment = region.path[index]
@@ -205,8 +202,7 @@ def feed_unit(entry: RunEntry, log: RunLog, timed: TimedProgram) -> float:
 def steady_value(values: FloatArray) -> float | None:
     """Where values heap up."""
     ordered = np.sort(values)
-    upto = np.searchsorted(ordered, ordered + _FEED_BIN, side="right")
-    count = upto - np.arange(len(ordered))
+    count = np.searchsorted(ordered, ordered + _FEED_BIN, side="right") - np.arange(len(ordered))
     most = int(count.max())
     if most < _MIN_READINGS or most < _MIN_SHARE * len(values):
         return None
@@ -448,11 +444,7 @@ def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
 
 
 def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
-    """Rapid rate of the machine and the override of each run, from the feeds that its logs show in rapids.
-
-    A rate shows as the highest feed that returns again and again. Where runs show several, the highest one, or one that
-    a usual setting of the rapid override makes of it, is the machine's.
-    """
+    """Rapid rate of the machine, and the runs with their overrides, from the feeds that its logs show in rapids."""
     shown = {id(run): _shown_rate(run) for run in runs}
     plateaus = [plateau for plateau, _ in shown.values() if math.isfinite(plateau)]
     if not plateaus:
@@ -488,12 +480,9 @@ def _shown_rate(run: ObservedRun) -> tuple[float, float]:
     value = log.feed.value[moving] * run.feed_unit_mm_per_s
     if not len(value):
         return math.nan, 0.0
-    single = _along_z(timed)[line[moving]]
-    alone = value[single]
-    high = value[value > 0.3 * value.max()]
-    ordered = np.sort(high)
-    upto = np.searchsorted(ordered, ordered * 1.003, side="right")
-    count = upto - np.arange(len(ordered))
+    alone = value[_along_z(timed)[line[moving]]]
+    ordered = np.sort(value[value > 0.3 * value.max()])
+    count = np.searchsorted(ordered, ordered * 1.003, side="right") - np.arange(len(ordered))
     steady = np.flatnonzero(count >= _MIN_READINGS)
     plateau = float(np.median(ordered[steady[np.argmax(count[steady])] :][: count.max()])) if len(steady) else math.nan
     return plateau, float(alone.max()) if len(alone) else 0.0

@@ -1,9 +1,8 @@
 """What run logs leave open of a calibrated cycle-time model, in the form in which the machine file holds it.
 
-Each row is a step of one standard deviation in one direction, independent of the others: the time of a program changes
-by the root of the sum of squares of what the rows change it by. The directions are those of the symmetric root of the
-covariance, each of which is as near as possible to one parameter (Zuber and Strimmer, 2011, "CAR scores"): so the
-squares say how much each parameter contributes.
+Each row is a step of one standard deviation, independent of the others. The directions are those of the symmetric root
+of the covariance, each as near as possible to one parameter (Zuber and Strimmer, 2011, "CAR scores"): so the squares
+say how much each parameter contributes.
 """
 
 from __future__ import annotations
@@ -18,13 +17,7 @@ import numpy as np
 from shapegcode.io.record import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.settings.keys import toml
-from shapegcode.timing.calibration.motion import (
-    FunctionFit,
-    MotionFit,
-    misfit,
-    section_residuals,
-    sections_of,
-)
+from shapegcode.timing.calibration.motion import FunctionFit, MotionFit, misfit, section_residuals, sections_of
 from shapegcode.timing.calibration.observed import ObservedRun
 
 _Row = dict[str, object]  # of the table times.open
@@ -33,7 +26,7 @@ _NO_STEP = 2e-3  # of a logarithm, or in s: what changes less is left out
 _ALONE, _SMALL = 0.1, 0.2  # steps of others that do not matter, and those within which times are straight lines
 _MIN_PART = 0.05  # of a step that times, none of which is below 0, must leave possible
 _KIND_SPREAD = 0.1  # a kind so much worse on runs left out has exp(-1/2) times the weight
-_MIN_WEIGHT = 0.02
+MIN_WEIGHT = 0.02  # of a kind of look-ahead that is worth a row
 _BLOCK_TIME = "controller.look_ahead_block_time_s"
 _USUAL_BLOCK_TIME_S = 0.002 * math.e  # one deviation above that of a usual machine
 _NOTICED = 0.01  # of the misfit: what one deviation from a usual machine costs in the fit
@@ -47,11 +40,6 @@ def kind_weights(scores: Sequence[float], best: int) -> list[float]:
     least = max(scores[best], 1e-9)
     found = [math.exp(-0.5 * (max(0.0, score / least - 1.0) / _KIND_SPREAD) ** 2) for score in scores]
     return [each / sum(found) for each in found]
-
-
-def is_rival(weight: float) -> bool:
-    """Whether a kind of look-ahead of that probability is worth a row."""
-    return weight >= _MIN_WEIGHT
 
 
 def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedRun], machine: Machine) -> list[_Row]:
@@ -69,10 +57,10 @@ def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedR
             for each, change in zip(parameters, step, strict=True)
             if abs(change) > _NO_STEP
         }
-        rows += _row(parameter.meaning, base, replace(fit, values=fit.values | values).file_values(), part**-2)
+        rows += open_row(parameter.meaning, base, replace(fit, values=fit.values | values).file_values(), part**-2)
     if fit.family.motion == "look_ahead" and not any(each.key == _BLOCK_TIME for each in parameters):
         block_time = _unnoticed_block_time(fit, runs, machine)
-        rows += _row("time in which a block is read", base, base | {_BLOCK_TIME: float(f"{block_time:.3g}")})
+        rows += open_row("time in which a block is read", base, base | {_BLOCK_TIME: float(f"{block_time:.3g}")})
     return rows
 
 
@@ -91,9 +79,7 @@ def _unnoticed_block_time(fit: MotionFit, runs: Sequence[ObservedRun], machine: 
 
 
 def function_rows(
-    functions: FunctionFit,
-    file_values: Callable[[FunctionFit], Mapping[str, object]],
-    meaning: Callable[[str], str],
+    functions: FunctionFit, file_values: Callable[[FunctionFit], Mapping[str, object]], meaning: Callable[[str], str]
 ) -> list[_Row]:
     """A row for each time beside the motion."""
     names, base = list(functions.values), file_values(functions)
@@ -106,7 +92,7 @@ def function_rows(
         part = max(min(parts[sign], _SMALL / float(np.abs(step).max())), _MIN_PART)
         moved = np.maximum(value + sign * part * step, 0.0)
         changed = replace(functions, values=dict(zip(names, moved.tolist(), strict=True)))
-        rows += _row(meaning(name), base, file_values(changed), weight=part**-2)
+        rows += open_row(meaning(name), base, file_values(changed), weight=part**-2)
     return rows
 
 
@@ -116,12 +102,8 @@ def _possible(value: FloatArray, step: FloatArray) -> float:
     return min(1.0, float(np.min(value[falls] / -step[falls], initial=1.0)))
 
 
-def kind_row(name: str, weight: float, base: Mapping[str, object], other: Mapping[str, object]) -> list[_Row]:
-    """The row of another kind of look-ahead."""
-    return _row(f"kind of look-ahead ({name})", base, other, weight=weight)
-
-
-def _row(name: str, base: Mapping[str, object], other: Mapping[str, object], weight: float = 1.0) -> list[_Row]:
+def open_row(name: str, base: Mapping[str, object], other: Mapping[str, object], weight: float = 1.0) -> list[_Row]:
+    """A row for what the values of the machine file may be instead; none where they are the same."""
     # A key that the other kind leaves out is one that it does not look at.
     values = [f"{key} = {toml(value)}" for key, value in other.items() if value is not None and value != base.get(key)]
     return [{"name": name, "values": values, "weight": float(f"{weight:.4g}")}] if values else []
@@ -138,10 +120,7 @@ def _symmetric_root(covariance: FloatArray) -> FloatArray:
 
 
 def cut_scatter(runs: Sequence[ObservedRun], fit: MotionFit, machine: Machine) -> float:
-    """Relative standard deviation of what the cuts of a tool take, over the programs and their tools.
-
-    A tool does one kind of work, for which the model may be wrong throughout; of two tools it is wrong independently.
-    """
+    """Relative standard deviation of what the cuts of a tool take: independent of the other tools."""
     from scipy.stats import t as student
 
     sums: dict[tuple[int, int], list[float]] = defaultdict(lambda: [0.0, 0.0])
