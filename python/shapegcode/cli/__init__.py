@@ -78,8 +78,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("batch", "run a command over many programs and machines, and resume where it stopped"),
     Command(
-        "study",
-        "simulate a program on sampled machines (Monte Carlo): how likely it stays within tolerance, and why",
+        "study", "simulate a program on sampled machines (Monte Carlo): how likely it stays within tolerance, and why"
     ),
     Command(
         "optimize", "choose settings for the shortest program that stays within tolerance on most sampled machines"

@@ -139,11 +139,7 @@ class FilterAdvice:
 
 
 def filter_advice(
-    program: Program,
-    machine: Machine,
-    model: MachineModel,
-    judge: Judge,
-    originals: Sequence[_core.SimulationFigures],
+    program: Program, machine: Machine, model: MachineModel, judge: Judge, originals: Sequence[_core.SimulationFigures]
 ) -> FilterAdvice | None:
     """Whether a smaller filter of the control would do instead of shaping."""
     limit_um, floor_um = machine.tolerance.contour_um, machine.tolerance.residual_floor_um

@@ -126,10 +126,7 @@ _CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, 
 
 _FADED = 1.0 / 3.0  # of the time after which a vibration is a millionth: it is a hundredth
 
-_PLANNERS = {
-    "look-ahead": _core.CommandPlanner.look_ahead,
-    "optimal": _core.CommandPlanner.time_optimal,
-}
+_PLANNERS = {"look-ahead": _core.CommandPlanner.look_ahead, "optimal": _core.CommandPlanner.time_optimal}
 _TARGETS = {
     "response": _core.ContourTarget.response,
     "command": _core.ContourTarget.command,

@@ -37,12 +37,7 @@ FloatArray = npt.NDArray[np.float64]
 
 _HALF_PIXEL = 0.5
 _LEAST_EXTENT_MM = 1e-3
-_FLAT = {
-    "deviation": 1e-3,
-    "vibration": 1e-3,
-    "speed": 1e-3,
-    "acceleration": 1e-6,
-}  # a curve within so little is flat
+_FLAT = {"deviation": 1e-3, "vibration": 1e-3, "speed": 1e-3, "acceleration": 1e-6}  # a curve within so little is flat
 
 
 @dataclass

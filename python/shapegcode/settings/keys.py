@@ -34,12 +34,17 @@ _UNITS = {
 """Unit of a key by the end of its name; the longest that fits."""
 
 
-def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: bool = False, **field: Any) -> Any:
+_KNOWN = object()
+
+
+def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: Any = _KNOWN, **field: Any) -> Any:
     """A pydantic field with what the documentation of a key needs; *unit* only where its name does not end in it.
 
-    Left out of *field*, ``default`` makes the key mandatory.
+    *assumed* is a default that nobody measured, in place of ``default``; left out, both make the key mandatory.
     """
-    noted: dict[str, Any] = {"unit": unit, "fanuc": fanuc, "assumed": assumed}
+    if assumed is not _KNOWN:
+        field["default"] = assumed
+    noted: dict[str, Any] = {"unit": unit, "fanuc": fanuc, "assumed": assumed is not _KNOWN}
     return Field(description=meaning, json_schema_extra=noted, **field)
 
 

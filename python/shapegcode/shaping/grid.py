@@ -124,10 +124,7 @@ def choose_block_period(
 
 
 def robust_candidate(
-    bands: Sequence[ModeBand],
-    period_s: float,
-    max_duration_s: float = 0.25,
-    vibration_limit: float = VIBRATION_LIMIT,
+    bands: Sequence[ModeBand], period_s: float, max_duration_s: float = 0.25, vibration_limit: float = VIBRATION_LIMIT
 ) -> BlockPeriodCandidate:
     """What :func:`choose_block_period` would take on one given period."""
     check_modes_and_times(bands, period_s=period_s, max_duration_s=max_duration_s)

@@ -29,13 +29,7 @@ from shapegcode.shaping.bands import (
     proven_worst,
     whole_periods,
 )
-from shapegcode.shaping.cutting_planes import (
-    NO_RESIDUAL,
-    SAME_RESIDUAL,
-    Bounds,
-    CutPool,
-    TapProblem,
-)
+from shapegcode.shaping.cutting_planes import NO_RESIDUAL, SAME_RESIDUAL, Bounds, CutPool, TapProblem
 from shapegcode.shaping.grid_designs import (
     RESIDUAL_LIMIT,
     exact_conditions,

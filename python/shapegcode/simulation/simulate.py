@@ -195,11 +195,7 @@ def simulate_motion(
 def _shaped_figures(runs: Sequence[RegionRun], simulated: Sequence[_core.SimulationFigures]) -> ShapedFigures | None:
     if not runs:
         return None
-    return ShapedFigures(
-        regions=len(runs),
-        cutting_time_s=math.fsum(run.time_s for run in runs),
-        **_largest(simulated),
-    )
+    return ShapedFigures(regions=len(runs), cutting_time_s=math.fsum(run.time_s for run in runs), **_largest(simulated))
 
 
 def _largest(simulated: Sequence[_core.SimulationFigures]) -> dict[str, Any]:

@@ -329,7 +329,4 @@ class ProgramFigures:
     def region_time_s(self) -> Pair[float]:
         """All cuts together, until the set-points rest."""
         cuts = self.all_cuts
-        return Pair(
-            math.fsum(cut.time_s.original for cut in cuts),
-            math.fsum(cut.time_s.emitted for cut in cuts),
-        )
+        return Pair(math.fsum(cut.time_s.original for cut in cuts), math.fsum(cut.time_s.emitted for cut in cuts))

@@ -71,12 +71,7 @@ class _RapidShaper:
     """Replaces the rapids of one emitted program by shaped moves."""
 
     def __init__(
-        self,
-        emitted: Program,
-        placed: Sequence[Placed],
-        model: MachineModel,
-        grid: Grid,
-        pool: Executor,
+        self, emitted: Program, placed: Sequence[Placed], model: MachineModel, grid: Grid, pool: Executor
     ) -> None:
         self.emitted, self.placed, self.grid, self.pool = emitted, placed, grid, pool
         self.model, self.machine = model, model.machine
