@@ -1,8 +1,6 @@
-"""What every result says of itself: whether it is good, its cautions, what to do next; when two of them are equal.
+"""What every result says of itself, and when two are equal; its pictures are drawn by the module `plots` beside it.
 
-A result's pictures are drawn by the module `plots` beside it, which is loaded when somebody asks for them. In a pickle
-the core's objects are handles: a path is built again; of any other one its figures travel, and what it computes is
-missing in the copy and says so.
+In a pickle a path is built again; of other objects of the core the figures travel, and what they compute is missing.
 """
 
 from __future__ import annotations
@@ -90,20 +88,11 @@ def _reduced(value: Any) -> tuple[Any, ...]:
     return CoreFigures, (type(value).__name__, figures)
 
 
-def _reduced_path(path: _core.Path) -> tuple[Any, ...]:
-    return _path, ([_parts(path[rank]) for rank in range(len(path))],)
-
-
 def _parts(segment: _core.Segment) -> tuple[Any, ...]:
     if segment.kind == _core.SegmentKind.arc:
         centre, sweep = segment.centre_mm.copy(), segment.sweep_rad
         return segment.start_mm, segment.end_mm, centre, sweep, segment.feed_mm_per_s, segment.normal
     return segment.start_mm, segment.end_mm, segment.feed_mm_per_s
-
-
-def _path(parts: list[tuple[Any, ...]]) -> _core.Path:
-    """A path of the same motion; which lines it comes from is not known."""
-    return _core.Path([_segment(each) for each in parts])
 
 
 def _segment(parts: tuple[Any, ...]) -> _core.Segment:
@@ -122,7 +111,8 @@ _IN_RESULTS = (  # beside what only the core makes
 for _kind in _HANDLES:
     if _kind in _IN_RESULTS or isinstance(vars(_kind)["__init__"], types.WrapperDescriptorType):
         copyreg.pickle(_kind, _reduced)
-copyreg.pickle(_core.Path, _reduced_path)
+# Of the same motion; which lines it comes from is not known in the copy.
+copyreg.pickle(_core.Path, lambda path: (_core.Path, ([path[rank] for rank in range(len(path))],)))
 copyreg.pickle(_core.Segment, lambda segment: (_segment, (_parts(segment),)))
 copyreg.pickle(types.MappingProxyType, lambda mapping: (types.MappingProxyType, (dict(mapping),)))
 
@@ -171,10 +161,7 @@ class Xyz(Generic[T]):
 
 
 class Outcome:
-    """What every result is; see `shapegcode.results.result.Result`, which a class inherits.
-
-    `json_extra` names the properties that the JSON holds beside the fields, with their types.
-    """
+    """What every result is; `json_extra` names properties that the JSON holds beside the fields, with their types."""
 
     from_json: bool = False
     """It was read back from its JSON: what no JSON holds is missing."""

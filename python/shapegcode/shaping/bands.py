@@ -101,10 +101,7 @@ class ModeBand:
 
 
 def parse_mode_band(text: str, uncertainty: float = 0.0) -> ModeBand:
-    """A mode such as ``46``, ``46:0.02``, ``46:0.02±5%`` or ``46:0.02+-2.3Hz``: Hz, damping ratio, band.
-
-    A band that reaches further to one side, ``30:0.1-13%+19%``, is that of its middle: ``30.9:0.1±15.534%``.
-    """
+    """A mode such as ``46``, ``46:0.02±5%``, ``46:0.02+-2.3Hz``, or ``30:0.1-13%+19%`` as that of the band's middle."""
     match = _TEXT.fullmatch(text.strip())
     if match is None:
         raise ArgumentError(
