@@ -12,7 +12,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import add_alias, add_options, line_ranges, positive, ratio, seconds, size
+from shapegcode.cli.arguments import NEEDED, add_alias, add_options, line_ranges, positive, ratio, seconds, size
 from shapegcode.cli.options import (
     add_cutting_arguments,
     add_machine_argument,
@@ -60,10 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("input", metavar="IN", help="CNC program")
     add_machine_argument(parser)
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write")
-    parser.add_argument(
-        "--arc-feed", metavar="RATIO", type=ratio, help="feed on arcs relative to the programmed feed, for example 60%%"
-    )
+    add_options(parser, (
+        ("-o --output", "OUT", None, "program to write", NEEDED),
+        ("--arc-feed", "RATIO", ratio, "feed on arcs relative to the programmed feed, for example 60%%"),
+    ))  # fmt: skip
     add_override_arguments(parser, MACHINE_KEYS)
     add_options(parser, (
         ("--shape-all", None, bool,
@@ -71,14 +71,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
          "and where the original is within its tolerance; without it such a cut is left unchanged"),
         ("--only", "A-B,...", line_ranges, "shape nothing but the cuts in these lines of IN, for example 12-80,95-240"),
         ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines of IN unchanged", ()),
-    ))  # fmt: skip
-    parser.add_argument(
-        "--tolerance-curve",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="work out what other contour tolerances would cost in time (default: %(default)s)",
-    )
-    add_options(parser, (
+        ("--tolerance-curve", None, {"action": argparse.BooleanOptionalAction},
+         "work out what other contour tolerances would cost in time (default: %(default)s)", True),
         ("--block-period", "TIME", seconds,
          "duration of the shortest block, for example 5ms (default: chosen for the modes)"),
         ("--max-bytes", "N[k|M]", size,
@@ -162,12 +156,7 @@ def _loading(module: str) -> Iterator[None]:
 
 
 def _give_memory_back() -> None:
-    """Let glibc give large pieces of memory back as soon as they are free.
-
-    By itself it keeps them for later from the second time on; a path, a plan and a text of a million blocks then stand
-    in memory one beside the other.
-    """
-
+    """Let glibc give large pieces of memory back as soon as they are free, though a later one may take them again."""
     if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
         libc.mallopt(_MMAP_THRESHOLD, _LARGE_BYTES)
 
