@@ -1,7 +1,6 @@
-"""Runs packed jobs, each in a process of its own with limits on time and memory.
+"""Runs packed jobs, each in a process of its own with limits on time and memory, here or on a Dask worker.
 
-A process that has loaded shapegcode once (`shapegcode.cli.host`) forks one for each job, so that a job starts in some
-milliseconds. Each thread that runs jobs has such a host. The same function runs jobs here and on a Dask worker.
+Each thread has a process that has loaded shapegcode (`shapegcode.cli.host`) and forks one for each job.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""What a controller would refuse in a program, and where it would not run it as programmed.
+"""What a controller would refuse in a program, by the reader, and where it would not run it as programmed.
 
-The alarms are the reader's, several per run. What an accepted program still does (starve on short blocks or on a slow
-serial line, stop between two cutting moves, run below its F) is worked out from the time of each block at its feed.
+The latter is worked out from the time of each block at its feed.
 """
 
 from __future__ import annotations

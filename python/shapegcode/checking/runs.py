@@ -1,7 +1,6 @@
 """Cutting runs of a program as a table of blocks: how long each lasts at its feed, and what stops between them.
 
-All lines here are those of the text that the control executes (`Program.core.text`), in which every line runs once and
-in order; `Program.place` leads back to the source.
+All lines here are those of `Program.core.text`; `Program.place` leads back to the source.
 """
 
 from __future__ import annotations
@@ -16,8 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
+from shapegcode.model.stream import cuts_of_lines
 from shapegcode.program import Program
 
 _CUTTING, _RAPID, _DWELL = (
@@ -116,7 +117,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     # The control takes a shaped block for whole periods: its F is rounded up so that it ends just before the last one.
     period_s = machine.controller.interpolation_period_s
     whole = np.ceil(limited_s / period_s - _TICK_SLACK) * period_s
-    shaped = _in_shaped_region(program, line)
+    shaped = cuts_of_lines([region for region in program.regions if region.shaped], line) >= 0
     duration = np.where(shaped, whole, limited_s)
     stretch_s = np.where(shaped, _shaper_s(program, machine), np.inf)
 
@@ -152,11 +153,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
 
 
 def _needed_per_s(
-    duration_s: npt.NDArray[np.float64],
-    offsets: npt.NDArray[np.int64],
-    first: int,
-    lines: npt.NDArray[np.int64],
-    stretch_s: float,
+    duration_s: FloatArray, offsets: npt.NDArray[np.int64], first: int, lines: npt.NDArray[np.int64], stretch_s: float
 ) -> float:
     """Characters per second; those between two blocks count with the block that follows."""
     amounts = np.diff(offsets[lines], prepend=offsets[first - 1])
@@ -172,18 +169,7 @@ def _shaper_s(program: Program, machine: Machine) -> float:
         return least_s
 
 
-def _in_shaped_region(program: Program, lines: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Which lines stand in regions that are shaped blocks."""
-    shaped = [region for region in program.regions if region.shaped]
-    firsts = np.array([region.first_line for region in shaped], dtype=np.int64)
-    lasts = np.array([0, *(region.last_line for region in shaped)], dtype=np.int64)
-    inside: npt.NDArray[np.bool_] = lines <= lasts[np.searchsorted(firsts, lines, side="right")]
-    return inside
-
-
-def _clamped_feeds(
-    line: npt.NDArray[np.int64], feed: npt.NDArray[np.float64], ratio: npt.NDArray[np.float64]
-) -> Iterator[ClampedFeed]:
+def _clamped_feeds(line: npt.NDArray[np.int64], feed: FloatArray, ratio: FloatArray) -> Iterator[ClampedFeed]:
     feeds, group = np.unique(feed.round(3), return_inverse=True)
     if feeds.size == 0:
         return
@@ -216,12 +202,7 @@ def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDAr
 def _run_starts(program: Program, lines: npt.NDArray[np.int64], places: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
     """Which cutting moves begin a run: another region, or something between it and the move before."""
     starts: npt.NDArray[np.bool_] = np.diff(places, prepend=-2) != 1
-    firsts = np.array([region.first_line for region in program.regions], dtype=np.int64)
-    lasts = np.array([region.last_line for region in program.regions], dtype=np.int64)
-    if firsts.size:
-        region = np.searchsorted(firsts, lines, side="right") - 1
-        region[(region >= 0) & (lines > lasts[np.maximum(region, 0)])] = -1
-        starts |= np.diff(region, prepend=-2) != 0
+    starts |= np.diff(cuts_of_lines(program.regions, lines), prepend=-2) != 0
     return starts
 
 
@@ -252,9 +233,10 @@ def look_ahead_breakers(program: Program, machine: Machine, table: BlockTable) -
         if region.exact_stop_at_end:
             note(region.last_line, "exact stop", _ASKED, behind=True)
     for line, code in _coded_lines(program):
+        at = int(np.searchsorted(cutting, line))
         if code == "53":
             note(line, "G53", _STOPS_READING)
-        elif _present(cutting, line):
+        elif at < cutting.size and int(cutting[at]) == line:
             note(line, "exact stop", _ASKED, behind=True)
     for line in table.dwell_lines.tolist():
         note(line, "G04", _ASKED)
@@ -285,11 +267,6 @@ def _coded_lines(program: Program) -> Iterator[tuple[int, str]]:
     offsets = _line_offsets(program)
     for match in _CODED.finditer(text):
         yield int(np.searchsorted(offsets, match.start(), side="right")), match[1].decode()
-
-
-def _present(ascending: npt.NDArray[np.int64], line: int) -> bool:
-    at = int(np.searchsorted(ascending, line))
-    return at < ascending.size and int(ascending[at]) == line
 
 
 def _words(function: tuple[list[int], int, float], machine: Machine, *, look_ahead_mode: bool) -> tuple[str, str]:

@@ -294,10 +294,7 @@ class Emission(TomlTable):
 
     @property
     def locking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override off: `lock_lines`, or the dialect's own where they are FANUC's.
-
-        None where it is not locked.
-        """
+        """Lines that switch the feed override off, the dialect's own in place of FANUC's; none where it is not."""
         if self.override != "lock":
             return ()
         own = dialect_of(self.dialect)

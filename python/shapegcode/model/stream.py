@@ -5,7 +5,7 @@ The plant is at rest at the start and runs on through the whole program. Memory 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import Offset
@@ -27,8 +28,6 @@ REST_S = 0.25
 _CHUNK_SAMPLES = 65536
 _OF_EVERY_PLANT = ("line", "kind", "command_mm", "response_mm", "velocity_mm_per_s")
 _OF_DRIVES = ("motor_mm", "motor_force_n", "friction_force_n")
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +87,15 @@ class Chunk:
         return self if step == 1 else self.rows(self.sample % step == 0)
 
 
+def cuts_of_lines(cuts: Sequence[_core.Region], lines: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
+    """Rank of the cut that each line stands in, (k,), -1 outside of them; the cuts are in the order of their lines."""
+    firsts = np.array([cut.first_line for cut in cuts], dtype=np.int64)
+    lasts = np.array([cut.last_line for cut in cuts] or [0], dtype=np.int64)
+    found = np.searchsorted(firsts, lines, side="right") - 1
+    found[(found >= 0) & (lines > lasts[np.maximum(found, 0)])] = -1
+    return found
+
+
 def stream(
     program: Program | str | Path,
     machine: Machine | str | Path,
@@ -125,8 +133,10 @@ def stream(
     if chunk_samples < 1:
         raise _core.ArgumentError(f"chunk_samples = {chunk_samples}: must be 1 or more")
     program = given_program(program, machine)
-    if lines is not None:
-        _check_lines(program, lines)
+    count = program.core.line_count
+    if lines is not None and not 1 <= lines[0] <= lines[1] <= count:
+        where = "lines {}-{}".format(*lines)
+        raise _core.ArgumentError(f"{where}: must lie within 1-{count} of {program.source}, first to last")
     model = MachineModel(machine)
     offsets, known = _offsets(program, model)
     options = model.options(plant=plant, offset=known)
@@ -136,20 +146,10 @@ def stream(
 
 
 def _offsets(program: Program, model: MachineModel) -> tuple[list[FloatArray], Offset]:
-    """Of each region from the program's positions to the machine's, and None for axes where one of them is not known.
-
-    A mode that varies over such an axis stays nominal throughout.
-    """
+    """Of each region from program to machine positions, and None for axes where one of them is not known."""
     found = [model.offset(region) for region in program.regions]
     x, y, z = (None if any(offset[axis] is None for offset in found) else 0.0 for axis in range(3))
     return [np.array([value or 0.0 for value in offset]) for offset in found], (x, y, z)
-
-
-def _check_lines(program: Program, lines: tuple[int, int]) -> None:
-    first, last = lines
-    count = program.core.line_count
-    if not 1 <= first <= last <= count:
-        raise _core.ArgumentError(f"lines {first}-{last}: must lie within 1-{count} of {program.source}, first to last")
 
 
 def _chunks(

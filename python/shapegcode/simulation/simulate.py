@@ -72,7 +72,9 @@ def simulate(
     machine = Machine.of(machine)
     program = given_program(program, machine)
     model, band_um = MachineModel(machine), machine.tolerance.residual_floor_um
-    limit_s = _rest_s(model, plant)
+    limit_s = _DRIVE_REST_S
+    if plant == "modal":
+        limit_s = min(max(model.vibration_memory_s, _SHORTEST_REST_S), _LONGEST_REST_S)
     nominal, verdict = {}, None
     if against is not None:
         against = given_program(against, machine)
@@ -182,8 +184,8 @@ def simulate_motion(
         ]
         for chunk in chunks:
             recorder.add(chunk)
-            for file in written:
-                file.write(chunk.every(every))
+            for write in written:
+                write(chunk.every(every))
             on_progress(float(chunk.time_s[-1]) / whole_s)
         if not recorder.samples:
             first, last = lines or (1, program.core.line_count)
@@ -228,12 +230,6 @@ def _play(
     options.settling_band_mm = band_um * 1e-3
     options.settling_limit_s = limit_s
     return model.simulated(shaped=shaped).simulate(blocks, options, against=path, block_end=block_end)
-
-
-def _rest_s(model: MachineModel, plant: str) -> float:
-    if plant != "modal":
-        return _DRIVE_REST_S
-    return min(max(model.vibration_memory_s, _SHORTEST_REST_S), _LONGEST_REST_S)
 
 
 def _settling_s(simulated: Iterable[_core.SimulationFigures], band_um: float) -> Xyz[float | None]:
