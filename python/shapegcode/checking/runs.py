@@ -106,7 +106,9 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     rows = limited[cutting]
     lines = rows["line"].astype(np.int64)
     # Several moves of one line (a corner word) are one block.
-    run_starts = _run_starts(program, lines, cutting)
+    # Another region begins, or something stands between a move and the one before.
+    run_starts: npt.NDArray[np.bool_] = np.diff(cuts_of_lines(program.regions, lines), prepend=-2) != 0
+    run_starts |= np.diff(cutting, prepend=-2) != 1
     block_starts = np.flatnonzero(run_starts | (np.diff(lines, prepend=-1) != 0))
     run_of_block = np.cumsum(run_starts)[block_starts] - 1
     limited_s = np.add.reduceat(rows["duration_s"], block_starts) * _SLOW_MOTION
@@ -197,13 +199,6 @@ def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDAr
     limits.max_feed_mm_per_s = limits.max_feed_mm_per_s * _SLOW_MOTION if with_limits else np.full(3, _NO_LIMIT)
     model.limits = limits
     return _core.time_program(program.core, model, per_block=True).blocks
-
-
-def _run_starts(program: Program, lines: npt.NDArray[np.int64], places: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Which cutting moves begin a run: another region, or something between it and the move before."""
-    starts: npt.NDArray[np.bool_] = np.diff(places, prepend=-2) != 1
-    starts |= np.diff(cuts_of_lines(program.regions, lines), prepend=-2) != 0
-    return starts
 
 
 def _line_offsets(program: Program) -> npt.NDArray[np.int64]:

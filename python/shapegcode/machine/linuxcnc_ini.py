@@ -23,17 +23,11 @@ _PLANNER = {
 
 @dataclass(frozen=True)
 class IniMachine:
-    """A machine that an INI file describes.
+    """A machine that an INI file describes."""
 
-    Attributes:
-        machine: with where each value comes from.
-        count: values that were read.
-        notes: what is set there and not part of the model.
-    """
-
-    machine: Machine
-    count: int
-    notes: tuple[str, ...]
+    machine: Machine  # with where each value comes from
+    count: int  # values that were read
+    notes: tuple[str, ...]  # what is set there and not part of the model
 
 
 class _Ini:

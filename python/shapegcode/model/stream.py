@@ -32,31 +32,19 @@ _OF_DRIVES = ("motor_mm", "motor_force_n", "friction_force_n")
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """A stretch of a simulated program; one row per interpolation period.
+    """A stretch of a simulated program; one row per interpolation period."""
 
-    Attributes:
-        sample: number of each row since the start of the program, (k,).
-        time_s: since the start of the program, (k,).
-        line: of the block that is being interpolated, (k,).
-        kind: what that block is, (k,): a rank in `KINDS`. Waits for in-position count to the block before them.
-        command_mm: set-points behind every filter, (k, 3).
-        response_mm: the table, (k, 3).
-        velocity_mm_per_s: of the command over the period before, (k, 3).
-        motor_mm: feed drives only: the motor as travel of the table, (k, 3).
-        motor_force_n: feed drives only: force of the motor, (k, 3).
-        friction_force_n: feed drives only: friction of the table, against its motion, (k, 3).
-    """
-
-    sample: npt.NDArray[np.int64]
-    time_s: FloatArray
-    line: npt.NDArray[np.uint32]
+    sample: npt.NDArray[np.int64]  # number of each row since the start of the program, (k,)
+    time_s: FloatArray  # since the start of the program, (k,)
+    line: npt.NDArray[np.uint32]  # of the block that is being interpolated, (k,)
+    # what that block is, (k,): a rank in `KINDS`. Waits for in-position count to the block before them
     kind: npt.NDArray[np.uint8]
-    command_mm: FloatArray
-    response_mm: FloatArray
-    velocity_mm_per_s: FloatArray
-    motor_mm: FloatArray | None = None
-    motor_force_n: FloatArray | None = None
-    friction_force_n: FloatArray | None = None
+    command_mm: FloatArray  # set-points behind every filter, (k, 3)
+    response_mm: FloatArray  # the table, (k, 3)
+    velocity_mm_per_s: FloatArray  # of the command over the period before, (k, 3)
+    motor_mm: FloatArray | None = None  # feed drives only: the motor as travel of the table, (k, 3)
+    motor_force_n: FloatArray | None = None  # feed drives only: force of the motor, (k, 3)
+    friction_force_n: FloatArray | None = None  # feed drives only: friction of the table, against its motion, (k, 3)
 
     def __len__(self) -> int:
         """Rows."""

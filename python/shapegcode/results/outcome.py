@@ -58,17 +58,14 @@ def _same(first: Any, second: Any) -> bool:
         return np.array_equal(first, second, equal_nan=first.dtype.kind in "fc" and second.dtype.kind in "fc")
     if type(first) is not type(second):
         return False
-    if is_dataclass(first) and _compares_fields(type(first)):
+    kind: Any = type(first)
+    if is_dataclass(first) and (kind.__eq__ is object.__eq__ or kind.__dataclass_params__.eq):
         return same_fields(first, second)
     if isinstance(first, Mapping):
         return first.keys() == second.keys() and all(_same(value, second[key]) for key, value in first.items())
     if isinstance(first, list | tuple):
         return len(first) == len(second) and all(map(_same, first, second))
     return bool(first == second) or bool(first != first and second != second)
-
-
-def _compares_fields(kind: Any) -> bool:
-    return kind.__eq__ is object.__eq__ or bool(kind.__dataclass_params__.eq)
 
 
 def _is_handle(value: Any) -> bool:

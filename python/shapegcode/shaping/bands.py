@@ -304,9 +304,8 @@ class DesignOptions:
     period_s: float | None = None  # grid on which the impulses must lie, s; None: continuous times
     max_duration_s: float = 0.25  # longest shaper, s
     max_abs_sum: float = 10.0  # largest sum of the impulses' magnitudes
-    vibration_limit: float = (
-        VIBRATION_LIMIT  # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
-    )
+    # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
+    vibration_limit: float = VIBRATION_LIMIT
     taps: Shaper | None = None  # the shaper of the family `taps`; no other family uses it
 
     @property

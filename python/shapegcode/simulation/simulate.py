@@ -108,7 +108,7 @@ def simulate(
         simulated += figures
         of_shaped += figures if as_shaped and not region.was_rapid else []
         on_progress(done, len(program.regions))
-    own = [run.figures for run in runs]
+    own, cuts = [run.figures for run in runs], [run for run in runs if run.shaped and not run.was_rapid]
     cutting_s = math.fsum(run.time_s for run in runs)
     warnings = [*program.warnings, *machine_warnings(machine), *region_range_warnings(program.regions, machine)]
     if shaped is None:
@@ -127,7 +127,9 @@ def simulate(
         settling_limit_s=limit_s,
         orbit_error_percent=tuple(error for figures in own for error in figures.orbit_error_percent),
         response_orbit_error_percent=tuple(error for figures in own for error in figures.response_orbit_error_percent),
-        of_shaped=_shaped_figures([run for run in runs if run.shaped and not run.was_rapid], of_shaped),
+        of_shaped=ShapedFigures(len(cuts), math.fsum(run.time_s for run in cuts), **_largest(of_shaped))
+        if cuts
+        else None,
         verdict=verdict,
         regions=tuple(runs),
         warnings=tuple(warnings),
@@ -192,12 +194,6 @@ def simulate_motion(
             raise _core.ArgumentError(f"lines {first}-{last}: nothing happens there: name other lines")
     names = {name: None if file is None else str(file) for name, file in (("csv", csv), ("npz", npz))}
     return recorder.result(program.source, lines=lines, every=every, **names)
-
-
-def _shaped_figures(runs: Sequence[RegionRun], simulated: Sequence[_core.SimulationFigures]) -> ShapedFigures | None:
-    if not runs:
-        return None
-    return ShapedFigures(regions=len(runs), cutting_time_s=math.fsum(run.time_s for run in runs), **_largest(simulated))
 
 
 def _largest(simulated: Sequence[_core.SimulationFigures]) -> dict[str, Any]:

@@ -72,7 +72,7 @@ class ModeLine:
 
 @dataclass(frozen=True, eq=False)
 class SceneSpectrum:
-    """SceneSpectrum of the acceleration of the command along an axis."""
+    """Spectrum of the acceleration of the command along an axis."""
 
     axis: str  # "x", "y" or "z"
     variant: str  # key of its variant
