@@ -95,7 +95,10 @@ def batch(
         if html is not None:
             Path(html).mkdir(parents=True, exist_ok=True)
         scratch = Path(output) / _SCRATCH
-        _sweep(scratch, folders)
+        # What a batch that was killed has left goes before this one writes.
+        shutil.rmtree(scratch, ignore_errors=True)
+        for file in (file for folder in folders for file in folder.rglob(".*.tmp") if is_temporary(file)):
+            file.unlink(missing_ok=True)
         scratch.mkdir()
         stack.callback(shutil.rmtree, scratch, ignore_errors=True)
         if remote is None:
@@ -116,15 +119,6 @@ def batch(
         command, str(output), rows, str(summary), len(planned) - len(rows), stopped,
         _warnings(stopped, called), time.monotonic() - begin, slots,
     )  # fmt: skip
-
-
-def _sweep(scratch: Path, folders: Sequence[Path]) -> None:
-    """Remove what a batch that was killed has left, before this one writes."""
-    shutil.rmtree(scratch, ignore_errors=True)
-    for folder in folders:
-        for file in folder.rglob(".*.tmp"):
-            if is_temporary(file):
-                file.unlink(missing_ok=True)
 
 
 def _warnings(stopped: str, called: Sequence[str]) -> tuple[str, ...]:

@@ -1,8 +1,6 @@
-"""What a batch has done, row by row: a file of JSON lines that outlives it.
+"""What a batch has done, row by row: a file of JSON lines that outlives it, and stays on the disk.
 
-The first line says what the file is, and in which folder the batch was started. Each further one is the row of a run,
-written when its files are complete; of several with one key the last counts. A row that was cut off in the middle is
-not there. Rows stay on the disk: in memory is where they stand.
+The first line says what the file is; of several rows with one key the last counts, and none that was cut off.
 """
 
 from __future__ import annotations

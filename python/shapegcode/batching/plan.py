@@ -8,7 +8,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapegcode.batching.manifest import MANIFEST, short
 from shapegcode.batching.process import Base, BatchJob
@@ -17,9 +16,6 @@ from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file
 from shapegcode.machine import Machine
 from shapegcode.program.reading import PROGRAM_SUFFIXES, program_loader
 from shapegcode.program.several import is_subprogram
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
 
 _NUMBERED = re.compile(r"[Oo]\d{1,8}")
 _COMMENT = re.compile(r"(?:^|\s)#.*")
@@ -133,10 +129,7 @@ def _only_returns(path: str) -> bool:
 
 
 def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterator[tuple[str, str]]:
-    """Files of programs that a program may call, and those that these may.
-
-    More than are called may be among them: any number behind a P counts, of a program that calls at all.
-    """
+    """Files of programs that a program may call, and those that these may: any number behind a P of one that calls."""
     beside = Path(path).parent
     folders = [beside, *(Path(base, Path(name).expanduser()) for name in machine.input.program_folders)]
     load = program_loader(folders, machine.controller.max_program_bytes)

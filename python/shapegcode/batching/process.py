@@ -1,7 +1,6 @@
-"""Runs packed jobs, each in a process of its own with limits on time and memory.
+"""Runs packed jobs, each in a process of its own with limits on time and memory, here or on a Dask worker.
 
-A process that has loaded shapegcode once (`shapegcode.cli.host`) forks one for each job, so that a job starts in some
-milliseconds. Each thread that runs jobs has such a host. The same function runs jobs here and on a Dask worker.
+Each thread has a process that has loaded shapegcode (`shapegcode.cli.host`) and forks one for each job.
 """
 
 from __future__ import annotations
@@ -206,7 +205,8 @@ class Hosts:
             with named_errors(target):
                 target.write_bytes(content)
         for word in packed.words:
-            _make_parent(cwd, word)
+            if os.sep in word and not os.path.isabs(word):  # folders of the batch exist also where a run writes
+                Path(os.path.normpath(cwd / word)).parent.mkdir(parents=True, exist_ok=True)
         host = self._host(packed.words[0])
         answer = None
         if host is not None:
@@ -240,12 +240,6 @@ def run_packed(packed: Packed) -> JobOutcome:
 def _ups(word: str) -> int:
     """How many folders upwards a word leads that may be a path."""
     return sum(part == ".." for part in Path(os.path.normpath(word)).parts) if ".." in word else 0
-
-
-def _make_parent(cwd: Path, word: str) -> None:
-    """Folders of the batch exist also where a run writes."""
-    if os.sep in word and not os.path.isabs(word):
-        Path(os.path.normpath(cwd / word)).parent.mkdir(parents=True, exist_ok=True)
 
 
 def _ending(answer: Mapping[str, Any], packed: Packed, complained: str) -> tuple[Ending, str]:

@@ -79,7 +79,9 @@ def figures_of(report: Mapping[str, Any]) -> dict[str, Any]:
     """The figures of a row from the JSON of a command."""
     return {
         "residual_um": _pair(report.get("residual_vibration_um"), _largest),
-        "contour_um": _pair(_contour(report), _contour_largest),
+        "contour_um": _pair(
+            _contour(report), lambda each: _number(each.get("max") if isinstance(each, dict) else each)
+        ),
         "cycle_time_s": _pair(report.get("cycle_time_s"), _number),
         "alarms": report["counts"].get("alarm") if isinstance(report.get("counts"), Mapping) else None,
     }
@@ -104,10 +106,6 @@ def _pair(value: object, take: Callable[[Any], float | None]) -> Pair[float] | N
 def _largest(value: object) -> float | None:
     numbers = [each for each in value.values() if isinstance(each, int | float)] if isinstance(value, Mapping) else []
     return float(max(numbers)) if numbers else None
-
-
-def _contour_largest(value: object) -> float | None:
-    return _number(value.get("max") if isinstance(value, Mapping) else value)
 
 
 def _number(value: object) -> float | None:

@@ -27,7 +27,7 @@ from shapegcode.batching.process import BatchJob, JobOutcome, Packed
 from shapegcode.batching.result import BatchRow, Ended, figures_of
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_bytes
-from shapegcode.results.json import file_hash, plain
+from shapegcode.results.json import MadeFile, plain
 from shapegcode.results.outcome import Pair
 from shapegcode.results.page.html import is_shared
 
@@ -242,7 +242,7 @@ class Runs:
         row = self._manifest.earlier(key) if self._resume else None
         if row is None or row.get("fingerprint") != fingerprint or row["ended"] == "failed":
             return False
-        if any(_hash_of(self._path_of(name)) != sha256 for name, sha256 in row["files"].items()):
+        if any(MadeFile.of("wrote", self._path_of(name)).sha256 != sha256 for name, sha256 in row["files"].items()):
             return False
         self.earlier[rank] = 1
         self._count(rank, self._manifest.kept_at(key), row["ended"])
@@ -304,10 +304,3 @@ class Runs:
         self._told = time.monotonic()
         text = f"{self._done} of {len(self._planned)} done, {running} running, {self._failed} failed"
         self._on_progress(self._done_bytes / self._whole_bytes, text)
-
-
-def _hash_of(name: str) -> str:
-    try:
-        return file_hash(name)[0]
-    except OSError:
-        return ""

@@ -1,7 +1,6 @@
-"""What a controller would refuse in a program, and where it would not run it as programmed.
+"""What a controller would refuse in a program, by the reader, and where it would not run it as programmed.
 
-The alarms are the reader's, several per run. What an accepted program still does (starve on short blocks or on a slow
-serial line, stop between two cutting moves, run below its F) is worked out from the time of each block at its feed.
+The latter is worked out from the time of each block at its feed.
 """
 
 from __future__ import annotations
@@ -124,7 +123,9 @@ def check_text(
             found.append(_at(program, severity, "look_ahead_breaker", stop.line, stop.message))
         found += _feed_findings(program, table)
         found += _low_feed_findings(program, machine)
-        found += _planner_findings(program, machine)
+        slowed = [region for region in program.regions if region.shaped]
+        for code, line, message in ini_lines([region.path for region in slowed], machine):
+            found.append(_at(program, "warning", code, line or slowed[0].first_line, message))
         if not program.core.alarms:
             simulated = SimulatedPrograms(program, machine, labels=("program", ""))
         short = _short_blocks(program, machine, table)
@@ -240,12 +241,6 @@ def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:
             f"{clamped.least_mm_per_min:.0f} mm/min"
         )
         yield _at(program, "warning", "axis_feed", clamped.first_line, message)
-
-
-def _planner_findings(program: Program, machine: Machine) -> Iterator[Finding]:
-    shaped = [region for region in program.regions if region.shaped]
-    for code, line, message in ini_lines([region.path for region in shaped], machine):
-        yield _at(program, "warning", code, line or shaped[0].first_line, message)
 
 
 def _low_feed_findings(program: Program, machine: Machine) -> Iterator[Finding]:

@@ -1,7 +1,6 @@
 """Cutting runs of a program as a table of blocks: how long each lasts at its feed, and what stops between them.
 
-All lines here are those of the text that the control executes (`Program.core.text`), in which every line runs once and
-in order; `Program.place` leads back to the source.
+All lines here are those of `Program.core.text`; `Program.place` leads back to the source.
 """
 
 from __future__ import annotations
@@ -16,8 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
+from shapegcode.model.stream import cuts_of_lines
 from shapegcode.program import Program
 
 _CUTTING, _RAPID, _DWELL = (
@@ -105,7 +106,9 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     rows = limited[cutting]
     lines = rows["line"].astype(np.int64)
     # Several moves of one line (a corner word) are one block.
-    run_starts = _run_starts(program, lines, cutting)
+    # Another region begins, or something stands between a move and the one before.
+    run_starts: npt.NDArray[np.bool_] = np.diff(cuts_of_lines(program.regions, lines), prepend=-2) != 0
+    run_starts |= np.diff(cutting, prepend=-2) != 1
     block_starts = np.flatnonzero(run_starts | (np.diff(lines, prepend=-1) != 0))
     run_of_block = np.cumsum(run_starts)[block_starts] - 1
     limited_s = np.add.reduceat(rows["duration_s"], block_starts) * _SLOW_MOTION
@@ -116,7 +119,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     # The control takes a shaped block for whole periods: its F is rounded up so that it ends just before the last one.
     period_s = machine.controller.interpolation_period_s
     whole = np.ceil(limited_s / period_s - _TICK_SLACK) * period_s
-    shaped = _in_shaped_region(program, line)
+    shaped = cuts_of_lines([region for region in program.regions if region.shaped], line) >= 0
     duration = np.where(shaped, whole, limited_s)
     stretch_s = np.where(shaped, _shaper_s(program, machine), np.inf)
 
@@ -152,11 +155,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
 
 
 def _needed_per_s(
-    duration_s: npt.NDArray[np.float64],
-    offsets: npt.NDArray[np.int64],
-    first: int,
-    lines: npt.NDArray[np.int64],
-    stretch_s: float,
+    duration_s: FloatArray, offsets: npt.NDArray[np.int64], first: int, lines: npt.NDArray[np.int64], stretch_s: float
 ) -> float:
     """Characters per second; those between two blocks count with the block that follows."""
     amounts = np.diff(offsets[lines], prepend=offsets[first - 1])
@@ -172,18 +171,7 @@ def _shaper_s(program: Program, machine: Machine) -> float:
         return least_s
 
 
-def _in_shaped_region(program: Program, lines: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Which lines stand in regions that are shaped blocks."""
-    shaped = [region for region in program.regions if region.shaped]
-    firsts = np.array([region.first_line for region in shaped], dtype=np.int64)
-    lasts = np.array([0, *(region.last_line for region in shaped)], dtype=np.int64)
-    inside: npt.NDArray[np.bool_] = lines <= lasts[np.searchsorted(firsts, lines, side="right")]
-    return inside
-
-
-def _clamped_feeds(
-    line: npt.NDArray[np.int64], feed: npt.NDArray[np.float64], ratio: npt.NDArray[np.float64]
-) -> Iterator[ClampedFeed]:
+def _clamped_feeds(line: npt.NDArray[np.int64], feed: FloatArray, ratio: FloatArray) -> Iterator[ClampedFeed]:
     feeds, group = np.unique(feed.round(3), return_inverse=True)
     if feeds.size == 0:
         return
@@ -213,18 +201,6 @@ def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDAr
     return _core.time_program(program.core, model, per_block=True).blocks
 
 
-def _run_starts(program: Program, lines: npt.NDArray[np.int64], places: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Which cutting moves begin a run: another region, or something between it and the move before."""
-    starts: npt.NDArray[np.bool_] = np.diff(places, prepend=-2) != 1
-    firsts = np.array([region.first_line for region in program.regions], dtype=np.int64)
-    lasts = np.array([region.last_line for region in program.regions], dtype=np.int64)
-    if firsts.size:
-        region = np.searchsorted(firsts, lines, side="right") - 1
-        region[(region >= 0) & (lines > lasts[np.maximum(region, 0)])] = -1
-        starts |= np.diff(region, prepend=-2) != 0
-    return starts
-
-
 def _line_offsets(program: Program) -> npt.NDArray[np.int64]:
     """Bytes of the text up to the end of each line, from 0."""
     text = np.frombuffer(program.core.text, dtype=np.uint8)
@@ -252,9 +228,10 @@ def look_ahead_breakers(program: Program, machine: Machine, table: BlockTable) -
         if region.exact_stop_at_end:
             note(region.last_line, "exact stop", _ASKED, behind=True)
     for line, code in _coded_lines(program):
+        at = int(np.searchsorted(cutting, line))
         if code == "53":
             note(line, "G53", _STOPS_READING)
-        elif _present(cutting, line):
+        elif at < cutting.size and int(cutting[at]) == line:
             note(line, "exact stop", _ASKED, behind=True)
     for line in table.dwell_lines.tolist():
         note(line, "G04", _ASKED)
@@ -285,11 +262,6 @@ def _coded_lines(program: Program) -> Iterator[tuple[int, str]]:
     offsets = _line_offsets(program)
     for match in _CODED.finditer(text):
         yield int(np.searchsorted(offsets, match.start(), side="right")), match[1].decode()
-
-
-def _present(ascending: npt.NDArray[np.int64], line: int) -> bool:
-    at = int(np.searchsorted(ascending, line))
-    return at < ascending.size and int(ascending[at]) == line
 
 
 def _words(function: tuple[list[int], int, float], machine: Machine, *, look_ahead_mode: bool) -> tuple[str, str]:

@@ -1,12 +1,6 @@
-"""The ``shapegcode`` command.
+"""The ``shapegcode`` command: one module of this package per command, imported only when that command runs.
 
-One module of this package per command, imported only when that command runs, so that ``shapegcode --help``
-answers at once. A command's module offers two functions:
-
-* ``add_arguments(parser: argparse.ArgumentParser) -> None`` declares its arguments,
-* ``run(args: argparse.Namespace) -> int`` does the work and returns the exit code.
-
-Such a module imports NumPy, the core and everything else that is slow inside ``run``.
+It offers ``add_arguments(parser)`` and ``run(args)``, which gives the exit code and imports what is slow.
 """
 
 from __future__ import annotations
@@ -78,8 +72,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("batch", "run a command over many programs and machines, and resume where it stopped"),
     Command(
-        "study",
-        "simulate a program on sampled machines (Monte Carlo): how likely it stays within tolerance, and why",
+        "study", "simulate a program on sampled machines (Monte Carlo): how likely it stays within tolerance, and why"
     ),
     Command(
         "optimize", "choose settings for the shortest program that stays within tolerance on most sampled machines"

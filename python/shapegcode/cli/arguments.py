@@ -369,19 +369,18 @@ NEEDED = object()
 def add_options(parser: argparse._ActionsContainer, rows: Iterable[tuple[Any, ...]]) -> None:
     """Declare options: names, metavar, type, help and, where it is not None, the default or `NEEDED` of each.
 
-    As type `bool` is a switch, a tuple one of its words, and a list of one type that type, several times.
+    As type `bool` is a switch, a tuple one of its words, a list of one type that type, several times, and a dictionary
+    what argparse takes.
     """
     for names, metavar, kind, text, *default in rows:
         settings: dict[str, Any] = {"default": default[0]} if default and default[0] is not NEEDED else {}
         settings |= {"required": True} if default and default[0] is NEEDED else {}
         if kind is bool:
             settings["action"] = "store_true"
-        elif isinstance(kind, tuple):
-            settings |= {"choices": kind, "metavar": metavar}
         else:
-            settings |= {"metavar": metavar} | (
-                {"action": "append", "type": kind[0]} if isinstance(kind, list) else {"type": kind}
-            )
+            how = {"choices": kind} if isinstance(kind, tuple) else kind if isinstance(kind, dict) else {"type": kind}
+            how = {"action": "append", "type": kind[0]} if isinstance(kind, list) else how
+            settings |= how if metavar is None else how | {"metavar": metavar}
         parser.add_argument(*names.split(), help=text, **settings)
 
 

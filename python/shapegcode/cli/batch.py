@@ -12,6 +12,7 @@ from shapegcode.cli.arguments import NEEDED, add_options, count, seconds, size
 from shapegcode.cli.options import add_amount_arguments, add_cluster_arguments, cluster_of
 
 _INDEX = "index.html"
+_COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,26 +23,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "and summary.csv (all rows). Exit code 0 if all are within tolerance, 1 if some are not or were refused, 2 if "
         "none could be started."
     )
-    parser.add_argument(
-        "programs",
-        nargs="+",
-        metavar="PROGRAMS",
-        help="files, folders (with all below them), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
-        "these per line",
-    )
     add_options(parser, (
+        ("programs", "PROGRAMS", {"nargs": "+"},
+         "files, folders (with all below them), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
+         "these per line"),
         ("-m --machine", "MACHINE", [None],
          "machine file or built-in machine; more than one -m: every program on each of them", NEEDED),
         ("-o --output", "DIR", None, "folder of the results", NEEDED),
-    ))  # fmt: skip
-    parser.add_argument(
-        "--command",
-        dest="batch_command",
-        choices=("convert", "time", "check", "feed", "measure", "simulate"),
-        default="convert",
-        help="what is done with each program (default: convert)",
-    )
-    add_options(parser, (
+        ("--command", None, {"dest": "batch_command", "choices": _COMMANDS},
+         "what is done with each program (default: convert)", "convert"),
         ("--resume", None, bool, "do only what is missing, failed or changed since"),
         ("--jobs", "N", count, "processes at a time (default: one per processor)", 0),
         ("--time-limit", "TIME", seconds, "of each run (default: 3600s)", 3600.0),
@@ -49,21 +39,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
          "of each run, such as 2G, beyond what is loaded (default: none; Linux only)", 0),
     ))  # fmt: skip
     add_cluster_arguments(parser, "run")
-    parser.add_argument("--json", metavar="FILE", help="write all rows as JSON; - for standard output")
-    parser.add_argument(
-        "--html", metavar="DIR", help="write a page for each run into this folder, and an index of them"
-    )
+    add_options(parser, (
+        ("--json", "FILE", None, "write all rows as JSON; - for standard output"),
+        ("--html", "DIR", None, "write a page for each run into this folder, and an index of them"),
+    ))  # fmt: skip
     add_amount_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the batch."""
-
     from shapegcode.batching.batch import batch
-    from shapegcode.cli import ExitCode
+    from shapegcode.cli import ExitCode, parser_of
 
     options = list(getattr(args, "rest", ()))
-    _check_options(args, options)
+    # What the command does not understand is refused before anything is done; argparse says what.
+    target = ["-o", "out"] if args.batch_command in ("convert", "feed") else []
+    parser_of(args.batch_command).parse_args([args.batch_command, "part.nc", "-m", "vx500", *target, *options])
     html, args.html = args.html, None
     name = f"{args.batch_command}: "
     with runner.progress(f"{name}reading", args) as bar:
@@ -96,11 +87,3 @@ def run(args: argparse.Namespace) -> int:
         notes.append(f"go on with: {shlex.join(['shapegcode', 'batch', '--resume', *words[1:]])}")
     code = runner.finish(result, args, tables=tables, notes=notes, wrote=[result.summary])
     return ExitCode.INTERRUPTED if result.stopped == "Ctrl-C" else code
-
-
-def _check_options(args: argparse.Namespace, options: list[str]) -> None:
-    """Refuse what the command does not understand before anything is done; argparse says what."""
-    from shapegcode.cli import parser_of
-
-    target = ["-o", "out"] if args.batch_command in ("convert", "feed") else []
-    parser_of(args.batch_command).parse_args([args.batch_command, "part.nc", "-m", "vx500", *target, *options])

@@ -55,7 +55,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the tests or fit their results; see the module."""
-
     _check_options(args)
     machine = load_machine(args, writes_program=args.write is not None)
     runner.check_files(args, also_read=[each for each in (args.servo, args.runs) if each is not None])

@@ -18,12 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", metavar="A", help="the one program, for example the original")
     parser.add_argument("against", metavar="B", help="the other one, for example what convert made of it")
     add_machine_argument(parser, required=False)
-    parser.add_argument(
-        "--allow",
-        metavar="WORDS",
-        default="",
-        help="differences that are allowed, for example feeds,blocks,path=20um,calls; a wrong word lists them all",
-    )
+    allowed = "differences that are allowed, for example feeds,blocks,path=20um,calls; a wrong word lists them all"
+    parser.add_argument("--allow", metavar="WORDS", default="", help=allowed)
     add_result_arguments(parser)
 
 

@@ -11,20 +11,8 @@ from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli import runner
-from shapegcode.cli.arguments import add_alias, add_options, line_ranges, positive, ratio, seconds, size
-from shapegcode.cli.options import (
-    add_cutting_arguments,
-    add_machine_argument,
-    add_override_arguments,
-    add_plots_argument,
-    add_program_argument,
-    add_result_arguments,
-    load_machine,
-    output_file,
-    overridden,
-    read_cutting_arguments,
-)
+from shapegcode.cli import options, runner
+from shapegcode.cli.arguments import NEEDED, add_alias, add_options, line_ranges, positive, ratio, seconds, size
 from shapegcode.cli.runner import ProgressBar
 
 if TYPE_CHECKING:
@@ -59,26 +47,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "overwritten; a program that nobody should run is written beside OUT with another suffix (exit code 1)."
     )
     parser.add_argument("input", metavar="IN", help="CNC program")
-    add_machine_argument(parser)
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write")
-    parser.add_argument(
-        "--arc-feed", metavar="RATIO", type=ratio, help="feed on arcs relative to the programmed feed, for example 60%%"
-    )
-    add_override_arguments(parser, MACHINE_KEYS)
+    options.add_machine_argument(parser)
+    add_options(parser, (
+        ("-o --output", "OUT", None, "program to write", NEEDED),
+        ("--arc-feed", "RATIO", ratio, "feed on arcs relative to the programmed feed, for example 60%%"),
+    ))  # fmt: skip
+    options.add_override_arguments(parser, MACHINE_KEYS)
     add_options(parser, (
         ("--shape-all", None, bool,
          "shape every cut within the price: also where that gains less than shaping.least_gain_um or becomes worse, "
          "and where the original is within its tolerance; without it such a cut is left unchanged"),
         ("--only", "A-B,...", line_ranges, "shape nothing but the cuts in these lines of IN, for example 12-80,95-240"),
         ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines of IN unchanged", ()),
-    ))  # fmt: skip
-    parser.add_argument(
-        "--tolerance-curve",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="work out what other contour tolerances would cost in time (default: %(default)s)",
-    )
-    add_options(parser, (
+        ("--tolerance-curve", None, {"action": argparse.BooleanOptionalAction},
+         "work out what other contour tolerances would cost in time (default: %(default)s)", True),
         ("--block-period", "TIME", seconds,
          "duration of the shortest block, for example 5ms (default: chosen for the modes)"),
         ("--max-bytes", "N[k|M]", size,
@@ -90,10 +72,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
          "first set the feeds so that the cut of the shaped program keeps the tool's limits, as `shapegcode feed`; "
          "needs --tool and --stock"),
     ))  # fmt: skip
-    add_cutting_arguments(parser, required=False)
-    add_program_argument(parser)
-    add_plots_argument(parser)
-    add_result_arguments(parser)
+    options.add_cutting_arguments(parser, required=False)
+    options.add_program_argument(parser)
+    options.add_plots_argument(parser)
+    options.add_result_arguments(parser)
     add_alias(parser, "--all", "--shape-all")
 
 
@@ -103,8 +85,8 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.program.compensation import read_for_conversion
     from shapegcode.program.several import alone_with
 
-    output = output_file(args.output)
-    machine = overridden(load_machine(args), args, MACHINE_KEYS)
+    output = options.output_file(args.output)
+    machine = options.overridden(options.load_machine(args), args, MACHINE_KEYS)
     failed = output.with_name(output.name + machine.emission.failed_suffix)
     if args.feed_schedule != bool(args.tool and args.stock) or bool(args.tool) != bool(args.stock):
         raise ArgumentError("--feed-schedule, --tool and --stock belong together: give all three or none")
@@ -162,12 +144,7 @@ def _loading(module: str) -> Iterator[None]:
 
 
 def _give_memory_back() -> None:
-    """Let glibc give large pieces of memory back as soon as they are free.
-
-    By itself it keeps them for later from the second time on; a path, a plan and a text of a million blocks then stand
-    in memory one beside the other.
-    """
-
+    """Let glibc give large pieces of memory back as soon as they are free, though a later one may take them again."""
     if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
         libc.mallopt(_MMAP_THRESHOLD, _LARGE_BYTES)
 
@@ -196,4 +173,6 @@ def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar
     """Feeds and shaping in one go."""
     from shapegcode.conversion.scheduled import convert_scheduled
 
-    return convert_scheduled(program, machine, **read_cutting_arguments(args), **_options(args), on_progress=bar.update)
+    return convert_scheduled(
+        program, machine, **options.read_cutting_arguments(args), **_options(args), on_progress=bar.update
+    )

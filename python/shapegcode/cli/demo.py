@@ -32,13 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Repeats the figures of a paper with this program's models, and shows both. Other papers are pages of the "
         "book: docs/evidence/figures.md. Exit code 1 if a statement of the paper differs and why is not known."
     )
-    parser.add_argument(
-        "name",
-        metavar="NAME",
-        type=_name,
-        choices=("path",),
-        help="path: line, arc, line at both feeds and reductions: Ko, Lim and Hong, 2023 (paper 000)",
-    )
+    what = "path: line, arc, line at both feeds and reductions: Ko, Lim and Hong, 2023 (paper 000)"
+    parser.add_argument("name", metavar="NAME", type=_name, choices=("path",), help=what)
     add_plots_argument(parser, "folder for the pictures, where there are some (PNG and SVG)")
     add_result_arguments(parser)
 

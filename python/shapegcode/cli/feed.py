@@ -4,16 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from shapegcode.cli import runner
-from shapegcode.cli.options import (
-    add_cutting_arguments,
-    add_input_arguments,
-    add_plots_argument,
-    add_result_arguments,
-    load_machine,
-    output_file,
-    read_cutting_arguments,
-)
+from shapegcode.cli import options, runner
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,15 +15,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "changes within them; everything else stays as it is. Exit code 0: every limit is kept; 1: written, but "
         "somewhere a limit is not kept (the report says where and why); 2: bad input."
     )
-    add_input_arguments(parser)
-    add_cutting_arguments(parser, required=True)
+    options.add_input_arguments(parser)
+    options.add_cutting_arguments(parser, required=True)
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write")
-    add_plots_argument(
+    options.add_plots_argument(
         parser,
         "write pictures (PNG and SVG) into this folder: force, feed and engagement along the path, the path coloured "
         "by force before and after, the error of the wall",
     )
-    add_result_arguments(parser)
+    options.add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -40,10 +31,10 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.feed.schedule import schedule_feed
     from shapegcode.program.compensation import read_for_conversion
 
-    output = output_file(args.output)
-    machine = load_machine(args, writes_program=True)
+    output = options.output_file(args.output)
+    machine = options.load_machine(args, writes_program=True)
     runner.check_files(args)
-    cutting = read_cutting_arguments(args)
+    cutting = options.read_cutting_arguments(args)
     with runner.progress(f"scheduling {args.input}", args) as bar:
         program = read_for_conversion(args.input, machine, program_number=args.program)
         schedule = schedule_feed(program, machine, **cutting, on_progress=bar.update)

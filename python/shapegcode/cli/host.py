@@ -1,8 +1,6 @@
-"""A process that has everything loaded and forks one for each command line that it is told.
+"""A process that has everything loaded and forks one for each command line that `shapegcode.batching` tells it.
 
-``python -m shapegcode.cli.host convert`` reads one JSON object per line: the folder of a run, the words of its command
-line, its limits; and answers with one: exit code, time, memory. It ends when its input does, and takes a running
-command with it. `shapegcode.batching` is the one that asks.
+It reads and answers one JSON object per line, ends when its input does, and takes a running command with it.
 """
 
 from __future__ import annotations

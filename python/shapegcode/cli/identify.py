@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from shapegcode.cli import arguments, options, runner
 from shapegcode.io.atomic import write_text
@@ -13,44 +13,23 @@ from shapegcode.io.atomic import write_text
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-_HELP_TIME = "where the decay begins in the file, for example 250ms (default: found by itself)"
-# What the user says of a file, over what it says itself: option, field of ReadOptions, how it is read, help.
-_OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
-    ("--time-column", "time_column", {"metavar": "NAME"}, "header or number (from 1) of the time"),
-    ("--force-column", "force_column", {"metavar": "NAME"}, "of the force"),
-    ("--response-column", "response_columns", {"metavar": "NAME", "action": "append"}, "of a response; repeatable"),
-    ("--time-unit", "time_unit", {"metavar": "UNIT"}, "s, ms or us"),
-    ("--force-unit", "force_unit", {"metavar": "UNIT"}, "N, kN, kgf or lbf"),
-    ("--response-unit", "response_unit", {"metavar": "UNIT"}, "for example m/s^2, g, mm/s or um"),
-    ("--sample-period", "period_s", {"metavar": "TIME", "type": arguments.seconds}, "between samples, such as 0.1ms"),
-    (
-        "--quantity", "quantity", {"choices": ("acceleration", "velocity", "displacement")},
-        "what the sensor measured",
-    ),
-    (
-        "--force-scale", "force_scale", {"metavar": "N", "type": arguments.nonzero},
-        "N for 1 in the file (integer WAV: full scale)",
-    ),
-    (
-        "--response-scale", "response_scale", {"metavar": "X", "type": arguments.nonzero},
-        "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)",
-    ),
-    (
-        "--force-sensitivity", "force_sensitivity", {"metavar": "mV/N"},
-        "of the hammer, where the force is in volts: 2.25mV/N",
-    ),
-    (
-        "--response-sensitivity", "response_sensitivity", {"metavar": "mV/g"},
-        "of the sensor, where the response is in volts: 100mV/g",
-    ),
-    (
-        "--exponential-window", "exponential_window_s", {"metavar": "TIME", "type": arguments.seconds},
-        "time constant of an exponential window that the analyser applied to the response, such as 50ms",
-    ),
-    (
-        "--response-first", "response_first", {"action": "store_true", "default": False},
-        "in a WAV file the response is the first channel, not the force",
-    ),
+# What the user says of a file, over what it says itself; each stands for a field of ReadOptions.
+_OF_FILES = (
+    ("--time-column", "NAME", None, "header or number (from 1) of the time"),
+    ("--force-column", "NAME", None, "of the force"),
+    ("--response-column", "NAME", {"dest": "response_columns", "action": "append"}, "of a response; repeatable"),
+    ("--time-unit", "UNIT", None, "s, ms or us"),
+    ("--force-unit", "UNIT", None, "N, kN, kgf or lbf"),
+    ("--response-unit", "UNIT", None, "for example m/s^2, g, mm/s or um"),
+    ("--sample-period", "TIME", {"dest": "period_s", "type": arguments.seconds}, "between samples, such as 0.1ms"),
+    ("--quantity", None, ("acceleration", "velocity", "displacement"), "what the sensor measured"),
+    ("--force-scale", "N", arguments.nonzero, "N for 1 in the file (integer WAV: full scale)"),
+    ("--response-scale", "X", arguments.nonzero, "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)"),
+    ("--force-sensitivity", "mV/N", None, "of the hammer, where the force is in volts: 2.25mV/N"),
+    ("--response-sensitivity", "mV/g", None, "of the sensor, where the response is in volts: 100mV/g"),
+    ("--exponential-window", "TIME", {"dest": "exponential_window_s", "type": arguments.seconds},
+     "time constant of an exponential window that the analyser applied to the response, such as 50ms"),
+    ("--response-first", None, bool, "in a WAV file the response is the first channel, not the force"),
 )  # fmt: skip
 
 
@@ -62,41 +41,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "95 % interval, and refuses what the data do not support. Exit code 0: all that stands out is supported; 1: "
         "some of it is not; 2: nothing is, or bad input."
     )
-    add = parser.add_argument
-    add(
-        "files",
-        metavar="FILE",
-        nargs="*",
-        help="CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML), capture of command and encoder; several "
-        "of one point together",
-    )
-    add(
-        "--sweep", metavar="PROGRAM", help="program that ran beside the sensor (shapegcode sweep), on the control of -m"
-    )
-    along = "use the response along this axis; where the file names none, it is this one"
-    add("--axis", choices=("x", "y", "z"), help=along)
-    across = (
-        "find what each mode moves along the other axes too, for a tool that rocks: by a sensor of three axes, or by "
-        "these files of taps at the same point with the sensor turned"
-    )
-    add("--across", metavar="FILE", nargs="*", help=across)
-    add("--update", metavar="MACHINE.toml", help="put the supported modes into this machine file")
+    arguments.add_options(parser, (
+        ("files", "FILE", {"nargs": "*"},
+         "CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML), capture of command and encoder; several of "
+         "one point together"),
+        ("--sweep", "PROGRAM", None, "program that ran beside the sensor (shapegcode sweep), on the control of -m"),
+        ("--axis", None, ("x", "y", "z"),
+         "use the response along this axis; where the file names none, it is this one"),
+        ("--across", "FILE", {"nargs": "*"},
+         "find what each mode moves along the other axes too, for a tool that rocks: by a sensor of three axes, or by "
+         "these files of taps at the same point with the sensor turned"),
+        ("--update", "MACHINE.toml", None, "put the supported modes into this machine file"),
+    ))  # fmt: skip
     options.add_modes_arguments(parser, "--keep-modes")
-    add("--tap-plan", action="store_true", help="say how to do the test (for the modes of -m MACHINE), nothing else")
+    plan = "say how to do the test (for the modes of -m MACHINE), nothing else"
+    parser.add_argument("--tap-plan", action="store_true", help=plan)
     options.add_machine_argument(parser, required=False)
-    add("--modes", metavar="N", type=arguments.count, help="how many (default: chosen by evidence)")
-    most = "largest number of modes (default: 40 over frequency, 8 over time)"
-    add("--max-modes", "--most-modes", dest="max_modes", metavar="N", type=arguments.count, help=most)
-    add("--force", action="store_true", help="write modes with --update even if the answer is not to use them")
-    within = "look for modes between these frequencies, Hz"
-    add("--frequencies", metavar="LOW:HIGH", type=arguments.frequency_band, help=within)
-    ignore = "take it as a free decay: do not use the force, even if there is one"
-    add("--decay", "--ignore-force", dest="ignore_force", action="store_true", help=ignore)
-    stops = "the record is of an ordinary run: use every stop in it behind which the machine rests"
-    add("--stops", action="store_true", help=stops)
-    add("--start", metavar="TIME", type=arguments.start_time, help=_HELP_TIME)
-    for name, field, how, said in _OF_FILES:
-        add(name, dest=field, help=said, **({"default": None} | how))
+    arguments.add_options(parser, (
+        ("--modes", "N", arguments.count, "how many (default: chosen by evidence)"),
+        ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": arguments.count},
+         "largest number of modes (default: 40 over frequency, 8 over time)"),
+        ("--force", None, bool, "write modes with --update even if the answer is not to use them"),
+        ("--frequencies", "LOW:HIGH", arguments.frequency_band, "look for modes between these frequencies, Hz"),
+        ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},
+         "take it as a free decay: do not use the force, even if there is one"),
+        ("--stops", None, bool,
+         "the record is of an ordinary run: use every stop in it behind which the machine rests"),
+        ("--start", "TIME", arguments.start_time,
+         "where the decay begins in the file, for example 250ms (default: found by itself)"),
+        *_OF_FILES,
+    ))  # fmt: skip
     options.add_plots_argument(
         parser, "write pictures (PNG and SVG) of records, fit and stabilisation into this folder"
     )

@@ -30,14 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
 
     init = actions.add_parser("init", help="write a commented machine file to start from")
-    init.add_argument(
-        "name",
-        metavar="NAME",
-        nargs="?",
-        default=_DEFAULT_MACHINE,
-        help="built-in machine to start from (default: %(default)s)",
-    )
     add_options(init, (
+        ("name", "NAME", {"nargs": "?"}, "built-in machine to start from (default: %(default)s)", _DEFAULT_MACHINE),
         ("-o --output", "FILE", None, "file to write (default: %(default)s); - for standard output", _DEFAULT_FILE),
         ("--full", None, bool, "every key with its meaning (600 lines), not only what differs from a default"),
         ("--force", None, bool, "overwrite an existing file"),
@@ -49,22 +43,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         description="Make a machine file from a FANUC parameter dump, and say what was read, assumed and missing. "
         "Exit code 1 if nothing was read.",
     )
-    take.add_argument(
-        "dump",
-        metavar="DUMP",
-        nargs="+",
-        help="parameter dump as the controller punches it; with it, if wanted, its tables of tool offsets, work "
-        "offsets and variables (TOOLOFST.TXT, EXT_WKZ.TXT, MACRO.TXT)",
-    )
-    take.add_argument(
-        "-o", "--output", metavar="FILE", default=_DEFAULT_FILE, help="file to write (default: %(default)s)"
-    )
-    take.add_argument(
-        "--from", dest="base", metavar="MACHINE", help="machine for what the dump does not say, such as the modes"
-    )
+    add_options(take, (
+        ("dump", "DUMP", {"nargs": "+"},
+         "parameter dump as the controller punches it; with it, if wanted, its tables of tool offsets, work offsets "
+         "and variables (TOOLOFST.TXT, EXT_WKZ.TXT, MACRO.TXT)"),
+        ("-o --output", "FILE", None, "file to write (default: %(default)s)", _DEFAULT_FILE),
+        ("--from", "MACHINE", {"dest": "base"}, "machine for what the dump does not say, such as the modes"),
+    ))  # fmt: skip
     add_modes_arguments(take, "--keep-modes")
-    take.add_argument("--name", metavar="NAME", help="name of the machine (default: that of the dump's file)")
-    take.add_argument("--force", action="store_true", help="overwrite an existing file")
+    add_options(take, (
+        ("--name", "NAME", None, "name of the machine (default: that of the dump's file)"),
+        ("--force", None, bool, "overwrite an existing file"),
+    ))  # fmt: skip
     add_result_arguments(take)
 
     show = actions.add_parser(
@@ -73,19 +63,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         description="Print every value with its unit, meaning and origin: measured, from the control's dump, inherited "
         "from another machine, assumed, a choice, stated in the file, or a default.",
     )
-    show.add_argument("machine", metavar="FILE_OR_NAME", help="machine file, or name of a built-in machine")
-    show.add_argument(
-        "--for",
-        dest="input",
-        metavar="PROGRAM",
-        help="convert this program, and rank the unverified parameters by how far each changes its verdict",
-    )
-    show.add_argument(
-        "--write-origins",
-        action="store_true",
-        help="write where the values come from as a table [origin] into the file: of an older one, whose comments say "
-        "it, or of values with an origin beside them",
-    )
+    add_options(show, (
+        ("machine", "FILE_OR_NAME", None, "machine file, or name of a built-in machine"),
+        ("--for", "PROGRAM", {"dest": "input"},
+         "convert this program, and rank the unverified parameters by how far each changes its verdict"),
+        ("--write-origins", None, bool,
+         "write where the values come from as a table [origin] into the file: of an older one, whose comments say it, "
+         "or of values with an origin beside them"),
+    ))  # fmt: skip
     add_result_arguments(show)
 
     diff = actions.add_parser(
@@ -185,7 +170,6 @@ def _show(args: argparse.Namespace) -> int:
 
 def _write_origins(name: str) -> None:
     """Write where the values of a machine file come from as a table into it; everything else stays."""
-
     from shapegcode.identification.update import check_updatable
     from shapegcode.machine import Machine
     from shapegcode.settings.edit import with_origin_table
@@ -200,7 +184,6 @@ def _write_origins(name: str) -> None:
 
 def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescription:
     """With the values that were not measured, by what they do to a program."""
-
     from shapegcode.conversion.convert import convert
     from shapegcode.conversion.sensitivity import rank_unknown_axes
     from shapegcode.machine import Machine

@@ -5,15 +5,8 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from shapegcode.cli import runner
+from shapegcode.cli import options, runner
 from shapegcode.cli.arguments import NEEDED, add_alias, add_options, line_range, micrometres
-from shapegcode.cli.options import (
-    add_machine_argument,
-    add_plots_argument,
-    add_program_argument,
-    add_result_arguments,
-    load_machine,
-)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,8 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "programs beside their original the shaped ones count alone); 2: bad input."
     )
     parser.add_argument("inputs", metavar="PROGRAM", nargs="+", help="CNC program; several stand side by side")
-    add_machine_argument(parser)
-    add_program_argument(parser)
+    options.add_machine_argument(parser)
+    options.add_program_argument(parser)
     add_options(parser, (
         ("--tool-diameter", "LENGTH", micrometres, "of the tool, for example 3mm", NEEDED),
         ("--plant", None, ("modal", "feed-drive"),
@@ -43,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     length("--station", default=50.0, help="distance of the places at which walls are measured (default: 0.05mm)")
     length("--cutoff", help="cut-off of the roughness (default: 0.8mm, less on sections shorter than 5.6 mm)")
     length("--lambda-s", default=0.0, help="short-wave cut-off (default: none)")
-    add_plots_argument(parser, "write pictures of part, walls and width (PNG and SVG) into this folder")
-    add_result_arguments(parser)
+    options.add_plots_argument(parser, "write pictures of part, walls and width (PNG and SVG) into this folder")
+    options.add_result_arguments(parser)
     add_alias(parser, "--all", "--verbose")
 
 
@@ -54,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.program import Program
 
     runner.check_files(args)
-    machine = load_machine(args)
+    machine = options.load_machine(args)
     with runner.progress("measuring", args) as bar:
         names = [*args.inputs, *([args.against] if args.against is not None else [])]
         read = [Program.read(name, machine, program_number=args.program) for name in names]

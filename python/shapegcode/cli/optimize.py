@@ -24,10 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "program, machine, what is varied, what can be chosen",
         "on how many sampled machines a choice is simulated",
     )
-    parser.add_argument(
-        "--at-least", type=ratio, metavar="RATIO",
-        help="probability of staying within tolerance, for example 99%% (default: the file's)",
-    )  # fmt: skip
+    within = "probability of staying within tolerance, for example 99%% (default: the file's)"
+    parser.add_argument("--at-least", type=ratio, metavar="RATIO", help=within)
     add_plots_argument(parser, "write time and probability of the choices as a picture (PNG and SVG) into this folder")
     add_result_arguments(parser, cites=False)  # each draw is a run of `convert`, which cites
 

@@ -26,21 +26,13 @@ def add_input_arguments(parser: argparse.ArgumentParser, metavar: str = "IN") ->
 
 def add_machine_argument(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Declare ``-m MACHINE`` and ``--set KEY=VALUE``."""
-    parser.add_argument(
-        "-m",
-        "--machine",
-        metavar="MACHINE",
-        required=required,
-        help="machine file (TOML), or name of a built-in machine such as vx500",
-    )
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        help="use another value for one key of the machine file, for example "
-        "--set input.arc_centre=absolute; may be repeated",
-    )
+    add_options(parser, (
+        ("-m --machine", "MACHINE", {"required": required},
+         "machine file (TOML), or name of a built-in machine such as vx500"),
+        ("--set", "KEY=VALUE", [None],
+         "use another value for one key of the machine file, for example --set input.arc_centre=absolute; may be "
+         "repeated", []),
+    ))  # fmt: skip
 
 
 def add_plots_argument(
@@ -54,14 +46,12 @@ def add_plots_argument(
 def add_result_arguments(parser: argparse.ArgumentParser, *, cites: bool = True) -> None:
     """Declare what every command with a result has; *cites*: with ``--cite``."""
     add_json_argument(parser)
-    parser.add_argument(
-        "--html", metavar="FILE", help="write the result as a page: one file that any browser opens, without a network"
-    )
+    page = "write the result as a page: one file that any browser opens, without a network"
+    parser.add_argument("--html", metavar="FILE", help=page)
     add_script_argument(parser)
     if cites:
-        parser.add_argument(
-            "--cite", action="store_true", help="also say which papers are behind the methods of this run, as BibTeX"
-        )
+        papers = "also say which papers are behind the methods of this run, as BibTeX"
+        parser.add_argument("--cite", action="store_true", help=papers)
     add_amount_arguments(parser)
 
 
@@ -74,20 +64,16 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
 
 def add_amount_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare ``--quiet`` and ``--verbose``."""
-    amount = one_of(parser, "how much is said")
-    amount.add_argument("-q", "--quiet", action="store_true", help="only the answer, warnings and errors")
-    amount.add_argument(
-        "-v", "--verbose", action="store_true", help="every table with every column and row, however wide"
-    )
+    add_options(one_of(parser, "how much is said"), (
+        ("-q --quiet", None, bool, "only the answer, warnings and errors"),
+        ("-v --verbose", None, bool, "every table with every column and row, however wide"),
+    ))  # fmt: skip
 
 
 def add_cluster_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     """Declare ``--scheduler`` and its certificates; `what` names the work that runs there."""
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help=f"{what} on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
-    )
+    where = f"{what} on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine"
+    parser.add_argument("--scheduler", metavar="ADDRESS", help=where)
     for name, of in (("ca", "the authority's certificate"), ("cert", "own certificate"), ("key", "own key")):
         parser.add_argument(f"--tls-{name}", metavar="FILE", default="", help=f"{of}, for tls:// schedulers")
 
@@ -101,12 +87,8 @@ def cluster_of(args: argparse.Namespace) -> Cluster | None:
 
 def add_script_argument(parser: argparse.ArgumentParser) -> None:
     """Declare ``--html-script``."""
-    parser.add_argument(
-        "--html-script",
-        choices=("inline", "beside"),
-        default="inline",
-        help="the page's script in its file (default), or in one beside it, which other pages share",
-    )
+    where = "the page's script in its file (default), or in one beside it, which other pages share"
+    parser.add_argument("--html-script", choices=("inline", "beside"), default="inline", help=where)
 
 
 def add_program_argument(parser: argparse.ArgumentParser) -> None:
@@ -256,16 +238,11 @@ def _facts(key: str) -> tuple[str, str, Any]:
 
 def add_modes_arguments(parser: argparse.ArgumentParser, keep: str) -> None:
     """Declare what decides over modes that were not measured on this machine."""
-    parser.add_argument(
-        keep,
-        dest="keep_modes",
-        metavar="AXES",
-        type=axes,
-        help="keep the modes of these axes, for example XY, though they were not measured here: it is the same machine",
-    )
-    parser.add_argument(
-        "--rigid", metavar="AXES", type=axes, help="these axes have no vibration mode that counts, for example Z"
-    )
+    add_options(parser, (
+        (keep, "AXES", {"dest": "keep_modes", "type": axes},
+         "keep the modes of these axes, for example XY, though they were not measured here: it is the same machine"),
+        ("--rigid", "AXES", axes, "these axes have no vibration mode that counts, for example Z"),
+    ))  # fmt: skip
 
 
 def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], introduction: str) -> tuple[str, str]:
@@ -286,21 +263,12 @@ def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], intro
 
 def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
     """Declare what a feed schedule needs beside program and machine: tool, stock, margin, resolution."""
-    parser.add_argument(
-        "--tool",
-        metavar="T.toml",
-        action="append",
-        required=required,
-        help="tool file: end mill, cutting force, limits (docs/reference/tool_files.md); repeated, each file needs "
-        "its T number",
-    )
-    parser.add_argument(
-        "--stock",
-        metavar="S.toml",
-        required=required,
-        help="stock file: what is there before the first block (docs/reference/tool_files.md)",
-    )
     add_options(parser, (
+        ("--tool", "T.toml", {"action": "append", "required": required},
+         "tool file: end mill, cutting force, limits (docs/reference/tool_files.md); repeated, each file needs its T "
+         "number"),
+        ("--stock", "S.toml", {"required": required},
+         "stock file: what is there before the first block (docs/reference/tool_files.md)"),
         ("--margin", "RATIO", share, "share of each limit that is left free, for example 3%% (default: 1.5%%)"),
         ("--resolution", "LENGTH", micrometres,
          "grid of the material, for example 50um (default: a hundredth of the tool's diameter)"),

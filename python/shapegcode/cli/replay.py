@@ -64,7 +64,6 @@ def simulated_again(
     made: Made, found: Mapping[tuple[str, str], Path], report: Mapping[str, Any]
 ) -> tuple[SimulatedPrograms | None, str]:
     """Read the programs and the machine of a run again, with the options that it was run with."""
-
     if made.result not in _WITH_MOTION or not made.command or "program_address" in report:
         return None, ""
     args = _typed(made.command)
@@ -78,7 +77,6 @@ def simulated_again(
 
 def _typed(command: str) -> argparse.Namespace | None:
     """The options of a command as it was typed; None where it cannot be read."""
-
     try:
         words = shlex.split(command)[1:]
     except ValueError:
@@ -101,7 +99,9 @@ def _read_again(
     inputs = [place for (role, _), place in found.items() if role in ("input", "inputs")]
     if not inputs:
         return None
-    machine = _machine(args, found)
+    args.machine = str(found.get(("machine", str(args.machine)), args.machine))
+    keys = getattr(importlib.import_module(f"shapegcode.cli.{args.command}"), "MACHINE_KEYS", {})
+    machine = overridden(load_machine(args), args, keys)
     conversion = made.result == "Conversion"
     read = read_for_conversion if conversion else Program.read
     number = None if getattr(args, "program", None) == "all" else getattr(args, "program", None)
@@ -114,10 +114,3 @@ def _read_again(
     emitted = None if made_of_it is None else Program.read(made_of_it, machine)
     plant = machine.verdict.plant if conversion else plant
     return SimulatedPrograms(original, machine, emitted, labels=labels, plant=plant)
-
-
-def _machine(args: argparse.Namespace, found: Mapping[tuple[str, str], Path]) -> Machine:
-    place = found.get(("machine", str(args.machine)))
-    args.machine = str(place) if place is not None else args.machine
-    module = importlib.import_module(f"shapegcode.cli.{args.command}")
-    return overridden(load_machine(args), args, getattr(module, "MACHINE_KEYS", {}))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import runner
+from shapegcode.cli.arguments import add_options
 from shapegcode.cli.options import add_amount_arguments, add_json_argument, add_script_argument, refuse_same_file
 
 if TYPE_CHECKING:
@@ -18,16 +19,15 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-
     parser.description = (
         "Makes the page that --html writes later, from the JSON: figures from the JSON, and where the programs and the "
         "machine file are still as they were, their motion too. What has changed since is said on the page and here "
         "(exit code 1). Files are looked for where they were, and beside the JSON."
     )
-    parser.add_argument("inputs", metavar="RESULT.json", nargs="+", help="what --json has written")
-    parser.add_argument(
-        "-o", "--output", metavar="PAGE.html", help="page to write (default: RESULT.html beside the JSON)"
-    )
+    add_options(parser, (
+        ("inputs", "RESULT.json", {"nargs": "+"}, "what --json has written"),
+        ("-o --output", "PAGE.html", None, "page to write (default: RESULT.html beside the JSON)"),
+    ))  # fmt: skip
     add_script_argument(parser)
     add_json_argument(parser)
     add_amount_arguments(parser)
@@ -67,7 +67,6 @@ def _target(source: Path, report: Mapping[str, Any]) -> Path:
 
 def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[float], None]) -> tuple[Page, str]:
     """The page of a result, and the result's class; empty: this version cannot read it."""
-
     from shapegcode._core import ArgumentError
     from shapegcode.cli.replay import changes, simulated_again
     from shapegcode.results.json import this_version

@@ -130,10 +130,7 @@ def standard_output(args: argparse.Namespace) -> str | None:
 
 @contextlib.contextmanager
 def progress(description: str, args: argparse.Namespace) -> Iterator[ProgressBar]:
-    """A _bar bar for the block, from its first second on, also as long as nobody tells how much of it is done.
-
-    There is none if standard error is no terminal or a file goes to standard output.
-    """
+    """A bar for the block from its first second on; none without a terminal or where a file goes to standard output."""
     bar = ProgressBar(description)
     later = threading.Timer(_PROGRESS_DELAY_S, bar.open)
     later.daemon = True

@@ -1,10 +1,7 @@
-"""``--program all``: a command over every program of a file, one after the other.
+"""``--program all``: a command over every program of a file that no other one calls, each as if it stood alone.
 
-Each program that no other one of the file calls is done as if it stood alone. What the command shows follows program
-by program; the JSON is a list; pictures go into a folder for each, tables (--csv, --npz) into a file for each; programs
-that a command writes go into one file again, where those that were called, and those that could not be read, stand as
-they were. In a file that holds shaped programs those subprograms are left out that nothing calls any more: what they
-did stands in the shaped text.
+Programs that are written go into one file again; all else stands there as it was, but for subprograms whose moves
+the shaped programs have taken in.
 """
 
 from __future__ import annotations
@@ -29,7 +26,6 @@ _TABLES = ("csv", "npz", "html")
 
 def run_all(args: argparse.Namespace) -> int:
     """Run a command for every program of its file that no other one calls."""
-
     for name in _TABLES:
         if getattr(args, name, None) == "-":
             raise ArgumentError(f"--{name} - with --program all: each program needs a file of its own, name one")
@@ -56,7 +52,6 @@ def run_all(args: argparse.Namespace) -> int:
 
 def _called(several: Gathered, machine: Machine) -> set[int]:
     """Places of programs that another one of the file calls: they are done there."""
-
     called: set[int] = set()
     folder = Path(several.source).parent
     for place in several.places:
@@ -73,7 +68,6 @@ def _called(several: Gathered, machine: Machine) -> set[int]:
 
 def _left_over(several: Gathered) -> set[int]:
     """Places of subprograms beside shaped programs, whose text has taken in what they called."""
-
     if STAMP_BEGIN not in several.text:
         return set()
     texts = [several.text[place.text_begin : place.text_end] for place in several.places]
@@ -103,7 +97,6 @@ def _run_one(args: argparse.Namespace, several: Gathered) -> int:
 
 def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left: set[int]) -> None:
     """Write the one JSON and the one program, and say it."""
-
     target = getattr(args, "json", None)
     outputs = {str(output) for output, _ in several.written.values()}
     # Where one of the programs misses its tolerance, the file as a whole goes beside the one that was asked for.

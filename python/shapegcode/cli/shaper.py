@@ -24,11 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the vibration if the frequencies are off, contour cost, negative impulses; and recommends one. "
         "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input."
     )
-    parser.add_argument(
-        "--mode", metavar="HZ[:DAMPING][±BAND]", action="append", default=[],
-        help="a mode to cancel, such as 46:0.02±5%%, 46:0.02+-2Hz or 46:0.02-5%%+8%%, from 0.1 to 10000 Hz; once for "
-        "each mode",
-    )  # fmt: skip
+    add_options(parser, ((
+        "--mode", "HZ[:DAMPING][±BAND]", [None],
+        "a mode to cancel, such as 46:0.02±5%%, 46:0.02+-2Hz or 46:0.02-5%%+8%%, from 0.1 to 10000 Hz; once for each "
+        "mode", [],
+    ),))  # fmt: skip
     add_machine_argument(parser, required=False)
     add_options(parser, (
         ("--uncertainty", "RATIO", share,
@@ -38,10 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
          "best few)", []),
         ("--continuous", None, bool,
          "designs at continuous times, with --block-period beside those on its grid (default: without a machine)"),
-    ))  # fmt: skip
-    families = f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"
-    parser.add_argument("--family", metavar="NAME", action="extend", nargs="+", help=families)
-    add_options(parser, (
+        ("--family", "NAME", {"action": "extend", "nargs": "+"},
+         f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"),
         ("--list-families", None, bool, "say what each family is and where it comes from, and nothing else"),
         ("--max-duration", "TIME", seconds,
          "longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if that is "

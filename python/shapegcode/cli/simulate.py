@@ -48,7 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate one program."""
-
     from shapegcode.model.programs import shaped_note
     from shapegcode.program import Program
     from shapegcode.simulation.simulate import simulate, simulate_motion

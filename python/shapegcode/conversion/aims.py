@@ -26,15 +26,12 @@ _LEVELS = 40  # steps of a bisection
 
 @dataclass
 class _Attempt:
-    """The last plan of a cut that left its tolerance, what it then reached, µm, and whether a tighter one helps.
-
-    `overridden`: it left the tolerance only at another feed override.
-    """
+    """The last plan of a cut that left its tolerance."""
 
     room_um: float
-    reached_um: float
-    overridden: bool
-    helps: bool = True
+    reached_um: float  # with it
+    overridden: bool  # it left the tolerance only at another feed override
+    helps: bool = True  # a tighter one
 
 
 class Aims:
@@ -182,10 +179,7 @@ class Aims:
         return max(self._asked_um, self.room_um[index] / MARGIN) if index in self._priced else self._asked_um
 
     def time_s(self, index: int, tolerance_um: float) -> float:
-        """What a cut that was shaped once takes at a contour tolerance; infinity: nothing is slowed.
-
-        As simulated at the tolerance that was asked for; else as planned, with what the control's own filter adds.
-        """
+        """What a cut takes at a contour tolerance: as simulated for the one that was asked for, else as planned."""
         if tolerance_um <= self._asked_um:
             return self._asked_s[index]
         return min(self._asked_s[index], self._planned_s(index, tolerance_um * MARGIN))
@@ -218,10 +212,7 @@ class Aims:
         return TolerancePoint(name, tolerance_um, time_s, increase, within)
 
     def _planned_s(self, index: int, room_um: float) -> float:
-        """What a cut takes where its feed is planned for a deviation.
-
-        What slowing costs, in the ratio in which it cost it as simulated; what is not slowed takes what is planned.
-        """
+        """What a cut takes where its feed is planned for a deviation, slowing at the cost that it had as simulated."""
         curve, blocks_s = self._curve_of(index), self._blocks_s[index]
         least_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.room_um[index], room_um))
         ratio = max(0.0, blocks_s - least_s) / (now_s - least_s) if now_s > least_s else 1.0
@@ -401,11 +392,10 @@ def curve_table(curve: ToleranceCurve) -> Table:
         Column("µm", value="tolerance_um", digits=1),
         Column("program s", value="time_s", digits=2),
         Column("increase %", value="time_increase_percent", digits=1),
-        Column("", value=_remark, text=True),
+        Column("", value=lambda each: ", ".join(_remarks(each)), text=True),
     )
     return Table("tolerance against time", columns, curve.points, caption=f"{curve.cuts} cuts that can be shaped")
 
 
-def _remark(point: TolerancePoint) -> str:
-    remarks = (["knee"] if point.is_knee else []) + ([] if point.is_within_price else ["above the price"])
-    return ", ".join(remarks)
+def _remarks(point: TolerancePoint) -> list[str]:
+    return (["knee"] if point.is_knee else []) + ([] if point.is_within_price else ["above the price"])

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.write import EmittedRegion
@@ -18,8 +17,6 @@ from shapegcode.results.result import Xyz
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.figures import RegionVerdict
 from shapegcode.verdict.judge import residual_floor_um
-
-FloatArray = npt.NDArray[np.float64]
 
 _ROUNDING = 1e-9  # relative; rates are quotients
 
@@ -150,12 +147,10 @@ class BudgetOutcome:
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
     """The load of a shaped region; a stretch lasts as long as the shaper: no transition is shorter."""
-    durations = np.empty(shaped.blocks)
-    np.concatenate(shaped.block_periods, out=durations, casting="same_kind")
+    durations = np.concatenate(shaped.block_periods, dtype=np.float64)
     durations *= grid.block_period_s
     window_s = max(grid.duration_s, grid.block_period_s)
-    sizes = np.empty(shaped.blocks)
-    np.concatenate(shaped.block_bytes, out=sizes, casting="same_kind")
+    sizes = np.concatenate(shaped.block_bytes, dtype=np.float64)
     characters = _core.busiest_per_s(durations, sizes, window_s)
     return TransferLoad(
         shaped.text.size - (region.text_end - region.text_begin),
@@ -246,7 +241,11 @@ class Spending:
         chosen = {index: reason for index, load in loads.items() if (reason := self.budget.too_fast(load))}
         for index, reason in chosen.items():
             if not self._keepable[index]:
-                raise self._impossible(index, reason)
+                cut = self._program.regions[index]
+                raise _core.ArgumentError(
+                    f"{self._program.source}:{cut.first_line}: lines {cut.first_line} to {cut.last_line}: "
+                    f"{reason}; their arcs have absolute centres and cannot be kept as they are"
+                )
         if self._longer:
             at = f"at a block period of {grid.block_period_s * 1e3:g} ms"
             missed = (index for index in loads if simulated[index].misses and self._keepable[index])
@@ -343,13 +342,6 @@ class Spending:
         return _core.ArgumentError(
             f"{self._program.source}: needs {least} bytes at least (the original has {self._program.core.size}), "
             f"the budget is {self.budget.max_bytes} bytes (--max-bytes){why}"
-        )
-
-    def _impossible(self, index: int, reason: str) -> _core.ArgumentError:
-        region = self._program.regions[index]
-        return _core.ArgumentError(
-            f"{self._program.source}:{region.first_line}: lines {region.first_line} to {region.last_line}: {reason}; "
-            "their arcs have absolute centres and cannot be kept as they are"
         )
 
 

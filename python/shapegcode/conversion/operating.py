@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad
 from shapegcode.conversion.restart import CutRestarts, RestartPoint
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import dialect_of
 from shapegcode.model.machine_model import MachineModel
@@ -59,7 +59,11 @@ def at_the_control(
         return ()
     machine = model.machine
     override = OVERRIDES[machine.emission.override]
-    elsewhere = [] if machine.emission.override == "lock" else _at_other_overrides(figures)
+    turned = [case for case in figures.cases if case.override != 1.0 and case.mode is None]
+    elsewhere = []
+    if turned and machine.emission.override != "lock":
+        worst = max(turned, key=lambda each: max(each.residual_um))
+        elsewhere = [f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of vibration stay"]
     return (
         ControlNote("memory", _memory(emitted.size, machine)),
         ControlNote("drip feed (DNC)", _line(loads, machine)),
@@ -133,13 +137,6 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
     return f"{needs}; the program switches no mode: contour control with look-ahead (G05.1Q1, G08P1) must be off"
 
 
-def _at_other_overrides(figures: ProgramFigures) -> Iterator[str]:
-    turned = [case for case in figures.cases if case.override != 1.0 and case.mode is None]
-    worst = max(turned, key=lambda each: max(each.residual_um), default=None)
-    if worst is not None:
-        yield f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of vibration stay"
-
-
 def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFigures, model: MachineModel) -> str:
     """What single block does to the cut that vibrates most: its blocks simulated one by one, each from rest to rest."""
     index = max(range(len(placed)), key=lambda each: max(figures.regions[each].residual_vibration_um.original))
@@ -168,7 +165,7 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFi
     )
 
 
-def _direction(segment: _core.Segment) -> npt.NDArray[np.float64]:
+def _direction(segment: _core.Segment) -> FloatArray:
     chord = segment.end_mm - segment.start_mm
     return chord / max(float(np.linalg.norm(chord)), 1e-9)
 

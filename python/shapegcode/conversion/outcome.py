@@ -8,7 +8,6 @@ from functools import partial
 
 from shapegcode.comparison.compare import compare
 from shapegcode.comparison.result import Allowed
-from shapegcode.conversion.aims import ToleranceCurve
 from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.plan import ConversionPlan, Shaped
 from shapegcode.conversion.recommendation import (
@@ -94,6 +93,10 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
     mark = plan.pool.submit(lambda: shaped.emitted.mark)
     warnings = _warnings(plan, shaped, verdict.figures)
     sensitivity, tried = _sensitivity(plan, shaped)
+    originals, curve = [original.result() for original in plan.originals], None
+    if plan.choice.tolerance_curve:
+        original_um = max((getattr(run, plan.judge.target).max_abs_mm for run in originals), default=0.0) * 1e3
+        curve = plan.aims.tolerance_curve(verdict.cycle_time_s.original, original_um)
     mark.result()
     emitted = shaped.emitted.with_verdict(
         good=verdict.grade != "do not run", better=verdict.grade == "better, tolerance not met"
@@ -105,11 +108,9 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
         recommendation=verdict.grade,
         reason=verdict.reason,
         cuts=verdict.cuts,
-        tolerance_curve=_curve(plan, verdict.cycle_time_s) if plan.choice.tolerance_curve else None,
+        tolerance_curve=curve,
         proof=verdict.proof,
-        advice=filter_advice(
-            program, machine, plan.model, plan.judge, [original.result() for original in plan.originals]
-        ),
+        advice=filter_advice(program, machine, plan.model, plan.judge, originals),
         cycle_time_s=verdict.cycle_time_s,
         cutting_time_s=verdict.figures.region_time_s(),
         block_period_s=plan.grid.block_period_s,
@@ -206,14 +207,6 @@ def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tupl
     return tuple(rows)
 
 
-def _curve(plan: ConversionPlan, times: Pair[float]) -> ToleranceCurve | None:
-    """Tolerance against time, of the cuts that were shaped once; None: there are none."""
-    original_um = max(
-        (getattr(original.result(), plan.judge.target).max_abs_mm for original in plan.originals), default=0.0
-    )
-    return plan.aims.tolerance_curve(times.original, original_um * 1e3)
-
-
 def _sensitivity(plan: ConversionPlan, shaped: Shaped) -> tuple[tuple[Sensitivity, ...], int]:
     """Sensitivity of the shaped cut that comes nearest to a limit."""
     deciding = plan.judge.deciding(shaped.figures, shaped.written.placed)
@@ -278,11 +271,7 @@ def _used_shaper(grid: Grid) -> UsedShaper:
 
 
 def prove(original: Program, emitted: Program, machine: Machine, *, rapids_shaped: bool) -> ChangeProof:
-    """Compare an emitted program with its original.
-
-    What shaping changes is allowed: blocks and feeds of cuts, calls that were expanded, the path within its tolerance,
-    which the verdict judges.
-    """
+    """Compare an emitted program with its original; what shaping changes is allowed: the verdict judges the path."""
     kinds = {"feeds", "blocks", "calls"}
     kinds |= {"shaped-rapids"} if rapids_shaped else set()
     kinds |= {"compensation"} if original.core.expanded_radii_mm else set()

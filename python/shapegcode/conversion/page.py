@@ -60,12 +60,8 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
     return "green", f"every tolerance is kept in all {sum(case.counts for case in conversion.cases)} cases that count"
 
 
-def sections_of(conversion: Conversion, made: Made | None = None) -> tuple[Section, ...]:
+def sections_of(conversion: Conversion, made: Made | None = None) -> Iterator[Section]:
     """What stands on the page."""
-    return tuple(_sections(conversion, made))
-
-
-def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     how = "Each card: original → emitted. The limit is what the emitted figure is judged by."
     yield Section("gain", "What it gains", (Figures(tuple(_figures(conversion))),), how=how)
     if conversion.proof is not None:
@@ -95,15 +91,14 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
 
 def _picker(conversion: Conversion, made: Made | None) -> CutPicker:
     """The cuts to tick; what a cut left unchanged would be is not known."""
-    rows = []
-    for cut in conversion.cuts:
-        rows.append(
-            CutRow(
-                cut.lines, "" if cut.tool is None else f"T{cut.tool}", cut.gain_um, _tried(cut.residual_um, cut),
-                _tried(cut.contour_um, cut), _tried(cut.time_s, cut), _tried(cut.bytes, cut),
-                "shaped" if cut.is_shaped else cut.reason, cut.is_shaped, cut.is_shaped,
-            )
-        )  # fmt: skip
+    rows = [
+        CutRow(
+            cut.lines, "" if cut.tool is None else f"T{cut.tool}", cut.gain_um, _tried(cut.residual_um, cut),
+            _tried(cut.contour_um, cut), _tried(cut.time_s, cut), _tried(cut.bytes, cut),
+            "shaped" if cut.is_shaped else cut.reason, cut.is_shaped, cut.is_shaped,
+        )
+        for cut in conversion.cuts
+    ]  # fmt: skip
     command = "shapegcode convert IN -m MACHINE -o OUT" if made is None or not made.command else made.command
     command = re.sub(r" --(?:only|leave)[ =]\S+", "", command)
     totals = CutTotals(
@@ -123,14 +118,8 @@ def _price(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     """Cut by cut, and what other tolerances would cost."""
     if len(conversion.cuts) > 1:
         how = "Tick the cuts to shape: the sums follow, and the command below shapes only them."
-        yield Section(
-            "cuts",
-            "Cut by cut",
-            (_picker(conversion, made),),
-            how=how,
-            folded=len(conversion.cuts) > _SHOWN_CUTS,
-            printed=False,
-        )
+        parts, many = (_picker(conversion, made),), len(conversion.cuts) > _SHOWN_CUTS
+        yield Section("cuts", "Cut by cut", parts, how=how, folded=many, printed=False)
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
         how = f"{sentence}. " if sentence else ""
@@ -184,9 +173,8 @@ def _cases(conversion: Conversion) -> Section:
                "worst share of its limit %")  # fmt: skip
     rows = tuple(_case(rank, case, axes, conversion) for rank, case in enumerate(conversion.cases))
     how = (
-        "Each line is an operating condition under which the emitted program was simulated. The "
-        "colour is the ratio to the limit: "
-        "up to 100 % is within. Lines in brackets are only shown."
+        "Each line is an operating condition under which the emitted program was simulated. The colour is the ratio "
+        "to the limit: up to 100 % is within. Lines in brackets are only shown."
     )
     counted = sum(case.counts for case in conversion.cases)
     caption = f"{counted} of {len(rows)} operating conditions count ([verdict] of the machine file)"
@@ -195,25 +183,20 @@ def _cases(conversion: Conversion) -> Section:
 
 
 def _case(rank: int, case: CaseVerdict, axes: list[str], conversion: Conversion) -> HeatRow:
-    errors = (case.contour_error_um.command, case.contour_error_um.response)
+    errors = {"command": case.contour_error_um.command, "response": case.contour_error_um.response}
     share = None if case.share_of_limit is None else case.share_of_limit * 100.0
-    target_rank = ("command", "response").index(conversion.limits.contour_target)
-    limit = conversion.limits.contour_um
-    shares: list[float | None] = [None, None]
-    error = errors[target_rank]
-    if error is not None and limit > 0.0:
-        shares[target_rank] = error / limit
-    residuals: list[float | None] = []
-    for axis in axes:
-        bound = conversion.residual_limit_um(axis)
-        residuals.append(case.residual_um[axis] / bound if bound else None)
+    judged = {conversion.limits.contour_target: conversion.limits.contour_um}
+    limits = [*map(conversion.residual_limit_um, axes), *map(judged.get, errors)]
+    measured = [*(case.residual_um[axis] for axis in axes), *errors.values()]
+    shares = [
+        each / limit if each is not None and limit else None for each, limit in zip(measured, limits, strict=True)
+    ]
     worst = " ← decides" if case is conversion.worst_case else ""
     remark = ("within" if case.within else "OUT") + worst
-    values = (*(case.residual_um[axis] for axis in axes), *errors, share)
     names = (*(f"residual_um.{axis}" for axis in axes), "contour_error_um.command", "contour_error_um.response",
              "share_of_limit")  # fmt: skip
     keys = tuple(f"cases.{rank}.{name}" for name in names)
-    return HeatRow(case.name, values, (*residuals, *shares, case.share_of_limit), remark, case.counts, keys)
+    return HeatRow(case.name, (*measured, share), (*shares, case.share_of_limit), remark, case.counts, keys)
 
 
 def _times(conversion: Conversion) -> Section:
@@ -258,7 +241,7 @@ def _sheet(conversion: Conversion, made: Made | None) -> Section:
     else:
         sha256 = "not known" if conversion.from_json else hashlib.sha256(conversion.text).hexdigest()
     rows = [("load", f"{name}, for {conversion.machine}, {conversion.bytes_emitted} bytes")]
-    rows += [("SHA-256 of what to load", sha256)]
+    rows.append(("SHA-256 of what to load", sha256))
     for role, name in (("input", "made from"), ("machine", "for the machine file")):
         if made is not None and (file := made.file(role)) is not None:
             rows.append((name, f"{Path(file.name).name}, SHA-256 {file.sha256 or 'not known'}"))

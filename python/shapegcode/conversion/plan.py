@@ -146,26 +146,23 @@ class ConversionPlan:
     def leave_out(self) -> None:
         """Leave unchanged, before anything is shaped, what has nothing to gain or keeps its limits as it is."""
         self.original_within = self._original_is_within()
-        if not self.choice.shape_all:
-            self._leave_what_has_nothing_to_gain()
-            if self.original_within:
-                self.leave_everything("every cut of the original keeps its limits")
-
-    def leave_everything(self, reason: str) -> None:
-        """Nothing is shaped; cuts that can stay as they are and have no reason yet get this one."""
-        for index, region in enumerate(self.program.regions):
-            if not self.reasons[index] and keepable(region, self.machine):
-                gained = self.gains_um.get(index)
-                self.leave(index, reason or f"shaping gains {gained or 0.0:.1f} µm", gained)
-
-    def _leave_what_has_nothing_to_gain(self) -> None:
-        """Where the original vibrates and errs by less than the least gain, shaping is not even tried."""
+        if self.choice.shape_all:
+            return
         least = self.machine.shaping.least_gain_um
         for index, (reason, original) in enumerate(zip(self.reasons, self.originals, strict=True)):
-            if not reason and keepable(self.program.regions[index], self.machine):
+            if not reason and self.is_keepable(index):
                 most = most_to_gain_um(original.result())
                 if most < least:
                     self.leave(index, f"nothing there to gain: {most:.1f} µm", most)
+        if self.original_within:
+            self.leave_everything("every cut of the original keeps its limits")
+
+    def leave_everything(self, reason: str) -> None:
+        """Nothing is shaped; cuts that can stay as they are and have no reason yet get this one."""
+        for index in self.chosen:
+            if self.is_keepable(index):
+                gained = self.gains_um.get(index)
+                self.leave(index, reason or f"shaping gains {gained or 0.0:.1f} µm", gained)
 
     def _original_is_within(self) -> bool:
         """Whether every cut as programmed keeps its limits in every operating condition that counts for it."""

@@ -13,7 +13,6 @@ from shapegcode import _core
 from shapegcode.comparison.result import ProgramDifference
 from shapegcode.conversion.sensitivity import unknown_axes
 from shapegcode.machine import Machine
-from shapegcode.machine.controller import Controller
 from shapegcode.machine.programs import Tolerance
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, written_increment_mm
@@ -86,11 +85,7 @@ def _at(cut: RegionVerdict, why: str) -> str:
 
 
 def benefits(cut: RegionVerdict, contour_limit_um: float, least_gain_um: float) -> bool:
-    """Whether shaping a cut is a benefit.
-
-    A figure that missed its limit, or a residual vibration above the least gain, falls by the least gain and either by
-    30 % or to within the limit.
-    """
+    """Whether a figure that missed its limit, or vibrates, falls by the least gain and by 30 % or to the limit."""
     pairs = [(cut.original_contour_error_um, cut.contour_error_um, contour_limit_um, contour_limit_um)]
     residual = cut.residual_vibration_um
     pairs += [
@@ -139,11 +134,7 @@ class FilterAdvice:
 
 
 def filter_advice(
-    program: Program,
-    machine: Machine,
-    model: MachineModel,
-    judge: Judge,
-    originals: Sequence[_core.SimulationFigures],
+    program: Program, machine: Machine, model: MachineModel, judge: Judge, originals: Sequence[_core.SimulationFigures]
 ) -> FilterAdvice | None:
     """Whether a smaller filter of the control would do instead of shaping."""
     limit_um, floor_um = machine.tolerance.contour_um, machine.tolerance.residual_floor_um
@@ -194,33 +185,16 @@ def open_axes(program: Program, machine: Machine) -> list[str]:
     ]
 
 
-def simulation_warnings(program: Program, figures: ProgramFigures, machine: Machine, *, is_priced: bool) -> list[str]:
+def simulation_warnings(
+    program: Program, figures: ProgramFigures, machine: Machine, *, is_priced: bool
+) -> Iterator[str]:
     """What simulating the emitted program showed: misses, the tolerance that binds, figures made worse."""
     expanded = " expanded" if program.core.expanded else ""
-    misses = [
-        f"{program.place(region.lines[0])}: lines {region.lines[0]} to {region.lines[1]}{expanded}: {miss}"
-        for region in figures.regions
-        for miss in region.misses
-    ]
+    for region in figures.regions:
+        for miss in region.misses:
+            yield f"{program.place(region.lines[0])}: lines {region.lines[0]} to {region.lines[1]}{expanded}: {miss}"
     rounding_um = math.sqrt(2.0) * written_increment_mm(machine, 21) * 1e3
-    return [*misses, *_binding(figures, machine.tolerance, rounding_um, is_priced=is_priced), *_worse(figures)]
-
-
-def text_warnings(
-    program: Program, placed: Sequence[Placed], figures: ProgramFigures, machine: Machine, size: int, blocks: int
-) -> list[str]:
-    """What the control must be told or cannot do with the emitted text."""
-    fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
-    return [
-        *_mode_left_on(program, placed, machine.emission.prologue),
-        *_too_fast(program, placed, fastest),
-        *_memory_and_line(machine.controller, size, blocks, figures.region_time_s().emitted),
-        *_slowed(0 if machine.emission.leaves_look_ahead else figures.slowed_blocks, blocks, machine.emission.dialect),
-    ]
-
-
-def _worse(figures: ProgramFigures) -> list[str]:
-    """Figures that the conversion made noticeably worse, within tolerance or not."""
+    yield from _binding(figures, machine.tolerance, rounding_um, is_priced=is_priced)
     pairs = [
         (f"{name} {axis.upper()}", both.original[axis], both.emitted[axis])
         for name, both in (
@@ -231,11 +205,9 @@ def _worse(figures: ProgramFigures) -> list[str]:
     ]
     response = figures.contour_error_um.response
     pairs.append(("contour error of the machine table", response.original.max, response.emitted.max))
-    return [
-        f"{name} is larger than the original's: {before:.1f} -> {after:.1f} um"
-        for name, before, after in pairs
-        if after > _WORSE_RATIO * before and after - before > _WORSE_UM
-    ]
+    for name, before, after in pairs:
+        if after > _WORSE_RATIO * before and after - before > _WORSE_UM:
+            yield f"{name} is larger than the original's: {before:.1f} -> {after:.1f} um"
 
 
 def _binding(figures: ProgramFigures, tolerance: Tolerance, rounding_um: float, *, is_priced: bool) -> Iterator[str]:
@@ -266,30 +238,30 @@ def _rounded_up(value: float) -> float:
     return math.ceil(value / step) * step
 
 
-def _mode_left_on(program: Program, placed: Sequence[Placed], prologue: Sequence[str]) -> Iterator[str]:
+def text_warnings(
+    program: Program, placed: Sequence[Placed], figures: ProgramFigures, machine: Machine, size: int, blocks: int
+) -> Iterator[str]:
+    """What the control must be told or cannot do with the emitted text."""
+    controller, emission = machine.controller, machine.emission
     on = next((place.region for place in placed if place.region.look_ahead_mode), None)
-    if on is not None and not prologue:
+    if on is not None and not emission.prologue:
         yield (
             f"{program.place(on.first_line)}: shaped blocks run while the program's look-ahead mode is on; the "
             'verdict holds for it off: set emission.prologue = ["G05.1Q0"] and emission.epilogue = ["G05.1Q1"]'
         )
-
-
-def _too_fast(program: Program, placed: Sequence[Placed], fastest: float) -> Iterator[str]:
+    fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
     fast = next((place.region for place in placed if place.region.path.fastest_feed_mm_per_s * 60.0 > fastest), None)
     if fast is not None:
         yield (
             f"{program.place(fast.first_line)}: programmed feed {fast.path.fastest_feed_mm_per_s * 60.0:g} mm/min is "
             f"over every axis' largest ({fastest:g} mm/min, axes.*.max_feed_mm_per_min): shaped at the axes' limits"
         )
-
-
-def _memory_and_line(controller: Controller, size: int, blocks: int, cutting_s: float) -> Iterator[str]:
     if size > controller.program_memory_bytes:
         yield (
             f"the emitted program has {size} bytes, the controller's memory {controller.program_memory_bytes} "
             f"(controller.program_memory_bytes): {no_room(controller.program_memory_bytes)}"
         )
+    cutting_s = figures.region_time_s().emitted
     if controller.dnc_baud > 0 and blocks > 0 and cutting_s > 0.0:
         needed = size * controller.dnc_bits_per_character / cutting_s
         if needed > controller.dnc_baud:
@@ -297,13 +269,10 @@ def _memory_and_line(controller: Controller, size: int, blocks: int, cutting_s: 
                 f"drip feeding needs {needed:.0f} baud on average, the line has {controller.dnc_baud} "
                 "(controller.dnc_baud): the buffer will run empty"
             )
-
-
-def _slowed(slowed: int, blocks: int, dialect: str) -> Iterator[str]:
-    if slowed:
-        prologue = '(emission.prologue, for example ["G05.1Q0"])' if dialect == "fanuc" else "(emission.prologue)"
+    if figures.slowed_blocks and not emission.leaves_look_ahead:
+        example = ', for example ["G05.1Q0"]' if emission.dialect == "fanuc" else ""
         yield (
-            f"{slowed} of {blocks} shaped blocks step an axis by more than "
+            f"{figures.slowed_blocks} of {blocks} shaped blocks step an axis by more than "
             "controller.corner_speed_difference_mm_per_min: run them with the look-ahead mode off "
-            f"{prologue}, or it slows them"
+            f"(emission.prologue{example}), or it slows them"
         )

@@ -1,8 +1,6 @@
 """Restart points inside of long cuts: where the shaped command is nearly at rest, and how the block there is written.
 
-A control that begins at a block begins with the table at rest. What it lacks is the table's motion at that block: its
-speed and deflection, which remain as a free vibration of the slowest mode. Where both are small, the rest of the cut is
-as it would have been; more than `tolerance.contour_um` of it is nowhere accepted.
+A start from rest lacks the table's speed and deflection at that block: they remain as a vibration of the slowest mode.
 """
 
 from __future__ import annotations
@@ -17,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.modes import slowest_excited_hz
 from shapegcode.program import Program, between_increments
@@ -147,16 +146,11 @@ def restart_points(
     )
 
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 _SLOW_RATIO = 0.2  # of the programmed feed
 _APART = 0.1  # of the interval: nearer to another point, or to an end of the cut, a point is of no use
-_MOTION, _PLANE, _FEED = (
-    re.compile(rb"G0([123])(?![0-9])"),
-    re.compile(rb"G(1[789])(?![0-9])"),
-    re.compile(rb"F[0-9.]+"),
-)
+_MOTION, _PLANE, _FEED = map(re.compile, (rb"G0([123])(?![0-9])", rb"G(1[789])(?![0-9])", rb"F[0-9.]+"))
 
 
 class RestartPlaces:
@@ -341,10 +335,7 @@ class _PointLines:
         return begin, begin + len(self._text[begin:end].rstrip(b"\r\n"))
 
     def write(self, block: int, position: str) -> bytes | None:
-        """A block with all that it rests on and its end; None where it cannot be a restart point.
-
-        Where the line would be too long, G64 and G40, which a reset leaves too, are left out.
-        """
+        """A block with all that it rests on, G40 and G64 where there is room; None: it cannot be a restart point."""
         if block >= len(self._begins):
             return None
         begin, end = self.extent(block)

@@ -194,7 +194,7 @@ class Conversion(ProgramFigures, Result):
     @property
     def answer(self) -> str:
         """What to do with it, its figures and price; then what is not met, and why."""
-        lines = [self._headline(), *self._left_out()[:1]]
+        lines = [self._headline(), *self._left_out()]
         if self.recommendation == "do not run" and not any(self.reason in line for line in lines):
             lines.append(self.reason)
         elif self.advice is not None:
@@ -218,9 +218,8 @@ class Conversion(ProgramFigures, Result):
         axis = max("xyz", key=lambda each: vibration.original[each])
         target = getattr(self.contour_error_um, self.limits.contour_target)
         if self.nothing_shaped:
-            why = (
-                "nothing fits the budget" if self.budget is not None and self.budget.given_up else self._why_unchanged()
-            )
+            given_up = self.budget is not None and self.budget.given_up
+            why = "nothing fits the budget" if given_up else self._why_unchanged()
             return (
                 f"{verdict}: {why}; residual vibration {axis.upper()} {vibration.original[axis]:.1f} µm, contour "
                 f"{target.original.max:.1f} µm; {self._unchanged}"
@@ -249,18 +248,14 @@ class Conversion(ProgramFigures, Result):
             return f"shaping would gain {best.gain_um:.1f} µm at most (least: {self.least_gain_um:g})"
         return "lines {} to {}: {}".format(*best.lines, best.reason)
 
-    def _left_out(self) -> list[str]:
-        """What is not within its limits: cuts left unchanged first, with their lines and what would cure it."""
-        out = [cut for cut in self.cuts if cut.misses]
-        out.sort(key=lambda cut: cut.is_shaped)
-        sentences = []
-        for cut in out:
-            where = "lines {} to {}".format(*cut.lines)
+    def _left_out(self) -> Iterator[str]:
+        """The first cut that is not within its limits, one left unchanged before others, and what would cure it."""
+        out = sorted((cut for cut in self.cuts if cut.misses), key=lambda cut: cut.is_shaped)
+        for cut in out[:1]:
             how = f"left unchanged ({cut.reason})" if not cut.is_shaped else self._cost_of(cut)
-            sentences.append(f"{where}: {cut.misses[0]}; {how}{': ' + cut.cure if cut.cure else ''}")
-        if len(sentences) > 1:
-            sentences[0] += f" (and {len(sentences) - 1} further cuts out of their limits)"
-        return sentences
+            cure = f": {cut.cure}" if cut.cure else ""
+            more = f" (and {len(out) - 1} further cuts out of their limits)" if len(out) > 1 else ""
+            yield "lines {} to {}: ".format(*cut.lines) + f"{cut.misses[0]}; {how}{cure}{more}"
 
     def _cost_of(self, cut: CutOutcome) -> str:
         """Why a shaped cut does not keep its tolerance, as far as its price is the reason."""
@@ -333,11 +328,9 @@ class Conversion(ProgramFigures, Result):
 
     def before_after(self) -> list[list[BeforeAfter]]:
         """Every figure of original and emitted, in groups."""
-        return [self._times(), *self._vibrations(), *self._contours(), self._orbits(), self._feeds(), self._sizes()]
-
-    def _times(self) -> list[BeforeAfter]:
         pairs = (("cycle time", self.cycle_time_s), ("cutting time", self.cutting_time_s))
-        return [BeforeAfter(name, "s", pair.original, pair.emitted, 3) for name, pair in pairs]
+        times = [BeforeAfter(name, "s", pair.original, pair.emitted, 3) for name, pair in pairs]
+        return [times, *self._vibrations(), *self._contours(), self._orbits(), self._feeds(), self._sizes()]
 
     def _vibrations(self) -> Iterator[list[BeforeAfter]]:
         for key, name in _VIBRATIONS.items():
@@ -394,12 +387,8 @@ class Conversion(ProgramFigures, Result):
     def _feeds(self) -> list[BeforeAfter]:
         if self.feed_excess is None:
             return []
-        above = max(0.0, self.feed_excess.ratio - 1.0) * 100.0
-        return [
-            BeforeAfter(
-                "speed above the programmed feed", "%", None, above, limit=self.limits.feed_excess_ratio * 100.0
-            )
-        ]
+        above, limit = max(0.0, self.feed_excess.ratio - 1.0) * 100.0, self.limits.feed_excess_ratio * 100.0
+        return [BeforeAfter("speed above the programmed feed", "%", None, above, limit=limit)]
 
     def _sizes(self) -> list[BeforeAfter]:
         """Figures of the emitted program and its shaper."""
@@ -456,5 +445,4 @@ class Conversion(ProgramFigures, Result):
         Returns:
             The sections.
         """
-        found: tuple[Section, ...] = self._beside("page").sections_of(self, made)
-        return found
+        return tuple(self._beside("page").sections_of(self, made))

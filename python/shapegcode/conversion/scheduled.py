@@ -6,9 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.convert import convert
@@ -18,10 +15,11 @@ from shapegcode.conversion.write import filter_tolerance
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.feed.load import PathLoad, load_of
-from shapegcode.feed.plan import OrdinaryMotion, Travelled, travel_emitted
+from shapegcode.feed.plan import Mover, OrdinaryMotion, Travelled, travel_emitted
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, feed_figures, schedule_survey
 from shapegcode.feed.survey import survey
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
@@ -29,37 +27,25 @@ from shapegcode.results.result import Plot
 from shapegcode.results.table import Table
 from shapegcode.shaping.grid import Grid, choose_grid
 
-Vector = npt.NDArray[np.float64]
 
-
-class ShapedMotion:
-    """The motion that `convert` will make of a region: look-ahead within the contour tolerance, then the shaper.
-
-    What the emitted text does is measured afterwards (`travel_emitted`); this is what a schedule is planned with.
-    """
+class ShapedMotion(Mover):
+    """The motion that `convert` plans for a region: look-ahead within the contour tolerance, then the shaper."""
 
     def __init__(self, machine: Machine, grid: Grid) -> None:
         period = machine.controller.interpolation_period_s
         ticks = round(grid.block_period_s / period)
-        self._period_s = period
         model = MachineModel(machine)
         self._limits = model.limits()
         self._tolerance = filter_tolerance(grid, model.shaped_filter, machine.tolerance.contour_um)
         shaper = _core.Fir([ticks * delay for delay in grid.fir.delays], list(grid.fir.taps))
         # The emitted blocks join samples of the shaped command by straight lines.
-        self._filters = [shaper, _core.Fir.moving_average(ticks), *model.shaped.filters]
+        super().__init__(period, [shaper, _core.Fir.moving_average(ticks), *model.shaped.filters])
 
-    @property
-    def reach_s(self) -> float:
-        """Half of what shaper and filters last."""
-        return 0.5 * self._period_s * sum(filter_.duration_samples for filter_ in self._filters)
-
-    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: FloatArray, window_s: float) -> Travelled:
         """See `Mover`."""
         profile = _core.plan_speed(path, self._limits, self._tolerance)
-        return Travelled.of(
-            _core.travel_path(path, profile, along, stations_mm, self._period_s, self._filters, window_s)
-        )
+        found = _core.travel_path(path, profile, along, stations_mm, self.period_s, self.filters, window_s)
+        return Travelled.of(found)
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)

@@ -1,7 +1,6 @@
 """Sensitivity of a verdict to unverified parameters: by how far each moves the deciding figure.
 
-The deciding region, the one that comes nearest to a limit, is simulated again with each value moved by its stated
-uncertainty, or by what is usual where none is stated. That takes no more simulations than the verdict itself.
+The deciding region is simulated again with each value moved by its stated uncertainty, or by what is usual.
 """
 
 from __future__ import annotations
@@ -66,17 +65,14 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A value, what it is moved to in words, and how the region is then simulated.
-
-    `moves_command`: the set-points are others too, not the table alone.
-    """
+    """A value that is moved, and how the region is then simulated."""
 
     value: KeyValue
-    moved: str
+    moved: str  # to what, in words
     machine: Machine
     shift: float = 0.0
     only: str | None = None
-    moves_command: bool = False
+    moves_command: bool = False  # the set-points are others too, not the table alone
 
 
 StartedTrials = Mapping[tuple[str, str], "Future[CaseFigures]"]
@@ -196,11 +192,15 @@ def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
 def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
     """What is tried, the most likely to matter first."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
-    yield from _filters(machine, unmeasured)
+    now_s = machine.controller.shaped_time_constant_s
+    other_s = 1.2 * now_s if now_s else _FILTER_S
+    yield from _other_command(machine, unmeasured, "controller.shaped_time_constant_s", other_s)
     yield from (trial for axis, trial in _axis_trials(machine).items() if axis in moving)
     yield from _frequencies(machine, unmeasured, moving)
     yield from _shares(machine, unmeasured, moving)
-    yield from _periods(machine, unmeasured)
+    freed = machine.with_values("emission.block_period_s", None)
+    period_s = 2.0 * machine.controller.interpolation_period_s
+    yield from _other_command(freed, unmeasured, "controller.interpolation_period_s", period_s)
 
 
 def _changed(machine: Machine, key: str, value: object) -> Iterator[Machine]:
@@ -211,13 +211,11 @@ def _changed(machine: Machine, key: str, value: object) -> Iterator[Machine]:
         return
 
 
-def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_Trial]:
-    key = "controller.shaped_time_constant_s"
+def _other_command(machine: Machine, unmeasured: Mapping[str, KeyValue], key: str, other_s: float) -> Iterator[_Trial]:
+    """Another time with which the set-points are others too."""
     if key in unmeasured:
-        now = machine.controller.shaped_time_constant_s
-        other = 1.2 * now if now else _FILTER_S
-        for each in _changed(machine, key, other):
-            yield _Trial(unmeasured[key], f"{other:g} s", each, moves_command=True)
+        for each in _changed(machine, key, other_s):
+            yield _Trial(unmeasured[key], f"{other_s:g} s", each, moves_command=True)
 
 
 def unknown_axes(machine: Machine) -> dict[str, KeyValue]:
@@ -243,10 +241,7 @@ def _axis_trials(machine: Machine) -> dict[str, _Trial]:
 
 
 def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[Sensitivity, ...]:
-    """Axes that may have a mode, by how much a usual one would vibrate behind the program as it is.
-
-    What matters on a machine without a known mode, where there is nothing to shape for: which axis to measure first.
-    """
+    """Axes that may have a mode, by how much a usual one would vibrate behind the program: which to measure first."""
     from shapegcode.simulation.simulate import simulate
 
     unknown = unknown_axes(machine)
@@ -292,15 +287,6 @@ def _shares(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -
             percent = sign * (stated if stated is not None else _PERCENT[name])
             for each in _changed(machine, f"{stem}.{name}", getattr(mode, name) * (1.0 + percent / 100.0)):
                 yield _Trial(unmeasured[f"{stem}.{name}"], f"{percent:+g} %", each)
-
-
-def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_Trial]:
-    key = "controller.interpolation_period_s"
-    if key in unmeasured:
-        free = machine.with_values("emission.block_period_s", None)
-        period = 2.0 * machine.controller.interpolation_period_s
-        for each in _changed(free, key, period):
-            yield _Trial(unmeasured[key], f"{period:g} s", each, moves_command=True)
 
 
 def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[Sensitivity]:

@@ -73,7 +73,7 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
     """The sensitivity to unverified parameters as a table."""
     columns = (
         Column("key", left=True),
-        Column("assumed → tested", value=_moved, text=True),
+        Column("assumed → tested", value=lambda row: unbroken(f"{row.value} {row.origin} → {row.moved}"), text=True),
         Column("figure, µm", value=_figure, text=True),
         Column("limit", value="limit_um", digits=1),
     )
@@ -84,11 +84,6 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
         caption=f"{tried} values moved, one at a time, in the region that comes nearest to a limit",
         row_style=lambda row: "red" if row.moved_um > row.limit_um else "",
     )
-
-
-def _moved(row: Sensitivity) -> str:
-    """What stands in the file, and what was tried instead: four columns of their own do not fit 80 characters."""
-    return unbroken(f"{row.value} {row.origin} → {row.moved}")
 
 
 def _figure(row: Sensitivity) -> str:
@@ -197,7 +192,7 @@ def cut_table(cuts: Sequence[CutOutcome], *, every: bool) -> Table:
         Column("residual µm", value=lambda cut: _change(cut.residual_um)),
         Column("contour µm", value=lambda cut: _change(cut.contour_um)),
         Column("time s", value=lambda cut: _change(cut.time_s, 2), priority=2),
-        Column("bytes", value=lambda cut: _sizes(cut.bytes), priority=3),
+        Column("bytes", value=lambda cut: _change(cut.bytes, 0), priority=3),
         Column("shaped, or why not", value=lambda cut: "shaped" if cut.is_shaped else cut.reason, text=True),
     )
     left = f"; {len(cuts) - len(shown)} more in --verbose, --html and --json" if len(shown) < len(cuts) else ""
@@ -211,13 +206,9 @@ def cut_table(cuts: Sequence[CutOutcome], *, every: bool) -> Table:
     )
 
 
-def _change(pair: Pair[float], digits: int = 1) -> str:
+def _change(pair: Pair[float] | Pair[int], digits: int = 1) -> str:
     before, after = (f"{each:z.{digits}f}" for each in (pair.original, pair.emitted))
     return before if before == after else f"{before} → {after}"
-
-
-def _sizes(pair: Pair[int]) -> str:
-    return str(pair.original) if pair.original == pair.emitted else f"{pair.original} → {pair.emitted}"
 
 
 def chosen_cuts(program: Program, only: Sequence[Lines] | None, leave: Sequence[Lines]) -> dict[int, str]:
@@ -234,25 +225,18 @@ def chosen_cuts(program: Program, only: Sequence[Lines] | None, leave: Sequence[
                     f"{option} {begin}-{end}: no cut that can be shaped there; cuts are in lines {near or 'none'}"
                 )
     found = {}
-    for span in spans:
-        if (
-            only is not None
-            and any(_overlap(span, each) for each in leave)
-            and any(_overlap(span, each) for each in only)
-        ):
+    for index, (first, to) in enumerate(spans):
+        is_left = any(first <= end and begin <= to for begin, end in leave)
+        is_chosen = any(first <= end and begin <= to for begin, end in only or ())
+        if is_left and is_chosen:
             raise _core.ArgumentError(
-                f"--only and --leave both name the cut in lines {span[0]} to {span[1]}: name it in one of them"
+                f"--only and --leave both name the cut in lines {first} to {to}: name it in one of them"
             )
-    for index, span in enumerate(spans):
-        if any(_overlap(span, each) for each in leave):
+        if is_left:
             found[index] = "named by --leave"
-        elif only is not None and not any(_overlap(span, each) for each in only):
+        elif only is not None and not is_chosen:
             found[index] = "not chosen by --only"
     return found
-
-
-def _overlap(one: Lines, other: Lines) -> bool:
-    return one[0] <= other[1] and other[0] <= one[1]
 
 
 def tools_of_cuts(program: Program) -> Mapping[int, int]:

@@ -305,20 +305,17 @@ class TextWriter:
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         limits.feed_override = feed_share
         try:
-            return self._regions.write(
-                self._program, region, limits, self._regions.tolerance(room_um), room, on_share
-            )  # fmt: skip
+            return self._regions.write(self._program, region, limits, self._regions.tolerance(room_um), room, on_share)
         except _core.ArgumentError as error:
             raise self._program.region_error(region, str(error)) from error
 
     def _keep(self, region: _core.Region, reason: str) -> str:
         """The warning for a region that is left unchanged."""
         if not keepable(region, self._machine):
-            raise self._program.region_error(
-                region, f"{reason}; its arcs have absolute centres and cannot be left unchanged"
-            )
-        program = self._program
-        return f"{program.place(region.first_line)}: {program.lines(region)} left unchanged: {reason}"
+            why = f"{reason}; its arcs have absolute centres and cannot be left unchanged"
+            raise self._program.region_error(region, why)
+        place = self._program.place(region.first_line)
+        return f"{place}: {self._program.lines(region)} left unchanged: {reason}"
 
     def _opening(self, *, shapes: bool) -> bytes:
         """Header comments where something is shaped, and the guards of expanded radii."""

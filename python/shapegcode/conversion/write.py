@@ -32,10 +32,7 @@ from shapegcode.shaping.grid import Grid
 
 
 class RegionText:
-    """The lines of a region: in parts as they were written, then in the program that was made of them.
-
-    So a text of a million lines stands in memory once.
-    """
+    """The lines of a region, which stand in memory once: as they were written, then in the program made of them."""
 
     def __init__(self, parts: Sequence[bytes]) -> None:
         self._parts: Sequence[bytes] | None = parts
@@ -126,10 +123,7 @@ _CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, 
 
 _FADED = 1.0 / 3.0  # of the time after which a vibration is a millionth: it is a hundredth
 
-_PLANNERS = {
-    "look-ahead": _core.CommandPlanner.look_ahead,
-    "optimal": _core.CommandPlanner.time_optimal,
-}
+_PLANNERS = {"look-ahead": _core.CommandPlanner.look_ahead, "optimal": _core.CommandPlanner.time_optimal}
 _TARGETS = {
     "response": _core.ContourTarget.response,
     "command": _core.ContourTarget.command,
@@ -255,10 +249,7 @@ class RegionWriter:
         room: Room | None = None,
         on_progress: Callable[[float], None] = lambda _share: None,
     ) -> EmittedRegion:
-        """Shape one region and write it.
-
-        The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
-        """
+        """Shape one region and write it, from a full safe line to the modal state of the original."""
         options = self.options(limits, tolerance, self._model.offset(region))
         # Periods without the stops for restart points, and how many stops there are.
         stopped = self._stop_for_restarts(region, options) if self._machine.emission.restart_stops else (0, 0)
@@ -408,10 +399,7 @@ class RegionWriter:
 
 
 def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, float, bool]]:
-    """The pieces of a region, how much of it they come to, and whether one is the last.
-
-    The next one is shaped while one is written: of a region of several pieces in a thread of its own.
-    """
+    """The pieces of a region, its share, and whether one is the last; a thread shapes the next while one is written."""
 
     def shaped() -> tuple[_core.ShapedCommand | None, float]:
         piece = shaper.next(_PIECE_PERIODS)
@@ -474,17 +462,7 @@ def _safe_line(
 
 def _restore_line(region: _core.Region, motion: int, plane: int) -> str:
     """Words that give the modal state of the original's last block back, behind the shaped blocks."""
-    state = region.exit
-    words = []
-    if state.motion != motion:
-        words.append(f"G0{state.motion}")
-    if state.plane != plane:
-        words.append(f"G{state.plane}")
-    if state.distance != (91 if region.incremental else 90):
-        words.append(f"G{state.distance}")
-    if state.feed_mode != 94:
-        words.append(f"G{state.feed_mode}")
-    if state.exact_stop != 64:
-        words.append(f"G{state.exact_stop}")
-    words.append(feed_word(state.feed))
-    return "".join(words)
+    state, distance = region.exit, 91 if region.incremental else 90
+    shaped = {"motion": motion, "plane": plane, "distance": distance, "feed_mode": 94, "exact_stop": 64}
+    codes = [code for name, own in shaped.items() if (code := getattr(state, name)) != own]
+    return "".join(f"G{code:02d}" for code in codes) + feed_word(state.feed)

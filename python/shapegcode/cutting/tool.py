@@ -173,11 +173,10 @@ class Cutter(TomlTable):
     )
     effective_diameter_ratio: Annotated[Positive, Field(le=1)] = key(
         "diameter of the solid cylinder that bends as the fluted part does, as a share of diameter_mm",
-        default=0.8,
-        assumed=True,
+        assumed=0.8,
     )
     youngs_modulus_gpa: Positive = key(
-        "Young's modulus: about 600 for cemented carbide, 210 for high-speed steel", default=600.0, assumed=True
+        "Young's modulus: about 600 for cemented carbide, 210 for high-speed steel", assumed=600.0
     )
     holder_stiffness_n_per_um: Positive | None = key(
         "stiffness of holder and spindle against a force across the axis where the tool is clamped; left out: rigid",
@@ -239,7 +238,7 @@ class Feed(TomlTable):
         "feed where the tool meets no material; left out: as programmed", default=None
     )
     approach_mm: NonNegative = key(
-        "distance before the tool meets material at which the feed is that of the cut again", default=1.0, assumed=True
+        "distance before the tool meets material at which the feed is that of the cut again", assumed=1.0
     )
     max_feed_mm_per_min: Positive | None = key(
         "largest feed that is written, in material and in air; left out: as the machine allows", default=None

@@ -179,10 +179,7 @@ def envelope(values: Vector, starts: npt.NDArray[np.intp]) -> tuple[Vector, Vect
 
 @dataclass(frozen=True)
 class WallMaps:
-    """Form error of the wall over distance and height, µm: + material is left standing.
-
-    Of the two walls of a slot it is that to the right of the feed.
-    """
+    """Form error of the wall over distance and height, µm: + is left standing; of a slot the wall right of the feed."""
 
     edges_mm: Vector  # of the columns, along the cutting path, (m + 1,)
     height_mm: Vector  # above the tip, (h,)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -48,28 +48,28 @@ class Travelled:
         return cls(np.asarray(travel.highest_mm_per_s) * 60.0, np.asarray(travel.time_s))
 
 
-class Mover(Protocol):
+class Mover:
     """What makes a motion of the blocks of a region."""
+
+    def __init__(self, period_s: float, filters: Sequence[_core.Fir]) -> None:
+        self.period_s, self.filters = period_s, filters
 
     @property
     def reach_s(self) -> float:
-        """Time by which the travel lags behind a change of the commanded feed."""
+        """Time by which the travel lags behind a change of the commanded feed: half of what its filters last."""
+        return 0.5 * self.period_s * sum(filter_.duration_samples for filter_ in self.filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
         """Travel of a path made of `along`, to whose length the stations ascend; feeds are over the window."""
+        raise NotImplementedError
 
 
-class OrdinaryMotion:
+class OrdinaryMotion(Mover):
     """The controller's own motion, as it simulates an ordinary program."""
 
     def __init__(self, machine: Machine) -> None:
         self._controller = MachineModel(machine).ordinary
-
-    @property
-    def reach_s(self) -> float:
-        """Half of what the filters behind the interpolation last."""
-        period_s = self._controller.model.period_s
-        return 0.5 * period_s * sum(filter_.duration_samples for filter_ in self._controller.filters)
+        super().__init__(self._controller.model.period_s, self._controller.filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
         """See `Mover`."""

@@ -306,10 +306,7 @@ def _region(part: SurveyedRegion, plan: FeedPlan | None, load: PathLoad | None, 
 def _misses(
     part: SurveyedRegion, plan: FeedPlan | None, load: PathLoad | None, machine: Machine
 ) -> Iterator[tuple[str, float]]:
-    """Limits that the region does not keep behind the schedule: in words, and the share that is too much.
-
-    The share counts where a lower feed could help: not where feeds stay, or are the least already.
-    """
+    """Limits not kept behind the schedule, in words, and by what share too much where a lower feed could help."""
     if load is None or part.tool is None or part.track is None:
         return
     helped = np.zeros(len(load.s_mm), dtype=bool) if plan is None else ~np.isin(plan.holds, (KEPT, MINIMUM))

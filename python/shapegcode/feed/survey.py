@@ -355,11 +355,7 @@ class Walk:
 
 
 class ZeroPoints:
-    """Work coordinates and shifts of the zero point along the (expanded) text of a program.
-
-    The stock lies in the coordinates that hold at the first cutting move; where others hold, positions are not
-    comparable.
-    """
+    """Work coordinates and zero shifts along the text; the stock lies in those of the first cutting move."""
 
     def __init__(self, program: Program) -> None:
         self._lines: list[int] = []  # at which something changes

@@ -25,31 +25,26 @@ class Drive(TomlTable):
         "axial stiffness from motor to table: screw, nut, bearings and coupling in series"
     )
     damping_ratio: Annotated[NonNegative, Field(lt=1)] = key(
-        "damping ratio of motor against table on that stiffness", default=0.05, assumed=True
+        "damping ratio of motor against table on that stiffness", assumed=0.05
     )
     backlash_um: NonNegative = key(
         "free travel between motor and table (a ball bar shows it together with the stretch of the screw); 0: none",
-        default=0.0,
-        assumed=True,
+        assumed=0.0,
     )
     position_feedback: Literal["motor", "table"] = key(
         'what the position loop measures. "motor": the encoder of the motor (semi-closed); "table": a linear scale '
         "(fully closed). Its gain is controller.position_gain_per_s, its feed-forward controller.feed_forward_ratio",
         fanuc="1815#1",
-        default="motor",
-        assumed=True,
+        assumed="motor",
     )
     velocity_bandwidth_hz: Positive = key(
         "bandwidth of the speed loop with all inertia as one mass; it states its gain", fanuc="2021, 2044"
     )
     velocity_integral_time_s: NonNegative = key(
-        "integral time of the speed loop; 0: no integral part", fanuc="2043", default=0.02, assumed=True
+        "integral time of the speed loop; 0: no integral part", fanuc="2043", assumed=0.02
     )
     acceleration_feed_forward_ratio: Annotated[NonNegative, Field(le=1)] = key(
-        "share of the torque for the set-points' acceleration that is fed forward; 0: none",
-        fanuc="2069",
-        default=0.0,
-        assumed=True,
+        "share of the torque for the set-points' acceleration that is fed forward; 0: none", fanuc="2069", assumed=0.0
     )
     torque_limit_n_m: Positive | None = key(
         "largest torque of the motor; left out: not limited", unit="N m", fanuc="2060", default=None
@@ -57,12 +52,9 @@ class Drive(TomlTable):
     friction_model: Literal["viscous", "stribeck", "lugre"] = key(
         'friction of the table. "viscous": in proportion to the speed alone; "stribeck": Coulomb, static and Stribeck '
         'as a curve over the speed; "lugre": the same with presliding, as a table shows it at reversals',
-        default="viscous",
-        assumed=True,
+        assumed="viscous",
     )
-    friction_viscous_n_s_per_m: NonNegative = key(
-        "viscous friction of the guideways", unit="N s/m", default=0.0, assumed=True
-    )
+    friction_viscous_n_s_per_m: NonNegative = key("viscous friction of the guideways", unit="N s/m", assumed=0.0)
     friction_coulomb_n: Positive | None = key(
         "sliding friction of the guideways; stribeck and lugre need it", default=None
     )
@@ -71,21 +63,20 @@ class Drive(TomlTable):
         default=None,
     )
     friction_stribeck_velocity_mm_per_s: Positive = key(
-        "speed at which the friction has fallen from static to sliding", default=5.0, assumed=True
+        "speed at which the friction has fallen from static to sliding", assumed=5.0
     )
     friction_smoothing_velocity_mm_per_s: Positive = key(
-        "speed within which the friction changes its sign (stribeck alone)", default=0.1, assumed=True
+        "speed within which the friction changes its sign (stribeck alone)", assumed=0.1
     )
     friction_bristle_stiffness_n_per_um: Positive = key(
         "force over displacement before the table slides (lugre alone); static friction over it is the distance",
-        default=30.0,
-        assumed=True,
+        assumed=30.0,
     )
     friction_bristle_damping_n_s_per_m: NonNegative = key(
-        "damping before the table slides (lugre alone)", unit="N s/m", default=30_000.0, assumed=True
+        "damping before the table slides (lugre alone)", unit="N s/m", assumed=30_000.0
     )
     motor_friction_viscous_n_m_s_per_rad: NonNegative = key(
-        "viscous friction of motor, bearings and nut", unit="N m s/rad", default=0.0, assumed=True
+        "viscous friction of motor, bearings and nut", unit="N m s/rad", assumed=0.0
     )
 
     @model_validator(mode="after")

@@ -47,58 +47,45 @@ class Controller(TomlTable):
         'settings of kind = "klipper"; left out: the control\'s own defaults', default=None
     )
     grbl: GrblPlanner | None = key('settings of kind = "grbl"; left out: the control\'s own defaults', default=None)
-    interpolation_period_s: Annotated[Positive, Field(le=0.1)] = key(
-        "time between two set-points", default=0.001, assumed=True
-    )
+    interpolation_period_s: Annotated[Positive, Field(le=0.1)] = key("time between two set-points", assumed=0.001)
     block_time_s: Annotated[NonNegative, Field(le=1)] = key(
-        "shortest time in which the controller can take in a block; emitted blocks are not shorter",
-        default=0.005,
-        assumed=True,
+        "shortest time in which the controller can take in a block; emitted blocks are not shorter", assumed=0.005
     )
     block_end: Literal["ceil", "carry"] = key(
         '"ceil": each block starts with an interpolation period; "carry": the remainder of a period is '
         "carried into the next block. The round trip is judged under both",
-        default="ceil",
-        assumed=True,
+        assumed="ceil",
     )
     motion: Literal["look_ahead", "after_interpolation"] = key(
         'how an ordinary program is executed. "look_ahead": the speed is planned along the path before '
         'interpolation; "after_interpolation": each axis is smoothed after interpolation, and cutting blocks '
         "overlap",
-        default="look_ahead",
-        assumed=True,
+        assumed="look_ahead",
     )
     law: Literal["constant_time", "jerk_limited"] = key(
         'speed change before interpolation. "constant_time": it lasts time_constant_s whatever the step; '
         '"jerk_limited": by the acceleration and jerk of the axes',
-        default="constant_time",
-        assumed=True,
+        assumed="constant_time",
     )
     time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
         "duration of a speed change (look-ahead, constant time), or length of the moving average or time constant "
         "of the exponential (after interpolation)",
         fanuc="1622, 1771",
-        default=0.05,
-        assumed=True,
+        assumed=0.05,
     )
     bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
         "time over which the acceleration itself is built up; length of the second moving average; 0: none",
         fanuc="1772",
-        default=0.0,
-        assumed=True,
+        assumed=0.0,
     )
     after_interpolation_shape: Literal["linear", "exponential"] = key(
         'how each axis is smoothed after interpolation. "linear": moving averages of the lengths time_constant_s '
         'and bell_time_s; "exponential": a first-order lag of time_constant_s',
         fanuc="1610#0, #1",
-        default="linear",
-        assumed=True,
+        assumed="linear",
     )
     look_ahead_filter_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
-        "length of the moving average after interpolation in look-ahead mode; 0: none",
-        fanuc="1769",
-        default=0.0,
-        assumed=True,
+        "length of the moving average after interpolation in look-ahead mode; 0: none", fanuc="1769", assumed=0.0
     )
     corner_rule: Literal["speed_difference", "junction_deviation", "stops"] = key(
         'what look-ahead does at corners. "speed_difference": no axis changes its speed by more than '
@@ -111,14 +98,10 @@ class Controller(TomlTable):
     corner_speed_difference_mm_per_min: AxisValues = key(
         "largest speed step of an axis where two blocks meet; 0: stop at every corner. One number, or x, y, z",
         fanuc="1783",
-        default=500.0,
-        assumed=True,
+        assumed=500.0,
     )
     centripetal_acceleration_mm_s2: Positive = key(
-        "largest acceleration across the path in arcs; it limits the feed there",
-        fanuc="1735",
-        default=1000.0,
-        assumed=True,
+        "largest acceleration across the path in arcs; it limits the feed there", fanuc="1735", assumed=1000.0
     )
     polyline_acceleration_mm_s2: Positive | None = key(
         "the same along polylines, where two lines meet; left out: as in arcs, under another corner_rule than "
@@ -144,26 +127,18 @@ class Controller(TomlTable):
     rapid_path: Literal["linear", "non_linear"] = key(
         '"linear": a rapid goes straight; "non_linear": each axis travels at its own speed',
         fanuc="1401#1",
-        default="linear",
-        assumed=True,
+        assumed="linear",
     )
     rapid_time_constant_s: AxisTimes = key(
-        "time in which a rapid reaches its speed. One number, or x, y, z",
-        fanuc="1620, 1773",
-        default=0.15,
-        assumed=True,
+        "time in which a rapid reaches its speed. One number, or x, y, z", fanuc="1620, 1773", assumed=0.15
     )
     rapid_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
-        "time over which the acceleration of a rapid is built up; 0: none",
-        fanuc="1621, 1774",
-        default=0.0,
-        assumed=True,
+        "time over which the acceleration of a rapid is built up; 0: none", fanuc="1621, 1774", assumed=0.0
     )
     in_position_s: AxisValues = key(
         "wait for the axis to arrive after a rapid or an exact stop; the slowest axis that moved counts. One "
         "number, or x, y, z",
-        default={"x": 0.025, "y": 0.025, "z": 0.12},
-        assumed=True,
+        assumed={"x": 0.025, "y": 0.025, "z": 0.12},
     )
     in_position: Literal["measured", "servo_lag"] = key(
         'where the wait after a rapid or an exact stop comes from. "measured": in_position_s; "servo_lag": the time '
@@ -171,67 +146,53 @@ class Controller(TomlTable):
         default="measured",
     )
     in_position_width_um: PositiveAxisValues = key(
-        "an axis has arrived when it lags by less than this. One number, or x, y, z",
-        fanuc="1826",
-        default=20.0,
-        assumed=True,
+        "an axis has arrived when it lags by less than this. One number, or x, y, z", fanuc="1826", assumed=20.0
     )
     position_gain_per_s: PositiveAxisValues = key(
         "gain of the position loop (the parameter counts 0.01/s); the servo lag is feed / gain. One number, or x, y, z",
         fanuc="1825",
-        default=30.0,
-        assumed=True,
+        assumed=30.0,
     )
     feed_forward_ratio: AxisRatios = key(
         "share of the servo lag that the feed-forward takes away; 0: none. One number, or x, y, z",
         fanuc="2005#1, 2068, 2092",
-        default=0.0,
-        assumed=True,
+        assumed=0.0,
     )
     shaped_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
         "length of the controller's own moving average after interpolation while a shaped program runs (it "
         "smooths the shaped blocks once more); 0: off",
         fanuc="1622, 1769",
-        default=0.0,
-        assumed=True,
+        assumed=0.0,
     )
     shaped_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
         "length of its second moving average, where it builds up the acceleration as a bell; 0: none",
         fanuc="1622 with 1610#1",
-        default=0.0,
-        assumed=True,
+        assumed=0.0,
     )
     shaped_filter_shape: Literal["linear", "exponential"] = key(
         'how it smooths. "linear": moving averages of the lengths shaped_time_constant_s and shaped_bell_time_s; '
         '"exponential": a first-order lag of shaped_time_constant_s',
         fanuc="1610#0, #1",
-        default="linear",
-        assumed=True,
+        assumed="linear",
     )
     program_memory_bytes: Annotated[int, Strict(), Field(gt=0)] = key(
-        "memory for programs; a larger output gets a warning", default=262_144, assumed=True
+        "memory for programs; a larger output gets a warning", assumed=262_144
     )
     dnc_baud: Count = key(
         "speed of the serial line when programs are drip fed; 0: not drip fed", fanuc="0103", default=0
     )
     macros: Bool = key(
-        "whether programs may set and read variables (custom macros, an option of many controls)",
-        default=True,
-        assumed=True,
+        "whether programs may set and read variables (custom macros, an option of many controls)", assumed=True
     )
     dnc_bits_per_character: Annotated[int, Strict(), Field(ge=7, le=12)] = key(
-        "bits on the serial line for each character, with start, parity and stop bits",
-        unit="bits",
-        default=11,
-        assumed=True,
+        "bits on the serial line for each character, with start, parity and stop bits", unit="bits", assumed=11
     )
     least_increment_mm: Annotated[Positive, Field(le=0.1)] = key("smallest coordinate step in G21", default=0.001)
     least_increment_inch: Annotated[Positive, Field(le=0.01)] = key("smallest coordinate step in G20", default=0.0001)
     arc_radius_tolerance_mm: Positive = key(
         "start and end radius of an arc may differ by this much; beyond it the block is an error (alarm 0020)",
         fanuc="3410",
-        default=0.01,
-        assumed=True,
+        assumed=0.01,
     )
     calculator_decimal_point: Bool = key(
         "X10 without a decimal point: 10 mm or inch if true, 10 least increments if false",
@@ -239,12 +200,12 @@ class Controller(TomlTable):
         default=False,
     )
     feed_decimals_mm: Annotated[int, Strict(), Field(ge=0, le=6)] = key(
-        "decimals of an F word in mm/min", unit="digits", default=1, assumed=True
+        "decimals of an F word in mm/min", unit="digits", assumed=1
     )
     feed_decimals_inch: Annotated[int, Strict(), Field(ge=0, le=6)] = key(
-        "decimals of an F word in inch/min", unit="digits", default=2, assumed=True
+        "decimals of an F word in inch/min", unit="digits", assumed=2
     )
-    minimum_feed_mm_per_min: Positive = key("smallest feed written in a block", default=1.0, assumed=True)
+    minimum_feed_mm_per_min: Positive = key("smallest feed written in a block", assumed=1.0)
     no_buffer_m_codes: tuple[Annotated[int, Strict(), Field(ge=0, le=99_999_999)], ...] = key(
         "M codes at which the controller stops reading ahead, besides M00, M01, M02 and M30",
         fanuc="3411-3432",
@@ -253,11 +214,10 @@ class Controller(TomlTable):
     offset_memory: Literal["A", "B", "C"] = key(
         'which system variables hold the tool offsets. "A": one value for each; "B": geometry and wear; "C": '
         "geometry and wear, length and radius apart",
-        default="C",
-        assumed=True,
+        assumed="C",
     )
     nesting_limit_subprogram: Annotated[int, Strict(), Field(ge=1, le=100)] = key(
-        "how deep subprograms may call one another; 4 on old controls", unit="levels", default=10, assumed=True
+        "how deep subprograms may call one another; 4 on old controls", unit="levels", assumed=10
     )
     max_program_steps: Annotated[int, Strict(), Field(ge=1, le=10**12)] = key(
         "blocks that a program may execute beyond one for each of its lines; more count as endless",
@@ -305,21 +265,19 @@ class Controller(TomlTable):
 class PowerOn(TomlTable):
     """Modal state before the first block of a program."""
 
-    motion: Literal["G00", "G01", "G02", "G03"] = key("kind of motion", fanuc="3402#0", default="G00", assumed=True)
-    plane: Literal["G17", "G18", "G19"] = key("plane of arcs", fanuc="3402#1, #2", default="G17", assumed=True)
+    motion: Literal["G00", "G01", "G02", "G03"] = key("kind of motion", fanuc="3402#0", assumed="G00")
+    plane: Literal["G17", "G18", "G19"] = key("plane of arcs", fanuc="3402#1, #2", assumed="G17")
     distance: Literal["G90", "G91"] = key(
-        "absolute (G90) or incremental (G91) coordinates", fanuc="3402#3", default="G90", assumed=True
+        "absolute (G90) or incremental (G91) coordinates", fanuc="3402#3", assumed="G90"
     )
-    units: Literal["G20", "G21"] = key("inch (G20) or mm (G21)", default="G21", assumed=True)
+    units: Literal["G20", "G21"] = key("inch (G20) or mm (G21)", assumed="G21")
     feed_mode: Literal["G93", "G94", "G95"] = key(
-        "feed per minute (G94), inverse time (G93) or per revolution (G95)", default="G94", assumed=True
+        "feed per minute (G94), inverse time (G93) or per revolution (G95)", assumed="G94"
     )
-    path_mode: Literal["G61", "G64"] = key("exact stop (G61) or cutting mode (G64)", default="G64", assumed=True)
-    work_offset: Literal["G54", "G55", "G56", "G57", "G58", "G59"] = key(
-        "work coordinate system", default="G54", assumed=True
-    )
+    path_mode: Literal["G61", "G64"] = key("exact stop (G61) or cutting mode (G64)", assumed="G64")
+    work_offset: Literal["G54", "G55", "G56", "G57", "G58", "G59"] = key("work coordinate system", assumed="G54")
     cycle_return: Literal["G98", "G99"] = key(
-        "level to which a drilling cycle returns: initial (G98) or R (G99)", default="G98", assumed=True
+        "level to which a drilling cycle returns: initial (G98) or R (G99)", assumed="G98"
     )
 
 
@@ -329,8 +287,7 @@ class FeedControl(TomlTable):
     interval_mm: Positive = key(
         "shortest piece of path over which the controller follows a change of the feed; scheduled blocks are not "
         "shorter. A test cut with feeds that change every 0.2, 0.4 and 0.6 mm shows it (paper 001, figure 8)",
-        default=0.6,
-        assumed=True,
+        assumed=0.6,
     )
     max_change_mm_per_min: Positive | None = key(
         "largest change of the feed from one block to the next; left out: not limited", default=None
@@ -416,21 +373,19 @@ class OpenTime(TomlTable):
 class Times(TomlTable):
     """What takes time beside the motion."""
 
-    program_start_s: Seconds = key("from the start key to the first block", default=0.0, assumed=True)
+    program_start_s: Seconds = key("from the start key to the first block", assumed=0.0)
     last_tool_in_spindle: Bool = key(
         "parts are made in series: the last tool of a program is in the spindle when it starts anew, and an M06 that "
         "calls it changes nothing; false: every M06 changes",
-        default=False,
-        assumed=True,
+        assumed=False,
     )
     feed_override_percent: Annotated[Positive, Field(le=200)] = key(
         "override of the feed at which this shop usually runs; `time` counts with it unless another is given",
-        default=100.0,
-        assumed=True,
+        assumed=100.0,
     )
-    rapid_override_percent: Annotated[Positive, Field(le=200)] = key("the same of rapids", default=100.0, assumed=True)
-    tool_change_s: Seconds = key("an M06", default=0.0, assumed=True)
-    m_function_s: Seconds = key("any other M code that m_codes does not name", default=0.0, assumed=True)
+    rapid_override_percent: Annotated[Positive, Field(le=200)] = key("the same of rapids", assumed=100.0)
+    tool_change_s: Seconds = key("an M06", assumed=0.0)
+    m_function_s: Seconds = key("any other M code that m_codes does not name", assumed=0.0)
     m_codes: MCodeTimes | None = key(
         "M codes with a time of their own, { code = [1, 8], s = [0.3, 5.1] }; left out: none", default=None
     )
@@ -447,8 +402,7 @@ class Times(TomlTable):
     unknown_move_s: AxisTimes = key(
         "a rapid of an axis of which the program does not give start or end: G28, G30, G53, and the first one "
         "behind them or behind M06. One number, or x, y, z",
-        default=0.0,
-        assumed=True,
+        assumed=0.0,
     )
     scatter: TimeScatter | None = key(
         "what calibrated times scatter by, { cuts_percent = 1.1, between_cuts_s = 0.2, runs_percent = 0.3 }; `time` "

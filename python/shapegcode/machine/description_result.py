@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 from shapegcode.machine.machine import Machine
 from shapegcode.results.result import Result
@@ -89,12 +89,8 @@ class MachineDescription(Result):
         """The one thing to do next, in one sentence."""
         if self.matters:
             key = self.matters[0].key
-            how = (
-                "`shapegcode identify --tap-plan` says how"
-                if ".modes" in key
-                else "docs/howto/characterize.md says how"
-            )
-            return f"measure {key} first: {how}."
+            how = "`shapegcode identify --tap-plan`" if ".modes" in key else "docs/howto/characterize.md"
+            return f"measure {key} first: {how} says how."
         if self._open() and self.program is None:
             return f"`shapegcode machine show {self.source} --for part.nc` ranks them by what they do to your program."
         return f"use it: shapegcode convert IN -m {self.source} -o OUT."
@@ -274,12 +270,11 @@ class MachineDifference(Result):
         return [Table("", columns, rows, row_style=_bold)] if rows else []
 
 
-def _shown(row: str | DifferentValue, which: Literal["first", "second"]) -> str | None:
-    """A value with its unit, and where it comes from."""
+def _shown(row: str | DifferentValue, which: str) -> str | None:
+    """A value with its unit, and where it comes from; `which`: "first" or "second"."""
     if isinstance(row, str):
         return None
-    value = row.first if which == "first" else row.second
-    origin = row.first_origin if which == "first" else row.second_origin
+    value, origin = getattr(row, which), getattr(row, f"{which}_origin")
     unit = "" if row.unit in ("", "1") or value in (_NONE, "not set") else f" {row.unit}"
     return value if value == _NONE else f"{value}{unit} ({origin})"
 
@@ -307,19 +302,11 @@ def machine_difference(first: Machine | str | Path, second: Machine | str | Path
 
 def _different(keys: list[str], ours: dict[str, KeyValue], theirs: dict[str, KeyValue]) -> Iterator[DifferentValue]:
     for key in keys:
-        own, other = ours.get(key), theirs.get(key)
-        if own is not None and other is not None and own.value == other.value:
-            continue
-        if {None if each is None else each.value for each in (own, other)} == {None, "not set"}:
-            continue  # neither has it
-        known = own or other
+        both = [ours.get(key), theirs.get(key)]
+        first, second = (_NONE if each is None else each.value for each in both)
+        if first == second or {first, second} == {_NONE, "not set"}:
+            continue  # they have the same, or neither has it
+        origin, other_origin = (_NONE if each is None else _origin(each) or "" for each in both)
+        known = both[0] or both[1]
         assert known is not None
-        yield DifferentValue(
-            key,
-            known.unit,
-            _NONE if own is None else own.value,
-            _NONE if other is None else other.value,
-            _NONE if own is None else "assumed" if own.assumed else own.origin,
-            _NONE if other is None else "assumed" if other.assumed else other.origin,
-            known.meaning,
-        )
+        yield DifferentValue(key, known.unit, first, second, origin, other_origin, known.meaning)

@@ -26,57 +26,39 @@ class Fact:
 
 @dataclass(frozen=True)
 class Dialect:
-    """How programs for a control are written.
+    """How programs for a control are written."""
 
-    Attributes:
-        control: its name.
-        facts: by topic, what holds there and where that is written.
-        same: words that mean what they mean on a FANUC control.
-        becomes: words that are written otherwise, and how; empty: left out, as it says nothing there.
-        means: words that mean something else there, for the refusal.
-        cautions: words that mean the same as far as the control is set up so.
-        frame: "tape": `%` and the O number; "percent": `%` alone; "name": `%` and the name in the first line; "none".
-        comment: "(" for comments in brackets, ";" for those that reach to the end of the line.
-        opening: lines before the first block.
-        dwell: of one; `{s}` seconds, `{ms}` milliseconds.
-        arc_radius: address of the radius of an arc; empty: there is none, as arcs are written as chords.
-        chord_tolerance_mm: largest distance of an arc from the chords that are written for it; 0: arcs stay arcs.
-        time_feed: shaped blocks carry their time in seconds, with G93.
-        one_code: a line holds one code, and each move its own G.
-        short_codes: codes have no leading zeros.
-        decimals: digits of positions in mm in shaped blocks; None: as many as `controller.least_increment_mm` has.
-        feed_decimals: likewise of F; None: `controller.feed_decimals_mm`.
-        smooth_arcs_um: how far the middle of an arc may be moved so that blocks meet at smaller angles; 0: not at all.
-        least_block_s: shortest block that the control runs; None: not known.
-        lock: lines that switch the feed override off, and on again; empty: none are known.
-        lock_word: word of every shaped block that does it instead.
-        exact_stop: lines before and behind a block with G09, "" behind: the mode in force; None: a word like others.
-        header: comments for the operator.
-    """
-
-    control: str
-    facts: Mapping[str, Fact]
-    same: frozenset[str]
+    control: str  # its name
+    facts: Mapping[str, Fact]  # by topic, what holds there and where that is written
+    same: frozenset[str]  # words that mean what they mean on a FANUC control
+    # words that are written otherwise, and how; empty: left out, as it says nothing there
     becomes: Mapping[str, str] = field(default_factory=dict)
-    means: Mapping[str, str] = field(default_factory=dict)
+    means: Mapping[str, str] = field(default_factory=dict)  # words that mean something else there, for the refusal
+    # words that mean the same as far as the control is set up so
     cautions: Mapping[str, str] = field(default_factory=dict)
+    # "tape": `%` and the O number; "percent": `%` alone; "name": `%` and the name in the first line; "none"
     frame: Literal["tape", "percent", "name", "none"] = "tape"
-    comment: str = "("
-    opening: tuple[str, ...] = ()
-    dwell: str = "G04P{ms}"
-    arc_radius: str = "R"
+    comment: str = "("  # "(" for comments in brackets, ";" for those that reach to the end of the line
+    opening: tuple[str, ...] = ()  # lines before the first block
+    dwell: str = "G04P{ms}"  # of one; `{s}` seconds, `{ms}` milliseconds
+    arc_radius: str = "R"  # address of the radius of an arc; empty: there is none, as arcs are written as chords
+    # largest distance of an arc from the chords that are written for it; 0: arcs stay arcs
     chord_tolerance_mm: float = 0.0
-    time_feed: bool = False
-    one_code: bool = False
-    short_codes: bool = False
+    time_feed: bool = False  # shaped blocks carry their time in seconds, with G93
+    one_code: bool = False  # a line holds one code, and each move its own G
+    short_codes: bool = False  # codes have no leading zeros
+    # digits of positions in mm in shaped blocks; None: as many as `controller.least_increment_mm` has
     decimals: int | None = None
-    feed_decimals: int | None = None
+    feed_decimals: int | None = None  # likewise of F; None: `controller.feed_decimals_mm`
+    # how far the middle of an arc may be moved so that blocks meet at smaller angles; 0: not at all
     smooth_arcs_um: float = 0.0
-    least_block_s: float | None = None
+    least_block_s: float | None = None  # shortest block that the control runs; None: not known
+    # lines that switch the feed override off, and on again; empty: none are known
     lock: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-    lock_word: str = ""
+    lock_word: str = ""  # word of every shaped block that does it instead
+    # lines before and behind a block with G09, "" behind: the mode in force; None: a word like others
     exact_stop: tuple[str, str] | None = None
-    header: tuple[str, ...] = ()
+    header: tuple[str, ...] = ()  # comments for the operator
 
     @property
     def assumed(self) -> tuple[str, ...]:

@@ -14,12 +14,7 @@ from shapegcode.results.result import Xyz
 
 
 class Draft:
-    """Tables of a machine file, filled from a dump.
-
-    Args:
-        dump: the records.
-        data: tables of the machine from which it starts.
-    """
+    """Tables of a machine file, filled from the records of a dump."""
 
     def __init__(self, dump: Dump, data: dict[str, Any]) -> None:
         self.dump = dump  # the records

@@ -1,8 +1,4 @@
-"""A control's parameter dump as a machine.
-
-:func:`import_parameters` takes from a dump what it says about motion and programs, and from a base machine what it does
-not say. Every value carries the parameter it comes from. See docs/reference/parameters.md.
-"""
+"""A control's parameter dump as a machine; a base machine says what it does not. See docs/reference/parameters.md."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import math
 
 from shapegcode.machine.fanuc_draft import Draft
 from shapegcode.machine.fanuc_dump import LONGEST_MS, ControlTables
-from shapegcode.machine.fanuc_program import inch_factor, increment_um
+from shapegcode.machine.fanuc_program import inch_factor, increment_um, shifted
 from shapegcode.machine.result import ReadTable
 
 _LAW = (1401, 1420, 1422, 1430, 1432, 1602, 1603, 1604, 1610, 1620, 1621, 1622, 1623, 1660, 1730, 1731, 1732)
@@ -17,14 +17,15 @@ _AHEAD = (1735, 1737, 1769, 1770, 1771, 1772, 1773, 1774, 1783)
 NUMBERS = frozenset((*_LAW, *_AHEAD, 1820, 1825, 1826, 2005, 2068, 2092))
 """Parameters that are read here."""
 
-_OFF, _ON = ("G05.1Q0",), ("G05.1Q1",)
-
 
 def take_motion(draft: Draft) -> None:
     """Everything about the motion."""
     before = _limits_and_law(draft)
     _shaped_filter(draft)
-    _look_ahead_at_start(draft)
+    # A control that starts every program with the look-ahead on must be made to leave it, and may not do so.
+    if draft.choose("verdict.look_ahead", 1604, 0):
+        draft.set("emission.prologue", ("G05.1Q0",), 1604)
+        draft.set("emission.epilogue", ("G05.1Q1",), 1604)
     _corners_and_arcs(draft)
     _rapids(draft, before)
     _servo(draft)
@@ -66,10 +67,7 @@ def _limits_and_law(draft: Draft) -> bool:
 
 
 def _look_ahead_filter(draft: Draft, time_s: float) -> None:
-    """1769 is one time; 1602#3 and #6 say what kind of filter it belongs to, of which one key holds a moving average.
-
-    A bell, and an exponential of another length, take an arc as far from its radius as that average does.
-    """
+    """1769 with its kind by 1602#3, #6; a bell and an exponential as the moving average with the same error on arcs."""
     key = "controller.look_ahead_filter_time_constant_s"
     linear, bell = draft.values.bit(1602, 6), draft.values.bit(1602, 3)
     if linear is None or bell is None:
@@ -143,13 +141,6 @@ def _set_filter(draft: Draft, found: tuple[float, float, str, str], *names: str)
     *values, note = found
     for name, value in zip(names, values, strict=True):
         draft.set(f"controller.{name}", value, *((1622, 1610) if isinstance(value, float) else (1610,)), note=note)
-
-
-def _look_ahead_at_start(draft: Draft) -> None:
-    """A control that starts every program with the look-ahead on must be made to leave it, and may not do so."""
-    if draft.choose("verdict.look_ahead", 1604, 0):
-        draft.set("emission.prologue", _OFF, 1604)
-        draft.set("emission.epilogue", _ON, 1604)
 
 
 def _corners_and_arcs(draft: Draft) -> None:
@@ -238,7 +229,9 @@ def take_tables(draft: Draft, tables: ControlTables) -> None:
     """Read offsets and variables as they were when the dump was punched."""
     _tools(draft, tables)
     _systems(draft, tables)
-    _variables(draft, tables)
+    if tables.variables:
+        given = {str(n): value for n, value in sorted(tables.variables.items()) if value is not None}
+        _put(draft, tables, "variables", "input.variables", given, len(given))
     for file, line, words in tables.left_out:
         draft.miss("", f'{file}: "{words}": read, but not used', line)
 
@@ -281,16 +274,8 @@ def _systems(draft: Draft, tables: ControlTables) -> None:
         return
     rows = {name: [_mm(draft, *axes.get(axis, (0.0, True))) for axis in "XYZ"] for name, axes in tables.systems.items()}
     shift = rows.pop("", [0.0, 0.0, 0.0])
-    sums = {name: tuple(round(a + b, 9) for a, b in zip(each, shift, strict=True)) for name, each in rows.items()}
-    offsets = {name: each for name, each in sums.items() if any(each)}
+    offsets = shifted(rows, shift)
     _put(draft, tables, "systems", "input.work_offsets", offsets, len(offsets))
-
-
-def _variables(draft: Draft, tables: ControlTables) -> None:
-    if not tables.variables:
-        return
-    given = {str(n): value for n, value in sorted(tables.variables.items()) if value is not None}
-    _put(draft, tables, "variables", "input.variables", given, len(given))
 
 
 def _put(draft: Draft, tables: ControlTables, group: str, key: str, value: object, count: int) -> None:

@@ -5,6 +5,8 @@ Sources of the meanings stand in docs/reference/parameters.md, with those that n
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.machine.fanuc_draft import Draft
 
@@ -130,13 +132,16 @@ def _work_offsets(draft: Draft) -> None:
             mm = values.per_axis(number, unit="mm", low=-1e7) or []
             found[number] = [v if "." in e.text else v * step_mm for v, e in zip(mm, entries, strict=True)]
     shift = found.pop(1220, [0.0, 0.0, 0.0])
-    sums = {
-        f"G{number - 1167}": tuple(round(a + b, 9) for a, b in zip(each, shift, strict=True))
-        for number, each in found.items()
-    }
-    if sums:
+    if found:
         used = [number for number in _OFFSETS if number in found] + ([1220] if any(shift) else [])
-        draft.set("input.work_offsets", {name: each for name, each in sums.items() if any(each)}, *used)
+        offsets = shifted({f"G{number - 1167}": each for number, each in found.items()}, shift)
+        draft.set("input.work_offsets", offsets, *used)
+
+
+def shifted(offsets: Mapping[str, Sequence[float]], shift: Sequence[float]) -> dict[str, tuple[float, ...]]:
+    """Work offsets with what is added to all of them; those that are zero then are left out."""
+    sums = {name: tuple(round(a + b, 9) for a, b in zip(each, shift, strict=True)) for name, each in offsets.items()}
+    return {name: each for name, each in sums.items() if any(each)}
 
 
 def _calls(draft: Draft) -> None:

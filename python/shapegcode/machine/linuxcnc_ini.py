@@ -1,13 +1,4 @@
-"""A LinuxCNC INI file as a machine: limits of the axes, period, what its planner is set to.
-
-    [AXIS_X] MAX_VELOCITY                             axes.x.max_feed_mm_per_min and rapid_mm_per_min
-    [AXIS_X] MAX_ACCELERATION                         axes.x.max_acceleration_mm_s2
-    [TRAJ] MAX_LINEAR_VELOCITY, ..._ACCELERATION      the same, where they are smaller
-    [EMCMOT] SERVO_PERIOD                             controller.interpolation_period_s
-    [TRAJ] ARC_BLEND_..., [DISPLAY] MAX_FEED_OVERRIDE controller.linuxcnc
-
-What it leaves out has LinuxCNC's own default.
-"""
+"""A LinuxCNC INI file as a machine: limits of the axes, period, what its planner is set to; else its defaults."""
 
 from __future__ import annotations
 
@@ -32,17 +23,11 @@ _PLANNER = {
 
 @dataclass(frozen=True)
 class IniMachine:
-    """A machine that an INI file describes.
+    """A machine that an INI file describes."""
 
-    Attributes:
-        machine: with where each value comes from.
-        count: values that were read.
-        notes: what is set there and not part of the model.
-    """
-
-    machine: Machine
-    count: int
-    notes: tuple[str, ...]
+    machine: Machine  # with where each value comes from
+    count: int  # values that were read
+    notes: tuple[str, ...]  # what is set there and not part of the model
 
 
 class _Ini:
@@ -75,19 +60,7 @@ class _Ini:
 
 
 def read_ini(file: str | Path, *, name: str | None = None) -> IniMachine:
-    """The machine that a LinuxCNC INI file describes; its modes are not known.
-
-    Args:
-        file: the INI file.
-        name: of the machine; None: [EMC] MACHINE.
-
-    Returns:
-        The machine, how many values were read, and notes.
-
-    Raises:
-        MachineError: no INI file of LinuxCNC, or a value that is none; every problem with its line.
-        OSError: the file cannot be read.
-    """
+    """The machine that a LinuxCNC INI file describes, of that name or [EMC] MACHINE; its modes are not known."""
     ini = _Ini(str(file), read_file(file, _MAX_BYTES).decode("utf-8", "replace"))
     if not any(section == "TRAJ" for section, _ in ini.entries):
         raise MachineError(str(file), (Problem("", "", "no INI file of LinuxCNC: it has no section [TRAJ]"),))

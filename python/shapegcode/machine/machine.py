@@ -1,8 +1,7 @@
-"""The machine file: what shapegcode knows about a machine tool and its controller.
+"""The machine file, TOML: what shapegcode knows about a machine tool and its controller.
 
-A machine file is TOML. :class:`Machine` is its model; it and its tables, one file each, are the only place that holds
-defaults for it: every other module takes the values from here. Each key carries its unit, its meaning and, where the
-number is not known for real machines, the remark *assumed*, of which ``docs/reference/machine.md`` is made.
+:class:`Machine` and its tables are the only place that holds defaults for it; ``docs/reference/machine.md`` is made of
+what each key says.
 """
 
 from __future__ import annotations
@@ -330,9 +329,11 @@ class Machine(TomlTable):
             "rapid_mm_per_min": rapid_mm_per_min,
             "max_acceleration_mm_s2": max_acceleration_mm_per_s2,
         }
-        axes = {
-            axis: {**limits, "modes": [_table_of(mode) for mode in _several(modes.get(axis, ()))]} for axis in "xyz"
-        }
+        axes = {}
+        for axis in "xyz":
+            given = modes.get(axis, ())
+            several = [given] if isinstance(given, int | float | Mode) else given
+            axes[axis] = {**limits, "modes": [_table_of(mode) for mode in several]}
         machine = validated(cls, {"name": name, "axes": axes}, "Machine.simple", "", MachineError)
         return machine.with_remarks({f"axes.{axis}.{limit}": "assumed" for axis in "xyz" for limit in limits})
 
@@ -493,10 +494,6 @@ def inherited_text(name: str) -> str:
         return inherited(whose, remark) if remark and key.startswith(_OF_A_MACHINE) else remark
 
     return with_remarks(text, remark)
-
-
-def _several(modes: float | Mode | Sequence[float | Mode]) -> Sequence[float | Mode]:
-    return [modes] if isinstance(modes, int | float | Mode) else modes
 
 
 def _table_of(mode: float | Mode) -> dict[str, float]:

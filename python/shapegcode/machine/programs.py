@@ -43,15 +43,11 @@ class Input(TomlTable):
         default="incremental",
     )
     arc_without_centre: Literal["alarm", "line"] = key(
-        'G02 or G03 without R, I, J, K: "alarm" 0022, or a "line" to its end',
-        fanuc="3403#5",
-        default="alarm",
-        assumed=True,
+        'G02 or G03 without R, I, J, K: "alarm" 0022, or a "line" to its end', fanuc="3403#5", assumed="alarm"
     )
     tool_change_unknown_axes: Annotated[str, Strict(), Field(pattern=r"^X?Y?Z?$")] = key(
         "axes whose position is not known after M06, until they are programmed again; letters of XYZ in this order",
-        default="XYZ",
-        assumed=True,
+        assumed="XYZ",
     )
     work_offsets: dict[str, tuple[Float, Float, Float]] = key(
         'work offsets, for programs that use more than one: G54 = [x, y, z]; "G54.1P5" = [x, y, z]; one that '
@@ -85,7 +81,7 @@ class Input(TomlTable):
         default="refuse",
     )
     compensation_start_up: Literal["A", "B"] = key(
-        "kind of the start-up and cancel moves of cutter compensation", fanuc="5003#0, #1", default="A", assumed=True
+        "kind of the start-up and cancel moves of cutter compensation", fanuc="5003#0, #1", assumed="A"
     )
     material_side: Literal["left", "right"] | None = key(
         "side of the programmed tool path on which the workpiece lies, seen along the travel: right where the contour "
@@ -94,17 +90,12 @@ class Input(TomlTable):
         default=None,
     )
     scale_unit: Annotated[Positive, Field(le=1)] = key(
-        "unit of the factors P, I, J, K of scaling G51 without a decimal point",
-        unit="1",
-        fanuc="5400#7",
-        default=0.001,
-        assumed=True,
+        "unit of the factors P, I, J, K of scaling G51 without a decimal point", unit="1", fanuc="5400#7", assumed=0.001
     )
     peck_clearance_mm: NonNegative = key(
         "distance to which a peck of G73 and G83 returns before it feeds on; for the cycle time",
         fanuc="5114, 5115",
-        default=0.5,
-        assumed=True,
+        assumed=0.5,
     )
     block_skip: Literal["unknown", "on", "off"] = key(
         'block-skip switch on the panel: "on": blocks with / do not run; "off": they run; "unknown": either may be '
@@ -124,8 +115,7 @@ class Input(TomlTable):
         "first and last O number of programs of the machine builder or of a probe: a call of one that is not at hand "
         "is kept as it stands, and position and variables are not known afterwards; a missing program outside of "
         "these is an error",
-        default=(9000, 9999),
-        assumed=True,
+        assumed=(9000, 9999),
     )
     g_macros: Annotated[_Programs, _G_CODED] = key(
         'G codes that call a macro like G65: { "120" = 9010 }', fanuc="6050 ... 6059", default={}
@@ -140,7 +130,7 @@ class Input(TomlTable):
         "program that every T code calls, with T in #149; 0: none", fanuc="6001#5", default=0
     )
     max_line_length: Annotated[int, Strict(), Field(ge=20, le=100_000)] = key(
-        "a longer line is an error", unit="characters", default=250, assumed=True
+        "a longer line is an error", unit="characters", assumed=250
     )
 
     @field_validator("work_offsets")
@@ -239,7 +229,7 @@ class Emission(TomlTable):
         default=".out-of-tolerance",
     )
     max_line_length: Annotated[int, Strict(), Field(ge=30, le=250)] = key(
-        "longest line written", unit="characters", default=60, assumed=True
+        "longest line written", unit="characters", assumed=60
     )
     arc_min_chord_mm: NonNegative = key(
         "a piece of an arc with a shorter chord is written as a line: rounding could turn it into a full circle",
@@ -304,10 +294,7 @@ class Emission(TomlTable):
 
     @property
     def locking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override off: `lock_lines`, or the dialect's own where they are FANUC's.
-
-        None where it is not locked.
-        """
+        """Lines that switch the feed override off, the dialect's own in place of FANUC's; none where it is not."""
         if self.override != "lock":
             return ()
         own = dialect_of(self.dialect)
@@ -483,9 +470,7 @@ class Verdict(TomlTable):
         "does (memory or a data server, emission.prefill_dwell_s)",
         default=False,
     )
-    starved_s: Annotated[Positive, Field(le=10)] = key(
-        "how long the axes then wait for the next block", default=0.02, assumed=True
-    )
+    starved_s: Annotated[Positive, Field(le=10)] = key("how long the axes then wait for the next block", assumed=0.02)
 
     @model_validator(mode="after")
     def _band_ascends(self) -> Verdict:

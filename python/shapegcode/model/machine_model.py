@@ -1,7 +1,6 @@
 """A machine as the core simulates it: made once from the machine file, and asked by everything that simulates.
 
-Whether the look-ahead plans the speed along a path or the path is simulated block by block is decided here and nowhere
-else (`SimulatedController`).
+Whether a path is planned or simulated block by block is decided in `SimulatedController` alone.
 """
 
 from __future__ import annotations
@@ -12,9 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import dialect_of
 from shapegcode.machine.planners import GrblPlanner, KlipperPlanner, LinuxcncPlanner
@@ -140,8 +139,6 @@ PLANTS = ("modal", "feed-drive")
 
 _DRIVE_REST_S = 0.5  # how long behind a stop the error of feed drives is looked at
 _LEAST_DECAY_PER_S = 0.01  # below it a mode has no damping to speak of
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -288,10 +285,7 @@ class MachineModel:
 
     @cached_property
     def bounds_deviations(self) -> bool:
-        """Whether the largest deviations at other feed overrides cost little beside a run.
-
-        Not behind feed drives, a filter or modes that vary with position, nor where both sides of the path count.
-        """
+        """Whether deviations at other overrides cost little beside a run: no filter, modes that stay, sides alike."""
         machine = self.machine
         plain = machine.verdict.plant == "modal" and not self.shaped.filters and moving_axis(machine) is None
         return plain and not self.always_plans and machine.input.material_side is None

@@ -1,7 +1,6 @@
-"""Modes that move: what the machine file's tables say, for the plant, for the shapers and for people.
+"""Modes that move over the mass of the part or the position of an axis, for the plant, for shapers and for people.
 
-A table over the mass of the part fixes a mode for a whole program; one over the position of an axis lets it vary
-along the program. Positions in tables are the machine's: those of the program plus work offset and tool length.
+Positions in tables are the machine's: those of the program plus work offset and tool length.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import MachineError, Problem
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import AxisMode, Machine
 from shapegcode.machine.axes import Drive
 
@@ -357,7 +357,7 @@ _WANTED = (
 
 def plant_response(
     command_mm: npt.ArrayLike, modes: Machine | Sequence[Sequence[AxisMode | _core.Mode]], period_s: float
-) -> npt.NDArray[np.float64]:
+) -> FloatArray:
     """Response of base-excited modes to a whole record of set-points, exact for set-points linear in between.
 
     What the real-time plant of the core gives sample by sample, to the last bit, at the speed of a batch. At rest at

@@ -19,21 +19,13 @@ _WHOLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class SimulatedPrograms:
-    """A program, and the one that was made of it.
+    """A program, and the one that was made of it."""
 
-    Attributes:
-        original: what is simulated.
-        machine: controller and plant.
-        emitted: made of it; None: none.
-        labels: of both, for people.
-        plant: "modal" or "feed-drive".
-    """
-
-    original: Program
-    machine: Machine
-    emitted: Program | None = None
-    labels: tuple[str, str] = ("original", "emitted")
-    plant: str = "modal"
+    original: Program  # what is simulated
+    machine: Machine  # controller and plant
+    emitted: Program | None = None  # made of it; None: none
+    labels: tuple[str, str] = ("original", "emitted")  # of both, for people
+    plant: str = "modal"  # "modal" or "feed-drive"
 
     @property
     def methods(self) -> tuple[str, ...]:

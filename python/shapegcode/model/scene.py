@@ -12,10 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import axis_modes
-from shapegcode.model.stream import Chunk, stream
+from shapegcode.model.stream import Chunk, cuts_of_lines, stream
 from shapegcode.program import Program
 from shapegcode.program.compensation import paired_regions
 from shapegcode.results.page.scene import (
@@ -33,16 +34,10 @@ from shapegcode.results.page.scene import (
 MOST_POINTS = 60_000
 """Samples of a program that a page shows, at most."""
 
-FloatArray = npt.NDArray[np.float64]
 
 _HALF_PIXEL = 0.5
 _LEAST_EXTENT_MM = 1e-3
-_FLAT = {
-    "deviation": 1e-3,
-    "vibration": 1e-3,
-    "speed": 1e-3,
-    "acceleration": 1e-6,
-}  # a curve within so little is flat
+_FLAT = {"deviation": 1e-3, "vibration": 1e-3, "speed": 1e-3, "acceleration": 1e-6}  # a curve within so little is flat
 
 
 @dataclass
@@ -56,10 +51,7 @@ class _Followed:
     def deviations_mm(self, chunk: Chunk) -> FloatArray:
         """From path to table, (k, 3); from command to table where no path is known."""
         found = chunk.error_mm.copy()
-        firsts = np.array([cut.first_line for cut, _ in self.cuts])
-        cut_of = np.searchsorted(firsts, chunk.line, side="right") - 1
-        lasts = np.array([cut.last_line for cut, _ in self.cuts] or [0])
-        cut_of[(cut_of >= 0) & (chunk.line > lasts[np.maximum(cut_of, 0)])] = -1
+        cut_of = cuts_of_lines([cut for cut, _ in self.cuts], chunk.line)
         borders = np.flatnonzero(np.diff(cut_of)) + 1
         for begin, end in zip([0, *borders], [*borders, len(chunk)], strict=True):
             rank = int(cut_of[begin])
@@ -103,7 +95,10 @@ def scene_of(
         thinned=f"Thinned for display, extremes kept ({'; '.join(notes)}). The figures are not thinned.",
         spectra=tuple(spectra),
         modes=tuple(_mode_lines(machine)),
-        link_lines=() if emitted is None else tuple(_links(original, emitted)),
+        link_lines=tuple(
+            (made.first_line, made.last_line, own.first_line, own.last_line)
+            for made, own in (() if emitted is None else paired_regions(emitted, original))
+        ),
     )
 
 
@@ -193,8 +188,3 @@ def _mode_lines(machine: Machine) -> Iterator[ModeLine]:
     for axis, modes in zip("xyz", axis_modes(machine), strict=True):
         for mode in modes:
             yield ModeLine(axis, mode.frequency_hz, f"mode of {axis.upper()}, {mode.frequency_hz:g} Hz")
-
-
-def _links(original: Program, emitted: Program) -> Iterator[tuple[int, int, int, int]]:
-    for made, own in paired_regions(emitted, original):
-        yield made.first_line, made.last_line, own.first_line, own.last_line

@@ -5,7 +5,7 @@ The plant is at rest at the start and runs on through the whole program. Memory 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.model.modes import Offset
@@ -28,36 +29,22 @@ _CHUNK_SAMPLES = 65536
 _OF_EVERY_PLANT = ("line", "kind", "command_mm", "response_mm", "velocity_mm_per_s")
 _OF_DRIVES = ("motor_mm", "motor_force_n", "friction_force_n")
 
-FloatArray = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """A stretch of a simulated program; one row per interpolation period.
+    """A stretch of a simulated program; one row per interpolation period."""
 
-    Attributes:
-        sample: number of each row since the start of the program, (k,).
-        time_s: since the start of the program, (k,).
-        line: of the block that is being interpolated, (k,).
-        kind: what that block is, (k,): a rank in `KINDS`. Waits for in-position count to the block before them.
-        command_mm: set-points behind every filter, (k, 3).
-        response_mm: the table, (k, 3).
-        velocity_mm_per_s: of the command over the period before, (k, 3).
-        motor_mm: feed drives only: the motor as travel of the table, (k, 3).
-        motor_force_n: feed drives only: force of the motor, (k, 3).
-        friction_force_n: feed drives only: friction of the table, against its motion, (k, 3).
-    """
-
-    sample: npt.NDArray[np.int64]
-    time_s: FloatArray
-    line: npt.NDArray[np.uint32]
+    sample: npt.NDArray[np.int64]  # number of each row since the start of the program, (k,)
+    time_s: FloatArray  # since the start of the program, (k,)
+    line: npt.NDArray[np.uint32]  # of the block that is being interpolated, (k,)
+    # what that block is, (k,): a rank in `KINDS`. Waits for in-position count to the block before them
     kind: npt.NDArray[np.uint8]
-    command_mm: FloatArray
-    response_mm: FloatArray
-    velocity_mm_per_s: FloatArray
-    motor_mm: FloatArray | None = None
-    motor_force_n: FloatArray | None = None
-    friction_force_n: FloatArray | None = None
+    command_mm: FloatArray  # set-points behind every filter, (k, 3)
+    response_mm: FloatArray  # the table, (k, 3)
+    velocity_mm_per_s: FloatArray  # of the command over the period before, (k, 3)
+    motor_mm: FloatArray | None = None  # feed drives only: the motor as travel of the table, (k, 3)
+    motor_force_n: FloatArray | None = None  # feed drives only: force of the motor, (k, 3)
+    friction_force_n: FloatArray | None = None  # feed drives only: friction of the table, against its motion, (k, 3)
 
     def __len__(self) -> int:
         """Rows."""
@@ -86,6 +73,15 @@ class Chunk:
     def every(self, step: int) -> Chunk:
         """Of all samples of the program every `step`-th, the first among them."""
         return self if step == 1 else self.rows(self.sample % step == 0)
+
+
+def cuts_of_lines(cuts: Sequence[_core.Region], lines: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
+    """Rank of the cut that each line stands in, (k,), -1 outside of them; the cuts are in the order of their lines."""
+    firsts = np.array([cut.first_line for cut in cuts], dtype=np.int64)
+    lasts = np.array([cut.last_line for cut in cuts] or [0], dtype=np.int64)
+    found = np.searchsorted(firsts, lines, side="right") - 1
+    found[(found >= 0) & (lines > lasts[np.maximum(found, 0)])] = -1
+    return found
 
 
 def stream(
@@ -125,8 +121,10 @@ def stream(
     if chunk_samples < 1:
         raise _core.ArgumentError(f"chunk_samples = {chunk_samples}: must be 1 or more")
     program = given_program(program, machine)
-    if lines is not None:
-        _check_lines(program, lines)
+    count = program.core.line_count
+    if lines is not None and not 1 <= lines[0] <= lines[1] <= count:
+        where = "lines {}-{}".format(*lines)
+        raise _core.ArgumentError(f"{where}: must lie within 1-{count} of {program.source}, first to last")
     model = MachineModel(machine)
     offsets, known = _offsets(program, model)
     options = model.options(plant=plant, offset=known)
@@ -136,20 +134,10 @@ def stream(
 
 
 def _offsets(program: Program, model: MachineModel) -> tuple[list[FloatArray], Offset]:
-    """Of each region from the program's positions to the machine's, and None for axes where one of them is not known.
-
-    A mode that varies over such an axis stays nominal throughout.
-    """
+    """Of each region from program to machine positions, and None for axes where one of them is not known."""
     found = [model.offset(region) for region in program.regions]
     x, y, z = (None if any(offset[axis] is None for offset in found) else 0.0 for axis in range(3))
     return [np.array([value or 0.0 for value in offset]) for offset in found], (x, y, z)
-
-
-def _check_lines(program: Program, lines: tuple[int, int]) -> None:
-    first, last = lines
-    count = program.core.line_count
-    if not 1 <= first <= last <= count:
-        raise _core.ArgumentError(f"lines {first}-{last}: must lie within 1-{count} of {program.source}, first to last")
 
 
 def _chunks(

@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.results.json import sparse
 from shapegcode.results.result import Xyz
 
-Vector = npt.NDArray[np.float64]
 T = TypeVar("T")
 
 CONTOURS = {"command": "contour error of the command", "response": "contour error of the machine table"}
@@ -100,7 +99,7 @@ class ContourError:
         )
 
 
-def largest_xyz_um(vectors: Iterable[Vector]) -> Xyz[float]:
+def largest_xyz_um(vectors: Iterable[FloatArray]) -> Xyz[float]:
     """Largest of each axis, mm to µm."""
     rows = list(vectors)
     x, y, z = np.max(rows, axis=0) * 1e3 if rows else np.zeros(3)

@@ -1,10 +1,6 @@
-"""One serialiser for every JSON, and the schema of a result from its class.
+"""One serialiser for every JSON, and the schema of a result from its class: fields, and properties of `json_extra`.
 
-A dataclass becomes an object whose keys are the names of its fields, in their order; what its field's metadata calls
-`hidden` (samples, programs, texts) stays out, and what it calls `sparse` where it is None. A class may name properties
-that belong to its object too: `json_extra` (names to types), and those of them that keep every digit: `json_exact`.
-Numbers are written as a person would write them: nine digits, no minus zero, nothing below a millionth of a unit of
-length, time or percent. What is no number in JSON (NaN, infinity) is null.
+Numbers have nine digits but for `json_exact`, no minus zero, nothing below a millionth; NaN and infinity are null.
 """
 
 from __future__ import annotations
@@ -121,10 +117,7 @@ def sparse() -> dict[str, Any]:
 
 
 class Streamed(list[Any]):
-    """Many entries that become plain one by one, while `json.JSONEncoder.iterencode` goes over them.
-
-    `json.dumps` would find it empty.
-    """
+    """Many entries that become plain one by one in `json.JSONEncoder.iterencode`; `json.dumps` would find it empty."""
 
     def __init__(self, entries: Sequence[object]) -> None:
         super().__init__()

@@ -1,7 +1,6 @@
-"""Simulated motion over time, one plot per question: how fast, how much vibration; `path_plots` has the path.
+"""Simulated or measured motion over time: how fast, how much vibration; `path_plots` has the path.
 
-They are functions of data: of traces of any motion, measured ones too. The first trace, usually the original program,
-is the wider line, so that it shows beneath the others.
+The first trace, usually the original program, is the wider line, so that it shows beneath the others.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from shapegcode.io.arrays import FloatArray
 from shapegcode.results import plot
 
 if TYPE_CHECKING:
@@ -113,8 +113,6 @@ class Trace:
             stops=self.stops and first * self.period_s <= self.rest_s - self.start_s <= last * self.period_s,
         )
 
-
-FloatArray = npt.NDArray[np.float64]
 
 AXIS_NAMES = "XYZ"
 _WIDTHS = (2.4, 0.9, 0.9, 0.9)

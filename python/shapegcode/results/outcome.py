@@ -1,8 +1,6 @@
-"""What every result says of itself: whether it is good, its cautions, what to do next; when two of them are equal.
+"""What every result says of itself, and when two are equal; its pictures are drawn by the module `plots` beside it.
 
-A result's pictures are drawn by the module `plots` beside it, which is loaded when somebody asks for them. In a pickle
-the core's objects are handles: a path is built again; of any other one its figures travel, and what it computes is
-missing in the copy and says so.
+In a pickle a path is built again; of other objects of the core the figures travel, and what they compute is missing.
 """
 
 from __future__ import annotations
@@ -60,17 +58,14 @@ def _same(first: Any, second: Any) -> bool:
         return np.array_equal(first, second, equal_nan=first.dtype.kind in "fc" and second.dtype.kind in "fc")
     if type(first) is not type(second):
         return False
-    if is_dataclass(first) and _compares_fields(type(first)):
+    kind: Any = type(first)
+    if is_dataclass(first) and (kind.__eq__ is object.__eq__ or kind.__dataclass_params__.eq):
         return same_fields(first, second)
     if isinstance(first, Mapping):
         return first.keys() == second.keys() and all(_same(value, second[key]) for key, value in first.items())
     if isinstance(first, list | tuple):
         return len(first) == len(second) and all(map(_same, first, second))
     return bool(first == second) or bool(first != first and second != second)
-
-
-def _compares_fields(kind: Any) -> bool:
-    return kind.__eq__ is object.__eq__ or bool(kind.__dataclass_params__.eq)
 
 
 def _is_handle(value: Any) -> bool:
@@ -90,20 +85,11 @@ def _reduced(value: Any) -> tuple[Any, ...]:
     return CoreFigures, (type(value).__name__, figures)
 
 
-def _reduced_path(path: _core.Path) -> tuple[Any, ...]:
-    return _path, ([_parts(path[rank]) for rank in range(len(path))],)
-
-
 def _parts(segment: _core.Segment) -> tuple[Any, ...]:
     if segment.kind == _core.SegmentKind.arc:
         centre, sweep = segment.centre_mm.copy(), segment.sweep_rad
         return segment.start_mm, segment.end_mm, centre, sweep, segment.feed_mm_per_s, segment.normal
     return segment.start_mm, segment.end_mm, segment.feed_mm_per_s
-
-
-def _path(parts: list[tuple[Any, ...]]) -> _core.Path:
-    """A path of the same motion; which lines it comes from is not known."""
-    return _core.Path([_segment(each) for each in parts])
 
 
 def _segment(parts: tuple[Any, ...]) -> _core.Segment:
@@ -122,7 +108,8 @@ _IN_RESULTS = (  # beside what only the core makes
 for _kind in _HANDLES:
     if _kind in _IN_RESULTS or isinstance(vars(_kind)["__init__"], types.WrapperDescriptorType):
         copyreg.pickle(_kind, _reduced)
-copyreg.pickle(_core.Path, _reduced_path)
+# Of the same motion; which lines it comes from is not known in the copy.
+copyreg.pickle(_core.Path, lambda path: (_core.Path, ([path[rank] for rank in range(len(path))],)))
 copyreg.pickle(_core.Segment, lambda segment: (_segment, (_parts(segment),)))
 copyreg.pickle(types.MappingProxyType, lambda mapping: (types.MappingProxyType, (dict(mapping),)))
 
@@ -171,10 +158,7 @@ class Xyz(Generic[T]):
 
 
 class Outcome:
-    """What every result is; see `shapegcode.results.result.Result`, which a class inherits.
-
-    `json_extra` names the properties that the JSON holds beside the fields, with their types.
-    """
+    """What every result is; `json_extra` names properties that the JSON holds beside the fields, with their types."""
 
     from_json: bool = False
     """It was read back from its JSON: what no JSON holds is missing."""

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.motion_plots import (
     AXIS_NAMES,
@@ -28,7 +29,6 @@ from shapegcode.results.result import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = npt.NDArray[np.float64]
 Plane = Literal["XY", "ZX", "YZ"]
 
 _STRAIGHT = (
@@ -239,10 +239,7 @@ COARSE_STEP_RAD = 0.05
 def follow(
     command_mm: FloatArray, points_mm: FloatArray, polyline_mm: FloatArray, *, complete: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Where on a polyline are samples that follow it?
-
-    Where the polyline passes a point twice, the distance that the command has travelled decides.
-    """
+    """Where on a polyline are samples that follow it? Where it passes a point twice, the distance travelled decides."""
     vertices = _refine(polyline_mm)
     gone = _distances(command_mm)
     if complete and gone[-1] > 0:
@@ -371,13 +368,10 @@ def motion_pictures(simulated: Callable[[], SimulatedRegion]) -> dict[str, Plot]
         plane = _widest_plane(s.programmed_mm)
         return plot_path(s.programmed_mm, s.near, ax, plane=plane, part=s.near_part, whole_mm=s.whole_mm)
 
-    def feed(ax: Axes | None = None) -> Axes:
-        return plot_feed(scene().views, ax, part=scene().part)
+    def over_time(draw: Plot) -> Plot:
+        return lambda ax=None: draw(scene().views, ax, part=scene().part)
 
-    def vibration(ax: Axes | None = None) -> Axes:
-        return plot_vibration(scene().views, ax, part=scene().part)
-
-    return {"path": path, "feed": feed, "vibration": vibration}
+    return {"path": path, "feed": over_time(plot_feed), "vibration": over_time(plot_vibration)}
 
 
 @dataclass(frozen=True, eq=False)

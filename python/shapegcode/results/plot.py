@@ -1,11 +1,6 @@
-"""The paper of the pictures: one style, figures and panels, titles, files.
+"""The paper of the pictures: one style, figures and panels, titles, files (PNG or SVG); no window, no global state.
 
-A plot is a function ``plot_x(result, ax=None) -> Axes``: it draws into the caller's axes or into a new figure, and
-writes nothing. `axes` gives it one panel, `grid` several; `save` writes what was drawn.
-
-Matplotlib is imported when the first figure is made and draws to files only (PNG or SVG, by the file's ending); no
-window system and no global state are touched. Colours are those of Okabe and Ito, which colour-blind readers can tell
-apart.
+A plot is a function ``plot_x(result, ax=None) -> Axes`` that writes nothing. Colours are those of Okabe and Ito.
 """
 
 from __future__ import annotations
@@ -140,19 +135,15 @@ def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> li
     files = []
     for name, plot in plots.items():
         drawn = plot()
-        _lay_out(drawn)
+        figure: Any = drawn.figure.figure
+        # Panels get their places once for every format: to find them takes as long as to draw all.
+        if (engine := figure.get_layout_engine()) is not None:
+            engine.execute(figure)
+            figure.set_layout_engine("none")
         for suffix in FORMATS:
             files.append(place / f"{name}{suffix}")
             save(drawn, files[-1])
     return [str(file) for file in files]
-
-
-def _lay_out(drawn: Axes | Figure) -> None:
-    """Give the panels their places once for every format: to find them takes as long as to draw all."""
-    figure: Any = drawn.figure.figure
-    if (engine := figure.get_layout_engine()) is not None:
-        engine.execute(figure)
-        figure.set_layout_engine("none")
 
 
 def save(drawn: Axes | Figure, file: str | Path) -> None:
@@ -178,10 +169,7 @@ _ID = re.compile(r'(\bid="|xlink:href="#|\bhref="#|url\(#)')
 
 
 def svg_text(drawn: Axes | Figure, key: str, *, label: str) -> str:
-    """The picture to which the axes belong as an `svg` element for a page that holds several; same data, same text.
-
-    What has very many points is drawn as pixels inside of it, so that a page stays small.
-    """
+    """The whole picture of the axes as an `svg` element of a page, very many points as pixels; same data, same text."""
     import matplotlib
 
     figure: Any = drawn.figure.figure

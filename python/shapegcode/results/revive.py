@@ -1,8 +1,5 @@
 """Results read back from what ``--json`` wrote: the inverse of `shapegcode.results.json.plain`, by typed fields.
 
->>> result = sg.load_result("out.json")
->>> result.answer, result.tables()
-
 What no JSON holds (samples, programs, texts) is missing: who asks for it gets an error that says so.
 """
 
@@ -139,7 +136,7 @@ def _value(hint: Any, data: Any, where: str, bound: Mapping[Any, Any] = types.Ma
     if origin is typing.Literal:
         return data if data in arguments else _wrong(where, data, f"one of {', '.join(map(str, arguments))}")
     cls = origin or hint
-    if cls in _SIMPLE:
+    if cls in _NAMES:
         return _simple(cls, data, where)
     if dataclasses.is_dataclass(cls):
         return _object(cls, arguments, data, where, bound)
@@ -157,9 +154,6 @@ def _value(hint: Any, data: Any, where: str, bound: Mapping[Any, Any] = types.Ma
     if issubclass(cls, np.ndarray):
         return np.array(data, dtype=np.float64)
     return _sequence(cls, arguments, data, where, bound)
-
-
-_SIMPLE = (bool, int, float, str, type(None))
 
 
 def _simple(cls: type, data: Any, where: str) -> Any:

@@ -192,10 +192,7 @@ def _least_width(columns: Sequence[Column], rows: Sequence[Sequence[str]], *, wh
 
 
 def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int) -> list[int]:
-    """How wide each column is, so that no word is cut and the table has no more lines than it must have.
-
-    rich shrinks every column alike, below its minimum width, and then cuts the last ones.
-    """
+    """How wide each column is, so that no word is cut; rich shrinks every column alike, and then cuts the last ones."""
     least, most = _least_and_most(columns, rows)
     found = list(least)
     spare = width - (2 * len(columns) - 1) - sum(least)

@@ -1,7 +1,6 @@
 """A TOML file edited with tomlkit: some entries, or where values come from, change, the rest stays byte for byte.
 
-The entries of a table are the list ``table.value.body``: keys with their items, comments, blank lines. It is edited in
-place; then the document is rendered. Whoever edits reads the result again and compares it with what was meant.
+Whoever edits the entries, ``table.value.body``, reads the result again and compares it with what was meant.
 """
 
 from __future__ import annotations
@@ -16,15 +15,7 @@ import tomlkit
 from tomlkit.items import AoT, Comment, InlineTable, Item, Key, Table, Whitespace
 
 from shapegcode.errors import ArgumentError
-from shapegcode.settings.remarks import (
-    ORIGIN,
-    ORIGIN_TEXT,
-    ORIGIN_WORDS,
-    lines_of,
-    origin_of,
-    remarks_of,
-    take_origins,
-)
+from shapegcode.settings.remarks import ORIGIN, ORIGIN_TEXT, ORIGIN_WORDS, lines_of, origin_of, remarks_of, take_origins
 
 Entry = tuple[Key | None, Item]
 

@@ -34,12 +34,17 @@ _UNITS = {
 """Unit of a key by the end of its name; the longest that fits."""
 
 
-def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: bool = False, **field: Any) -> Any:
+_KNOWN = object()
+
+
+def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: Any = _KNOWN, **field: Any) -> Any:
     """A pydantic field with what the documentation of a key needs; *unit* only where its name does not end in it.
 
-    Left out of *field*, ``default`` makes the key mandatory.
+    *assumed* is a default that nobody measured, in place of ``default``; left out, both make the key mandatory.
     """
-    noted: dict[str, Any] = {"unit": unit, "fanuc": fanuc, "assumed": assumed}
+    if assumed is not _KNOWN:
+        field["default"] = assumed
+    noted: dict[str, Any] = {"unit": unit, "fanuc": fanuc, "assumed": assumed is not _KNOWN}
     return Field(description=meaning, json_schema_extra=noted, **field)
 
 
@@ -195,20 +200,9 @@ def _as_table(annotation: Any) -> type[TomlTable] | None:
 def key_info(field: FieldInfo, key: str) -> KeyInfo:
     """What the documentation says of a field; *key* is its dotted name."""
     noted = facts(field)
-    if field.is_required():
-        default = "required"
-    elif field.default is None:
-        default = "not set"
-    else:
-        default = toml(field.default)
-    return KeyInfo(
-        key=key,
-        unit=noted.get("unit", ""),
-        default=default,
-        meaning=field.description or "",
-        fanuc=noted.get("fanuc", ""),
-        assumed=bool(noted.get("assumed")),
-    )
+    default = "required" if field.is_required() else "not set" if field.default is None else toml(field.default)
+    unit, fanuc = noted.get("unit", ""), noted.get("fanuc", "")
+    return KeyInfo(key, unit, default, field.description or "", fanuc, bool(noted.get("assumed")))
 
 
 def values_of(
@@ -230,16 +224,8 @@ def values_of(
             says_why = not value and (value is not None or remark.startswith("assumed"))
             origin = origin_of(remark) if from_file or (remark and says_why) else "default"
             assumed = origin == "assumed" or (info.assumed and origin == "default")
-            yield KeyValue(
-                key=key,
-                value="not set" if value is None else toml(value),
-                unit=info.unit,
-                origin=origin,
-                assumed=assumed,
-                meaning=info.meaning,
-                fanuc=info.fanuc,
-                remark=remark,
-            )
+            shown = "not set" if value is None else toml(value)
+            yield KeyValue(key, shown, info.unit, origin, assumed, info.meaning, info.fanuc, remark)
 
 
 def toml(value: object) -> str:
@@ -247,34 +233,24 @@ def toml(value: object) -> str:
     if isinstance(value, PerAxis):
         if value.x == value.y == value.z:
             return toml(value.x)
-        return "{ " + ", ".join(f"{axis} = {toml(getattr(value, axis))}" for axis in "xyz") + " }"
+        return toml(dict(value))
     if isinstance(value, InlineTable):
         given = {name: getattr(value, name) for name in type(value).model_fields}
         return toml({name: item for name, item in given.items() if item is not None})
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return _toml_float(value)
-    if isinstance(value, int):
-        return str(value)
+        is_whole = math.isfinite(value) and value == int(value) and abs(value) < 1e15
+        return f"{value:.1f}" if is_whole else repr(value)
     if isinstance(value, str):
         # JSON strings are TOML basic strings, but for DEL, which TOML wants escaped.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple):
         return "[" + ", ".join(toml(item) for item in value) + "]"
     if isinstance(value, dict):
-        return (
-            "{ " + ", ".join(f"{toml_key(key)} = {toml(item)}" for key, item in value.items()) + " }" if value else "{}"
-        )
+        items = ", ".join(f"{toml_key(key)} = {toml(item)}" for key, item in value.items())
+        return f"{{ {items} }}" if value else "{}"
     return str(value)
-
-
-def _toml_float(value: float) -> str:
-    if not math.isfinite(value):
-        return str(value)
-    if value == int(value) and abs(value) < 1e15:
-        return f"{value:.1f}"
-    return repr(value)
 
 
 def toml_key(key: str) -> str:

@@ -149,11 +149,9 @@ def _unit_remark(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
 
 def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     """The known key that an unknown one most likely stands for."""
-    parent = [part for part in location[:-1] if not isinstance(part, int)]
-    model: type[BaseModel] | None = root
-    for part in parent:
-        field = model.model_fields.get(part) if model is not None else None
-        model = table_type(field) if field is not None else None
+    parent = tuple(part for part in location[:-1] if not isinstance(part, int))
+    field = _field(root, parent)
+    model = root if not parent else table_type(field) if field is not None else None
     if model is None:
         return ""
     name = str(location[-1])[:_LONGEST_NAME]

@@ -1,9 +1,4 @@
-"""Designs of shapers, and the choice among them.
-
-What is to be cancelled, and what a design for it is worth: `bands`. The families, one row each: `registry`, with their
-`solvers`, `grid_search` (on a sample grid), `grid_designs` (exact there) and `robust` (within a limit over bands). The
-choice: `comparison` designs every family and recommends one by `ranking` in a `result`. For a conversion: `grid`
-chooses the block period and the shaper on it for a machine, `track` those that follow moving modes.
+"""Shapers: `bands` to cancel, families in `registry`, the choice in `comparison`, of a conversion in `grid`.
 
 Their names can be taken from here too, each loaded on first use.
 """

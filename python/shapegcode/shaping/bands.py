@@ -101,10 +101,7 @@ class ModeBand:
 
 
 def parse_mode_band(text: str, uncertainty: float = 0.0) -> ModeBand:
-    """A mode such as ``46``, ``46:0.02``, ``46:0.02±5%`` or ``46:0.02+-2.3Hz``: Hz, damping ratio, band.
-
-    A band that reaches further to one side, ``30:0.1-13%+19%``, is that of its middle: ``30.9:0.1±15.534%``.
-    """
+    """A mode such as ``46``, ``46:0.02±5%``, ``46:0.02+-2.3Hz``, or ``30:0.1-13%+19%`` as that of the band's middle."""
     match = _TEXT.fullmatch(text.strip())
     if match is None:
         raise ArgumentError(
@@ -307,9 +304,8 @@ class DesignOptions:
     period_s: float | None = None  # grid on which the impulses must lie, s; None: continuous times
     max_duration_s: float = 0.25  # longest shaper, s
     max_abs_sum: float = 10.0  # largest sum of the impulses' magnitudes
-    vibration_limit: float = (
-        VIBRATION_LIMIT  # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
-    )
+    # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
+    vibration_limit: float = VIBRATION_LIMIT
     taps: Shaper | None = None  # the shaper of the family `taps`; no other family uses it
 
     @property

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode._core import DesignError
+from shapegcode.io.arrays import FloatArray
 from shapegcode.shaping.bands import ModeBand
 
 # Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.
@@ -124,10 +125,7 @@ class LinearProgram:
 
 
 class TapProgram:
-    """Taps under equations and planes, of least cost; one unknown more is by how much the planes are exceeded.
-
-    Taps that may be negative are the difference of two that are not, so that their magnitude is linear.
-    """
+    """Taps of least cost under equations and planes; one unknown more is by how much the planes are exceeded."""
 
     def __init__(
         self, equal: tuple[FloatArray, FloatArray], *, signed: bool, largest: float = math.inf, last_tap: float = 0.0
@@ -202,7 +200,6 @@ def _over(matrix: FloatArray, right: FloatArray, used: NDArray[np.bool_]) -> Flo
     return x
 
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 SAME_RESIDUAL = 1e-3
 """Relative gap between the lower bound and the design at which the design counts as optimal."""
@@ -314,10 +311,7 @@ class TapProblem:
         self._rows = [[] for _ in self.bands]
 
     def least_worst(self, limit: float | None = None) -> Bounds | None:
-        """Taps with the least worst residual, or None if the equalities have no solution.
-
-        With a limit the search ends as soon as it is known on which side of it the optimum lies.
-        """
+        """Taps with the least worst residual, or None; with a limit the search ends once its side is known."""
         best = np.zeros(self.last + 1)
         lower, upper = 0.0, math.inf
         # far below what is asked for the program would be degenerate, and the solver may go round in circles
@@ -342,10 +336,7 @@ class TapProblem:
         )
 
     def cheapest(self, cost: FloatArray, limit: float) -> FloatArray | None:
-        """Taps of least cost whose residual stays below the limit (to `SAME_RESIDUAL`), or None.
-
-        The cost is that of the taps or, where they may be negative, of their magnitudes.
-        """
+        """Taps of least cost (of their magnitudes if signed) with a residual below the limit, or None."""
         for _ in range(_MOST_ROUNDS):
             found = self._solve(cost, limit)
             if found is None:

@@ -124,10 +124,7 @@ def choose_block_period(
 
 
 def robust_candidate(
-    bands: Sequence[ModeBand],
-    period_s: float,
-    max_duration_s: float = 0.25,
-    vibration_limit: float = VIBRATION_LIMIT,
+    bands: Sequence[ModeBand], period_s: float, max_duration_s: float = 0.25, vibration_limit: float = VIBRATION_LIMIT
 ) -> BlockPeriodCandidate:
     """What :func:`choose_block_period` would take on one given period."""
     check_modes_and_times(bands, period_s=period_s, max_duration_s=max_duration_s)
@@ -470,11 +467,7 @@ def override_vibration_um(
 
 
 def best_for_overrides(designs: Iterable[tuple[float, _core.Shaper]], machine: Machine, feed_mm_per_s: float) -> float:
-    """The block period with the best of both: a short shaper, and little vibration with another feed override.
-
-    What stays below `tolerance.residual_floor_um` counts as that. Above it twice the vibration weighs as much as a
-    shaper of twice the duration.
-    """
+    """The period of least duration times vibration at other overrides, which counts as the residual floor at least."""
     model = MachineModel(machine)
     floor_um = max(machine.tolerance.residual_floor_um, 1e-3)
 

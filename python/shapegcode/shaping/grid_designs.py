@@ -1,9 +1,6 @@
 """Exact shaper designs on a sample grid that need an optimiser.
 
-A shaper survives being written as blocks only if its taps lie on the block grid and its zeros are exact there
-(sum a_k z_i^-k = 0, z_i = e^(s_i T)). The shortest exact design is a polynomial
-(:func:`shapegcode._core.grid_polynomial`), but its taps may be wild; :func:`shortest_non_negative` spends a few more
-taps on a design that never reverses.
+The shortest, a polynomial, may have wild taps: :func:`shortest_non_negative` spends a few more and never reverses.
 """
 
 from __future__ import annotations
@@ -13,13 +10,11 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shapegcode._core import DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
+from shapegcode.io.arrays import FloatArray
 from shapegcode.shaping.bands import check_modes_and_times, mode_names, ms, whole_periods
 from shapegcode.shaping.cutting_planes import LinearProgram, non_negative_least_squares
-
-FloatArray = NDArray[np.float64]
 
 RESIDUAL_LIMIT = 1e-10
 """Largest residual ratio of a design that is handed out; the usual one is 1e-16 to 1e-15."""
@@ -98,10 +93,7 @@ def smallest_enough(
     is_enough: Callable[[int], bool], start: int, most: int, too_few: int = 0, *, growth: float = 2.0,
     precision: float = 0.0,
 ) -> int | None:  # fmt: skip
-    """The smallest number that is enough, by growing from a start and then halving; None: it exceeds `most`.
-
-    To a relative precision it may exceed the smallest.
-    """
+    """The smallest number that is enough, to a relative precision: growing, then halving; None: it exceeds `most`."""
     enough = min(most, start)
     while enough < most and not is_enough(enough):
         too_few, enough = enough, max(enough + 1, math.ceil(growth * enough))
@@ -130,11 +122,7 @@ def refined(columns: FloatArray, right: FloatArray, taps: FloatArray) -> FloatAr
 
 
 def _non_negative_solution(modes: Sequence[Mode], period_s: float, last: int) -> FloatArray | None:
-    """Taps at 0 ... `last` periods that satisfy every condition, or None.
-
-    Lawson and Hanson's active-set method answers to rounding, where a linear program answers to its
-    tolerance.
-    """
+    """Taps at 0 ... `last` periods that satisfy every condition to rounding, by Lawson and Hanson's method, or None."""
     matrix, right = exact_conditions(modes, period_s, last)
     taps = non_negative_least_squares(matrix, right)
     if taps is None:  # it went round in circles: the linear program decides

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shapegcode._core import (
     DesignError,
@@ -26,13 +25,13 @@ from shapegcode._core import (
     sensitivity_curve,
     worst_residual,
 )
+from shapegcode.io.arrays import FloatArray
 from shapegcode.shaping.bands import check_times, ms, whole_periods
 from shapegcode.shaping.cutting_planes import TapProgram
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, halved, refined
 
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _HINT_PERIODS = 400  # longest grid that a refusal searches, periods
-FloatArray = NDArray[np.float64]
 LIMIT_MARGIN = 1e-3
 """Share of a tolerated residual that the search leaves unused, so that it ends: the shortest is meant with it."""
 _SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # magnitudes above one of these are taps
@@ -199,10 +198,7 @@ class GridSearch:
         return [*sorted(centred, key=variance), *rest]
 
     def _centred(self, last: int, centre: float, seen: list[float]) -> list[FloatArray]:
-        """Taps of each step from a centre (periods) to a local minimum of the second central moment.
-
-        From a centre that an earlier search passed it continues as that search did.
-        """
+        """Taps of each step from a centre (periods) to a local minimum of the second moment, or to where one passed."""
         found: list[FloatArray] = []
         for _ in range(_CENTRINGS):
             if any(abs(centre - other) < _SAME_CENTRE * (last + 1) for other in seen):
@@ -217,10 +213,7 @@ class GridSearch:
         return found
 
     def _feasible(self, last: int) -> FloatArray | None:
-        """Taps at 0 ... `last` periods that meet the conditions, or None.
-
-        With limits: those whose largest ratio to its limit is smallest, until it is below 1 or proven not to be.
-        """
+        """Taps at 0 ... `last` periods that meet the conditions; None: proven not to be."""
         if self._conditions.limits:  # the planes found since say more
             return self._found_feasible(last)
         if last not in self._answers:
@@ -240,10 +233,7 @@ class GridSearch:
         return None
 
     def _best(self, last: int, centre: float) -> FloatArray | None:
-        """Taps that meet the conditions with the least second moment about `centre`, or None if none was found.
-
-        `centre` is in periods; taps that may be negative have the least sum of magnitudes instead.
-        """
+        """Taps of least second moment about `centre` (periods), signed ones of least sum of magnitudes, or None."""
         cost = ((np.arange(last + 1) - centre) / max(1, last)) ** 2
         for _ in range(_MOST_ROUNDS):
             found = self._program(last, cost)

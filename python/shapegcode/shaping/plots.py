@@ -7,10 +7,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shapegcode import _core
 from shapegcode._core import ArgumentError, MinimalBranches, Mode, Shaper, minimal_branches
+from shapegcode.io.arrays import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 from shapegcode.shaping.bands import Design, ModeBand, mode_band
@@ -27,7 +27,6 @@ _FREQUENCIES = 601
 _PERIODS_IN_DURATION = 2.0
 _SAMPLES_OF_A_STEP = 3000
 _SWINGS_SHOWN = 3.0  # of the slowest mode, behind the longest shaper
-FloatArray = NDArray[np.float64]
 Shapers = Recommendation | Shaper | Mapping[str, Shaper]
 
 
@@ -46,11 +45,7 @@ def plots_of(result: Recommendation) -> dict[str, Plot]:
 
 
 def selected(result: Recommendation) -> list[Design]:
-    """The designs worth a curve: what is recommended, then one of each family on the Pareto front, from short to long.
-
-    Where there is room, one of each other family. Designs with negative impulses are left out where they may not be
-    recommended and there are others.
-    """
+    """The designs worth a curve: what is recommended, then one of each family, those on the Pareto front first."""
     indices = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))
     negative = result.allow_negative or result.design.negative
     shown = [index for index in result.shown() if negative or not result.designs[index].negative]
@@ -314,7 +309,7 @@ def _branches(result: Recommendation) -> MinimalBranches | None:
     return branches if np.isfinite(branches.times_s).any() else None
 
 
-def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: Sequence[Mode]) -> NDArray[np.float64]:
+def residual_curve(shaper: Shaper, frequencies_hz: FloatArray, modes: Sequence[Mode]) -> FloatArray:
     """Residual ratio over frequency, with the damping ratios of the modes and between them what lies between."""
     known = sorted((mode.frequency_hz, mode.damping_ratio) for mode in modes) or [(0.0, 0.0)]
     damping = np.interp(frequencies_hz, [frequency for frequency, _ in known], [ratio for _, ratio in known])

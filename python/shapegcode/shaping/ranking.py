@@ -1,9 +1,4 @@
-"""How designs of shapers rank: Pareto front, objectives, the rule of the recommendation, and its reason in words.
-
-A design is worth a look (it is on the Pareto front) if no other one is at least as good in duration, worst residual
-over the bands, contour cost and sum of the taps' magnitudes, and better in one of them. Which of those to take is the
-user's objective; :func:`recommend` is the whole rule.
-"""
+"""How designs of shapers rank: Pareto front, objectives, the rule of the recommendation, and its reason in words."""
 
 from __future__ import annotations
 

@@ -183,11 +183,7 @@ def family_named(name: str) -> Family:
 
 
 def distinct(bands: Sequence[ModeBand]) -> list[ModeBand]:
-    """The bands without repetition: modes whose poles agree within 1e-9 count once, with the wider band.
-
-    Their order is that of their first appearance. Without this a family that works mode by mode would cancel the
-    same mode twice, at twice the duration.
-    """
+    """The bands, modes whose poles agree within 1e-9 once, with the wider band: no family shall cancel a mode twice."""
     kept: list[ModeBand] = []
     for band in bands:
         pole = band.mode.pole

@@ -250,15 +250,13 @@ def families_table() -> Table:
     columns = (
         Column("family", value="name", text=True),
         Column("what", value="title", text=True),
-        Column("times", value=_kinds_of_times, text=True),
+        Column(
+            "times", value=lambda row: ", ".join(["continuous"] * row.continuous + ["grid"] * row.on_grid), text=True
+        ),
         Column("valid for", value="validity", text=True),
         Column("source", text=True),
     )
     return Table("families of shapers", columns, FAMILIES, sections=range(len(FAMILIES)))
-
-
-def _kinds_of_times(row: Any) -> str:
-    return ", ".join(name for name, has in (("continuous", row.continuous), ("grid", row.on_grid)) if has)
 
 
 def times_name(period_s: float | None) -> str:

@@ -1,11 +1,6 @@
 """Robust shapers on a sample grid: the least worst residual over frequency bands, and the shortest one below a limit.
 
-A mode's frequency is never known exactly: an identification gives it with an interval, and it moves with the load. The
-designs here bound the residual ratio over a whole band of each mode, on the grid, so that they survive being written as
-blocks. What is best is proven: the cutting planes of :mod:`shapegcode.shaping.cutting_planes` give
-a bound that no other design can beat, and a sweep with a bound on what lies between its samples judges the taps.
-
-A mode without a band (uncertainty 0) is cancelled exactly at its frequency, as the plain grid designs do.
+What is best is proven, by `cutting_planes` and a sweep; a mode without a band (uncertainty 0) is cancelled exactly.
 """
 
 from __future__ import annotations
@@ -15,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
+from shapegcode.io.arrays import FloatArray
 from shapegcode.shaping.bands import (
     VIBRATION_LIMIT,
     ModeBand,
@@ -29,13 +24,7 @@ from shapegcode.shaping.bands import (
     proven_worst,
     whole_periods,
 )
-from shapegcode.shaping.cutting_planes import (
-    NO_RESIDUAL,
-    SAME_RESIDUAL,
-    Bounds,
-    CutPool,
-    TapProblem,
-)
+from shapegcode.shaping.cutting_planes import NO_RESIDUAL, SAME_RESIDUAL, Bounds, CutPool, TapProblem
 from shapegcode.shaping.grid_designs import (
     RESIDUAL_LIMIT,
     exact_conditions,
@@ -49,7 +38,6 @@ _LONGER = 4  # times the longest duration: how far a refusal looks for what woul
 _OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # of the refused one: what a refusal looks at
 _HINT_PRECISION = 0.05  # relative, of the duration that would do
 _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
-FloatArray = NDArray[np.float64]
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's round-off
 _GROWTH = 1.4  # of the number of periods while it is searched
 _WHOLE = 1e-3  # cycles per period from a whole number
@@ -245,10 +233,7 @@ class Task:
 
 
 def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cost: bool = True) -> RobustDesign | None:
-    """The shortest design whose worst residual is below the limit, or None.
-
-    Of that duration the one of least contour cost is taken, or, to save the time that takes, any one.
-    """
+    """The shortest design whose worst residual is below the limit, of least contour cost or any one, or None."""
     most = task.periods(max_duration_s)
     if not task.wide and task.max_abs_sum is None and not task.mirrored:
         return _exact(task, max_duration_s)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from shapegcode._core import (
     ArgumentError,
@@ -27,6 +26,7 @@ from shapegcode._core import (
     negative_zv,
     repeated_zv,
 )
+from shapegcode.io.arrays import FloatArray
 from shapegcode.shaping.bands import DesignOptions, ModeBand, mode_names, ms, on_grid
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, halved
 from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid
@@ -34,7 +34,6 @@ from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shor
 Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
 """All shapers of a family for some bands, the preferred one first."""
 _STEPS_PER_PERIOD = 64  # of the fastest frequency: time grid of the SI shaper at continuous times
-FloatArray = NDArray[np.float64]
 _PER_PERIOD = (40, 80, 160, 320)  # steps of the time grid in a period of the fastest mode
 _NEIGHBOURS = 2.5  # steps: taps closer than this are one tap between them
 _NEWTON_STEPS = 30
@@ -297,19 +296,14 @@ def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[Sha
     modes = [band.mode for band in bands]
     longest_s = min(options.max_duration_s, _MOST_PERIODS / max(mode.frequency_hz for mode in modes))
     usual_s = convolved_zv(modes).duration_s
+    boxes = {} if len(modes) <= _PROVEN_MODES else {"max_boxes": 0}
     for span in _SPANS:
-        found = _search(modes, min(span * usual_s, longest_s), options.max_abs_sum)
+        found = minimal_shapers(modes, min(span * usual_s, longest_s), max_abs_sum=options.max_abs_sum, **boxes)
         if found.shapers or found.max_duration_s >= longest_s:
             break
     if not found.shapers:
         raise DesignError(_none_found(modes, found))
     return sorted(found.shapers, key=lambda shaper: shaper.has_negative)
-
-
-def _search(modes: Sequence[Mode], max_duration_s: float, max_abs_sum: float) -> MinimalShapers:
-    if len(modes) <= _PROVEN_MODES:
-        return minimal_shapers(modes, max_duration_s, max_abs_sum=max_abs_sum)
-    return minimal_shapers(modes, max_duration_s, max_abs_sum=max_abs_sum, max_boxes=0)
 
 
 def _none_found(modes: Sequence[Mode], found: MinimalShapers) -> str:

@@ -1,9 +1,6 @@
-"""Shapers that follow modes along an axis: one design per node, shared linearly in between.
+"""Shapers that follow modes along an axis: one design per node, shared linearly in between (`_core.FollowingFir`).
 
-An increment of the command that begins between two nodes is split between their shapers
-(:class:`shapegcode._core.FollowingFir`). Of a mode that both cancel nothing is left; of one that moves, what the two
-leave at the frequency in between points in opposite directions, so that few nodes keep a small residual. All shapers
-of a track have the same mean delay where the grid permits it: then the speed along the path does not change either.
+All have the same mean delay where the grid permits it: then the speed along the path does not change either.
 """
 
 from __future__ import annotations
@@ -18,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
+from shapegcode.io.arrays import FloatArray
 from shapegcode.shaping.bands import check_times, whole_periods
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, Vertices, refined, shortest_non_negative
 
-FloatArray = NDArray[np.float64]
 _LOOKS = 16  # positions between two nodes at which the residual is looked at
 _SUPPORT = 1e-9  # amplitudes above this are taps
 _LONGER = 1.3  # how much longer shapers may become for a common mean delay
@@ -92,11 +89,7 @@ def design_track(
     most_nodes: int = 100,
     design: NodeDesign | None = None,
 ) -> ShaperTrack:
-    """Shapers along an axis that keep the residual of every mode below a limit, between the nodes as well.
-
-    Nodes are added in the middle of every interval in which a mode keeps more than the limit, at first where the
-    tables have their rows.
-    """
+    """Shapers along an axis that keep the residual of every mode below a limit, also halfway between the nodes."""
     low, high = span_mm
     if not modes:
         raise ArgumentError("a shaper needs at least one mode: 0 given")

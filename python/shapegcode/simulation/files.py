@@ -7,9 +7,9 @@ import shutil
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import BinaryIO
 
 import numpy as np
 
@@ -21,32 +21,27 @@ _COPY_BYTES = 1 << 20
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same motion gives the same bytes
 
 
-class MotionFile(Protocol):
-    """A file that a motion is written to."""
-
-    def write(self, chunk: Chunk) -> None:
-        """Append the rows of a chunk."""
+WriteMotion = Callable[[Chunk], None]
+"""Appends the rows of a chunk to a file."""
 
 
-class _Csv:
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = stream
-        self._has_head = False
+def _csv(stream: BinaryIO) -> WriteMotion:
+    has_head = False
 
-    def write(self, chunk: Chunk) -> None:
+    def write(chunk: Chunk) -> None:
+        nonlocal has_head
         columns = chunk.columns()
-        if not self._has_head:
-            self._has_head = True
-            self._stream.write((",".join(["kind", *columns]) + "\n").encode())
+        if not has_head:
+            has_head = True
+            stream.write((",".join(["kind", *columns]) + "\n").encode())
         table = np.column_stack([column.astype(np.float64) for column in columns.values()])
-        self._stream.write(_core.csv_rows(chunk.kind, KINDS, table))
+        stream.write(_core.csv_rows(chunk.kind, KINDS, table))
+
+    return write
 
 
 class _Npz:
-    """One temporary file per column; the archive is put together from them at the end.
-
-    A ZIP archive holds its members one after the other, but the columns come side by side.
-    """
+    """One temporary file per column, put together at the end: an archive holds them one after the other."""
 
     def __init__(self, folder: Path | None, files: contextlib.ExitStack) -> None:
         self._folder = folder
@@ -88,28 +83,22 @@ def _header(stream: object, dtype: np.dtype[np.generic], shape: tuple[int, ...])
 
 
 @contextlib.contextmanager
-def csv_file(path: str | Path) -> Iterator[MotionFile]:
-    """A CSV file with the names of its columns in the first line; ``-`` is standard output.
-
-    Columns: `kind` in words, then those of `Chunk.columns`; numbers as the shortest text that reads back the same.
-    """
+def csv_file(path: str | Path) -> Iterator[WriteMotion]:
+    """A CSV file of `kind` and `Chunk.columns`, their names first, shortest numbers; ``-`` is standard output."""
     if path == "-":
-        yield _Csv(sys.stdout.buffer)
+        yield _csv(sys.stdout.buffer)
         sys.stdout.buffer.flush()
         return
     with named_errors(path), replaced_file(path) as stream:
-        yield _Csv(stream)
+        yield _csv(stream)
 
 
 @contextlib.contextmanager
-def npz_file(path: str | Path) -> Iterator[MotionFile]:
-    """A NumPy archive with one array per column: those of `Chunk.columns`, `kind` and what its numbers mean.
-
-    Until it is complete its columns take as much room again in the same folder.
-    """
+def npz_file(path: str | Path) -> Iterator[WriteMotion]:
+    """A NumPy archive of `Chunk.columns`, `kind` and its names; it takes twice the room in its folder meanwhile."""
     target = Path(path).resolve()
     with named_errors(path), contextlib.ExitStack() as files, replaced_file(path) as stream:
         # Beside the file, where there is room for it; not beside a device.
         npz = _Npz(target.parent if target.is_file() or not target.exists() else None, files)
-        yield npz
+        yield npz.write
         npz.finish(stream)

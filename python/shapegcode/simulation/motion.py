@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from shapegcode.io.arrays import FloatArray
 from shapegcode.model.stream import Chunk
 from shapegcode.results.result import Xyz
 from shapegcode.simulation.result import Motion
-
-FloatArray = npt.NDArray[np.float64]
 
 _BUCKETS = 4000
 
@@ -39,27 +37,19 @@ class MotionEnvelope:
 
     def _merge(self) -> None:
         """Pairs of stretches become one; an odd last one goes back to the samples that wait."""
-        assert self._low is not None
-        assert self._high is not None
-        assert self._rest is not None
+        assert self._low is not None and self._high is not None and self._rest is not None
         pairs = len(self._low) // 2
         if len(self._low) % 2:
             # Its two extremes stand for it until its stretch is full.
-            self._rest = np.concatenate([self._padded(self._low[-1], self._high[-1]), self._rest])
+            extremes = np.repeat(self._low[-1:], self.samples_per_bucket, axis=0)
+            extremes[-1] = self._high[-1]
+            self._rest = np.concatenate([extremes, self._rest])
         self._low = self._low[: 2 * pairs].reshape(pairs, 2, self._low.shape[1]).min(axis=1)
         self._high = self._high[: 2 * pairs].reshape(pairs, 2, self._high.shape[1]).max(axis=1)
         self.samples_per_bucket *= 2
 
-    def _padded(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        rows = np.repeat(low[None, :], self.samples_per_bucket, axis=0)
-        rows[-1] = high
-        return rows
-
     def result(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Middle of each stretch in samples since the first, (n,); least and largest values, (n, curves).
-
-        The two are the same where every sample has a stretch of its own.
-        """
+        """Middle of each stretch in samples since the first, (n,); least and largest values, (n, curves)."""
         if self._low is None or self._high is None or self._rest is None:
             raise ValueError("no sample: an envelope needs one or more")
         low, high = self._low, self._high

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from shapegcode.io.arrays import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.path_plots import RECORD_SAMPLES, SimulatedRegion, motion_pictures
 from shapegcode.results.result import Plot
@@ -17,7 +17,6 @@ from shapegcode.simulation.result import Motion, Simulation
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = npt.NDArray[np.float64]
 
 _COMMAND, _RESPONSE = plot.COLOURS[1], plot.COLOURS[0]
 _MOVES_MM = 1e-9
@@ -88,10 +87,7 @@ def plot_motion(motion: Motion, ax: Axes | None = None) -> Axes:
 
 
 def _band(panel: Axes, times: FloatArray, low: FloatArray, high: FloatArray, colour: str, name: str) -> None:
-    """A curve, or the band that it fills where a stretch of time holds several samples.
-
-    A band that is wide against the picture holds many cycles: it is light, so that it does not pass for a solid.
-    """
+    """A curve, or the band of several samples; a wide one is light, so that it does not pass for a solid."""
     width = high - low
     tall = float(high.max() - low.min())
     dense = tall > 0 and float(np.median(width)) > _DENSE * tall

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.figures import CONTOURS, ContourError, Tracks
 from shapegcode.results.json import hidden, sparse
@@ -22,7 +20,6 @@ from shapegcode.verdict.figures import ProgramFigures
 if TYPE_CHECKING:
     from shapegcode.results.page.model import Figure
 
-FloatArray = npt.NDArray[np.float64]
 
 # With a feed drive what is left between command and table is vibration and the lag of the servo loop.
 _LEAST_SHOWN_UM = 0.005
@@ -277,28 +274,27 @@ class Simulation(Result):
         return [*regions, *([self.motion.table()] if self.motion is not None else [])]
 
     def _vibration_table(self) -> Table:
-        residual, peak = _NAMES[self.plant]
-        rows: list[tuple[str, Callable[[str], str]]] = [
-            (f"{residual} µm", lambda axis: f"{self.residual_vibration_um[axis]:.2f}"),
-            (f"{peak} µm", lambda axis: f"{self.peak_vibration_um[axis]:.2f}"),
-        ]
-        if self.of_shaped is not None and self.of_shaped.regions < len(self.regions):
-            part, name = self.of_shaped, f"{self.of_shaped.regions} shaped regions alone"
-            rows += [
-                (f"{residual} µm, {name}", lambda axis: f"{part.residual_vibration_um[axis]:.2f}"),
-                (f"{peak} µm, {name}", lambda axis: f"{part.peak_vibration_um[axis]:.2f}"),
-            ]
+        rows: list[tuple[str, Xyz[str]]] = []
+        for figures, of in self._parts():
+            for name, largest in zip(
+                _NAMES[self.plant], (figures.residual_vibration_um, figures.peak_vibration_um), strict=True
+            ):
+                rows.append((f"{name} µm{of}", Xyz(*(f"{value:.2f}" for value in largest))))
         if self.settling_band_um > 0.0:
-            rows.append((f"settling to ±{self.settling_band_um:g} µm, ms", self._settling))
+            over = f"over {self.settling_limit_s * 1e3:.0f}"
+            times = (over if time_s is None else f"{time_s * 1e3:.0f}" for time_s in self.settling_time_s)
+            rows.append((f"settling to ±{self.settling_band_um:g} µm, ms", Xyz(*times)))
         columns = (
             Column("cutting regions, each from rest to rest", value=lambda row: row[0], text=True),
-            *xyz_columns(lambda axis, row: row[1](axis)),
+            *xyz_columns(lambda axis, row: row[1][axis]),
         )
         return Table("", columns, rows)
 
-    def _settling(self, axis: str) -> str:
-        time_s = self.settling_time_s[axis]
-        return f"over {self.settling_limit_s * 1e3:.0f}" if time_s is None else f"{time_s * 1e3:.0f}"
+    def _parts(self) -> Iterator[tuple[Simulation | ShapedFigures, str]]:
+        """The figures of all regions, and of the shaped ones where others are beside them."""
+        yield self, ""
+        if self.of_shaped is not None and self.of_shaped.regions < len(self.regions):
+            yield self.of_shaped, f", {self.of_shaped.regions} shaped regions alone"
 
     @property
     def _path_name(self) -> str:
@@ -308,15 +304,11 @@ class Simulation(Result):
 
     def _contour_table(self) -> Table:
         rows: list[tuple[str, str, str]] = []
-        for track, name in CONTOURS.items():
-            error = getattr(self.contour_error_um, track)
-            rows.append((f"{name} µm", f"{error.max:.2f}", f"{error.rms:.2f}"))
-        orbits = {"command": self.orbit_error_percent, "table": self.response_orbit_error_percent}
-        if self.of_shaped is not None and self.of_shaped.regions < len(self.regions):
+        for figures, of in self._parts():
             for track, name in CONTOURS.items():
-                error = getattr(self.of_shaped.contour_error_um, track)
-                shown = f"{name} µm, {self.of_shaped.regions} shaped regions alone"
-                rows.append((shown, f"{error.max:.2f}", f"{error.rms:.2f}"))
+                error = getattr(figures.contour_error_um, track)
+                rows.append((f"{name} µm{of}", f"{error.max:.2f}", f"{error.rms:.2f}"))
+        orbits = {"command": self.orbit_error_percent, "table": self.response_orbit_error_percent}
         rows += [(f"orbit error of the {name} %", f"{max(of):.4f}", "") for name, of in orbits.items() if of]
         columns = (
             Column(f"cutting regions, against {self._path_name}", value=lambda row: row[0], text=True),

@@ -72,7 +72,9 @@ def simulate(
     machine = Machine.of(machine)
     program = given_program(program, machine)
     model, band_um = MachineModel(machine), machine.tolerance.residual_floor_um
-    limit_s = _rest_s(model, plant)
+    limit_s = _DRIVE_REST_S
+    if plant == "modal":
+        limit_s = min(max(model.vibration_memory_s, _SHORTEST_REST_S), _LONGEST_REST_S)
     nominal, verdict = {}, None
     if against is not None:
         against = given_program(against, machine)
@@ -109,7 +111,7 @@ def simulate(
         simulated += figures
         of_shaped += figures if as_shaped and not region.was_rapid else []
         on_progress(done, len(program.regions))
-    own = [run.figures for run in runs]
+    own, cuts = [run.figures for run in runs], [run for run in runs if run.shaped and not run.was_rapid]
     cutting_s = math.fsum(run.time_s for run in runs)
     warnings = [*program.warnings, *machine_warnings(machine), *region_range_warnings(program.regions, machine)]
     if shaped is None:
@@ -128,7 +130,9 @@ def simulate(
         settling_limit_s=limit_s,
         orbit_error_percent=tuple(error for figures in own for error in figures.orbit_error_percent),
         response_orbit_error_percent=tuple(error for figures in own for error in figures.response_orbit_error_percent),
-        of_shaped=_shaped_figures([run for run in runs if run.shaped and not run.was_rapid], of_shaped),
+        of_shaped=ShapedFigures(len(cuts), math.fsum(run.time_s for run in cuts), **_largest(of_shaped))
+        if cuts
+        else None,
         verdict=verdict,
         regions=tuple(runs),
         warnings=tuple(warnings),
@@ -185,24 +189,14 @@ def simulate_motion(
         ]
         for chunk in chunks:
             recorder.add(chunk)
-            for file in written:
-                file.write(chunk.every(every))
+            for write in written:
+                write(chunk.every(every))
             on_progress(float(chunk.time_s[-1]) / whole_s)
         if not recorder.samples:
             first, last = lines or (1, program.core.line_count)
             raise _core.ArgumentError(f"lines {first}-{last}: nothing happens there: name other lines")
     names = {name: None if file is None else str(file) for name, file in (("csv", csv), ("npz", npz))}
     return recorder.result(program.source, lines=lines, every=every, **names)
-
-
-def _shaped_figures(runs: Sequence[RegionRun], simulated: Sequence[_core.SimulationFigures]) -> ShapedFigures | None:
-    if not runs:
-        return None
-    return ShapedFigures(
-        regions=len(runs),
-        cutting_time_s=math.fsum(run.time_s for run in runs),
-        **_largest(simulated),
-    )
 
 
 def _largest(simulated: Sequence[_core.SimulationFigures]) -> dict[str, Any]:
@@ -235,12 +229,6 @@ def _play(
     options.settling_band_mm = band_um * 1e-3
     options.settling_limit_s = limit_s
     return model.simulated(shaped=shaped).simulate(blocks, options, against=path, block_end=block_end)
-
-
-def _rest_s(model: MachineModel, plant: str) -> float:
-    if plant != "modal":
-        return _DRIVE_REST_S
-    return min(max(model.vibration_memory_s, _SHORTEST_REST_S), _LONGEST_REST_S)
 
 
 def _settling_s(simulated: Iterable[_core.SimulationFigures], band_um: float) -> Xyz[float | None]:

@@ -1,9 +1,6 @@
 """The shortest program that stays within tolerance as likely as asked: block period, family, tolerance, feed on arcs.
 
-SciPy is there anyway, and the choices are few and discrete. So all of them are converted where they are not too many,
-and the shortest is taken that is likely enough: that is exact, and the same every time. Where there are more, SciPy's
-differential evolution over their ranks says which ones are converted. Optuna would be one more package, to save
-conversions that take a tenth of a second each.
+All choices are converted where they are not too many; else SciPy's differential evolution says which ones.
 """
 
 from __future__ import annotations
@@ -16,9 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, DesignError, MachineError
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.program import Program
@@ -145,13 +142,10 @@ class _Choosing:
         self._replays: dict[Ranks, Replay] = {}
         self.candidates: dict[Ranks, Candidate] = {}
 
-    def _values(self, ranks: Ranks) -> dict[str, object]:
-        return {key: values[rank] for (key, values), rank in zip(self._choices.items(), ranks, strict=True)}
-
     def converted(self, ranks: Ranks) -> Candidate:
         """A candidate with its time."""
         if ranks not in self.candidates:
-            values = self._values(ranks)
+            values = {key: listed[rank] for (key, listed), rank in zip(self._choices.items(), ranks, strict=True)}
             chosen = tuple(ChosenValue(key, toml(value)) for key, value in values.items())
             try:
                 machine = sampled_machine(self._machine, values, "choose")
@@ -259,7 +253,7 @@ def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float
         return
     known: dict[Ranks, float] = {}
 
-    def asked(point: npt.NDArray[np.float64]) -> float:
+    def asked(point: FloatArray) -> float:
         ranks = tuple(round(each) for each in point)
         if ranks not in known:
             if len(known) >= most:

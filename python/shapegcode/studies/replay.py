@@ -143,14 +143,12 @@ class Replay:
             for name, value in self._of_region(part, model, wanted, override).items():
                 found[name] = found[name] + value if name == "cutting_time_s" else max(found[name], value)
         if "time_s" in found:
-            changed = times or override != _FULL
-            found["time_s"] = self._cycle_time_s(model, override) if changed else self.time_s
+            found["time_s"] = self.time_s
+            if times or override != _FULL:
+                controller = model.ordinary.model
+                controller.feed_override = override
+                found["time_s"] = float(_core.time_program(self._emitted.core, controller).total_s) + self._beyond_s
         return found
-
-    def _cycle_time_s(self, model: MachineModel, override: float) -> float:
-        controller = model.ordinary.model
-        controller.feed_override = override
-        return float(_core.time_program(self._emitted.core, controller).total_s) + self._beyond_s
 
     def _of_region(
         self, part: _SimulatedPart, model: MachineModel, wanted: Collection[str], override: float

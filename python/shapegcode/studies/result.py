@@ -332,8 +332,9 @@ class MachineStudy(Result):
         if not self.draws:
             raise NotKeptError("the draws of a study are not in its JSON: run it again, or keep --csv")
         keys = {each.key for each in self.varied}
+        units = {each.key: each.unit for each in self.varied} | {each.name: each.unit for each in self.quantities}
         found = {
-            name: xr.DataArray(values, dims=["draw"], attrs={"units": self._unit(name)})
+            name: xr.DataArray(values, dims=["draw"], attrs={"units": units.get(name, "")})
             for name, values in self.draws.items()
         }
         return xr.Dataset(
@@ -341,10 +342,6 @@ class MachineStudy(Result):
             coords={name: array for name, array in found.items() if name in keys} | {"draw": np.arange(1, self.n + 1)},
             attrs=about,
         )
-
-    def _unit(self, name: str) -> str:
-        known = {each.key: each.unit for each in self.varied} | {each.name: each.unit for each in self.quantities}
-        return known.get(name, "")
 
     def csv_lines(self) -> Iterator[str]:
         """One line for each draw.

@@ -316,12 +316,7 @@ def _bin(at: float, name: str, values: FloatArray) -> BinQuantiles:
 
 
 def decides(
-    varied: Sequence[Varied],
-    columns: Sequence[Sequence[object]],
-    shares: FloatArray,
-    *,
-    indices: bool,
-    seed: int,
+    varied: Sequence[Varied], columns: Sequence[Sequence[object]], shares: FloatArray, *, indices: bool, seed: int
 ) -> tuple[Decides, ...]:
     """Which value moves the share of the limit most."""
     found = _indices(varied, shares, seed) if indices else {}

@@ -27,17 +27,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, Strict, model_validator
 from shapegcode.errors import ArgumentError, FileError, Problem
 from shapegcode.machine import Machine
 from shapegcode.settings.describe import keys_schema, toml_schema
-from shapegcode.settings.keys import (
-    Bool,
-    Float,
-    InlineTable,
-    Positive,
-    Text,
-    TomlTable,
-    item_type,
-    key,
-    table_type,
-)
+from shapegcode.settings.keys import Bool, Float, InlineTable, Positive, Text, TomlTable, item_type, key, table_type
 from shapegcode.settings.load import KeyProblem, parsed, read_text, validated
 from shapegcode.studies.optimize import USUAL_CONVERSIONS, USUAL_DRAWS
 from shapegcode.studies.replay import DEFAULT_MEASURES, MEASURES

@@ -1,7 +1,6 @@
 """Which values are varied: what each is sampled from, and whether the converter knows of it.
 
-A program is converted for the machine file. What is varied then is the machine on which it is simulated: its modes,
-drives, filters, times. A value that only the converter reads, such as `shaping.family`, needs another program.
+What only the converter reads needs another program; all else is of the machine on which the program is simulated.
 """
 
 from __future__ import annotations
@@ -18,11 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, MachineError, Problem
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.settings.keys import toml
 from shapegcode.settings.load import missing_row
 
-Unit = npt.NDArray[np.float64]
+Unit = FloatArray
 
 
 @dataclass(frozen=True)
@@ -266,7 +266,7 @@ def sampled_columns(varied: Sequence[Varied], n: int, sampling: str, seed: int, 
     return [each.distribution.at(column) for each, column in zip(varied, shares.T, strict=True)]
 
 
-def _sequence(dimensions: int, n: int, sampling: str, seed: int) -> npt.NDArray[np.float64]:
+def _sequence(dimensions: int, n: int, sampling: str, seed: int) -> FloatArray:
     from scipy.stats import qmc
 
     if sampling == "lhs":
@@ -301,7 +301,7 @@ def index_problem(varied: Sequence[Varied]) -> dict[str, Any]:
     return {"num_vars": count, "names": [each.key for each in varied], "bounds": [[0.0, 1.0]] * count}
 
 
-def _saltelli(varied: Sequence[Varied], n: int, seed: int) -> npt.NDArray[np.float64]:
+def _saltelli(varied: Sequence[Varied], n: int, seed: int) -> FloatArray:
     try:
         from SALib.sample import sobol
     except ModuleNotFoundError as error:

@@ -1,7 +1,6 @@
 """Operating conditions: what a controller, its operator and a drifting machine may do to an emitted program.
 
-Each case varies one thing around the program as it is meant to run, and a few stand for the corners of the band that
-the machine file states (table `[verdict]`). The cases inside the band decide; the others are shown.
+Those inside the band that the machine file states (table `[verdict]`) decide; the others are shown.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.machine.planners import PLANNER_NAMES
 from shapegcode.model.machine_model import MachineModel
@@ -25,7 +24,6 @@ from shapegcode.results.figures import Deviation
 from shapegcode.results.table import NO_BREAK, Column, Table
 from shapegcode.verdict.figures import CaseVerdict
 
-Vector = npt.NDArray[np.float64]
 Target = Literal["command", "response"]
 
 ALL_MODES = "all"
@@ -53,10 +51,7 @@ class Case:
         return self.override == 1.0 and self.mode is None and not self.look_ahead and self.starved_s == 0.0
 
     def needs_contour(self, target: Target) -> bool:
-        """Whether the contour has to be measured in this very case.
-
-        A mode that is off changes nothing of the command, and where it is only shown the residual is enough.
-        """
+        """Whether the contour has to be measured in this case: a mode that is off changes nothing of the command."""
         if self.mode is None:
             return True
         return self.counts and (self.override != 1.0 or target == "response")
@@ -66,7 +61,7 @@ class Case:
 class CaseFigures:
     """One region simulated in one operating condition."""
 
-    residual_mm: Vector  # largest |table - command| while the set-points rest, (3,)
+    residual_mm: FloatArray  # largest |table - command| while the set-points rest, (3,)
     command: Deviation | None  # deviation of the command; None: not measured
     response: Deviation | None  # deviation of the table; None: not measured
     time_s: float  # until the set-points rest
@@ -76,7 +71,7 @@ class CaseFigures:
 class RegionLimits:
     """What a region is judged by."""
 
-    residual_um: Vector  # per axis, (3,)
+    residual_um: FloatArray  # per axis, (3,)
     contour_um: float  # of the targeted deviation
     target: Target = "command"  # which deviation: of the command, or of the table (response)
 

@@ -205,11 +205,8 @@ class CaseVerdict:
 def worst_counted(cases: Sequence[CaseVerdict]) -> CaseVerdict | None:
     """The case that decides: of those that count the one with the largest share of a limit; None without cases."""
     counted = [case for case in cases if case.counts]
-    return max(counted, key=_share, default=None)
-
-
-def _share(case: CaseVerdict) -> float:
-    return math.inf if case.share_of_limit is None else case.share_of_limit
+    shares = [math.inf if case.share_of_limit is None else case.share_of_limit for case in counted]
+    return counted[shares.index(max(shares))] if counted else None
 
 
 @dataclass(frozen=True)
@@ -329,7 +326,4 @@ class ProgramFigures:
     def region_time_s(self) -> Pair[float]:
         """All cuts together, until the set-points rest."""
         cuts = self.all_cuts
-        return Pair(
-            math.fsum(cut.time_s.original for cut in cuts),
-            math.fsum(cut.time_s.emitted for cut in cuts),
-        )
+        return Pair(math.fsum(cut.time_s.original for cut in cuts), math.fsum(cut.time_s.emitted for cut in cuts))

@@ -11,10 +11,10 @@ from itertools import count
 from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import RoundTripError
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm, written_increment_mm
@@ -166,10 +166,7 @@ class Judge:
         return results
 
     def contour_um(self, figures: RegionFigures, *, turned: bool = True) -> float:
-        """Largest deviation from the path of what the contour tolerance is about, over the cases that count, µm.
-
-        Without those that a lower feed is no remedy for: look-ahead left on, a buffer underrun.
-        """
+        """Largest deviation that the tolerance is about, µm, over the cases that count and a lower feed can cure."""
         deviations = [
             simulated.command if self.target == "command" else simulated.response
             for case, simulated in zip(self.cases, figures.cases, strict=True)
@@ -198,21 +195,17 @@ class Judge:
     ) -> ProgramFigures:
         """The figures of all cuts; see `verdicts`."""
         emitted = [run for region in figures for run in region.emitted]
-        originals = [region.original for region in figures]
+        both = [region.original for region in figures], emitted
         side = self._machine.input.material_side
         cases = self._case_verdicts(figures, placed)
         excesses = [region.feed_excess for region in figures if region.feed_excess is not None]
         verdicts = self.verdicts(figures, placed, block_period_s)
         return ProgramFigures(
-            residual_vibration_um=Pair(
-                largest_xyz_um(run.residual_mm for run in originals), largest_xyz_um(run.residual_mm for run in emitted)
-            ),
-            peak_vibration_um=Pair(
-                largest_xyz_um(run.peak_mm for run in originals), largest_xyz_um(run.peak_mm for run in emitted)
-            ),
+            residual_vibration_um=Pair(*(largest_xyz_um(run.residual_mm for run in runs) for runs in both)),
+            peak_vibration_um=Pair(*(largest_xyz_um(run.peak_mm for run in runs) for runs in both)),
             contour_error_um=Tracks(
-                Pair(*(ContourError.of((run.command for run in runs), side) for runs in (originals, emitted))),
-                Pair(*(ContourError.of((run.response for run in runs), side) for runs in (originals, emitted))),
+                Pair(*(ContourError.of((run.command for run in runs), side) for runs in both)),
+                Pair(*(ContourError.of((run.response for run in runs), side) for runs in both)),
             ),
             rapid_vibration_um=rapid_vibration_um,
             orbit_error_percent=tuple(
@@ -299,8 +292,7 @@ class Judge:
                 if (found := region.cases[rank]) is not None
             ]
             if rows:
-                simulated, within, lines = [row[0] for row in rows], [row[1] for row in rows], [row[2] for row in rows]
-                verdict = case_verdict(case, simulated, within, lines, side)
+                verdict = _case_verdict(case, rows, side)
                 verdicts.append(verdict if len(rows) == len(figures) else replace(verdict, time_s=None))
         return tuple(verdicts)
 
@@ -311,20 +303,13 @@ def residual_floor_um(region: _core.Region, machine: Machine) -> float:
     return max(machine.tolerance.residual_floor_um, machine.tolerance.residual_floor_increments * increment_um)
 
 
-def case_verdict(
-    case: Case,
-    simulated: Sequence[CaseFigures],
-    limits: Sequence[RegionLimits],
-    lines: Sequence[tuple[int, int]],
-    material_side: str | None,
+def _case_verdict(
+    case: Case, rows: Sequence[tuple[CaseFigures, RegionLimits, tuple[int, int]]], material_side: str | None
 ) -> CaseVerdict:
     """All regions in one case."""
-    checks = [
-        (each, where)
-        for where, run, limit in zip(lines, simulated, limits, strict=True)
-        for each in judge_region(run, limit)
-    ]
+    checks = [(each, where) for run, limit, where in rows for each in judge_region(run, limit)]
     worst, where = max(checks, key=lambda pair: pair[0].share)
+    simulated = [run for run, _, _ in rows]
     tracks = _largest(run.command for run in simulated), _largest(run.response for run in simulated)
     sides: dict[str, Tracks[float | None]] = {}
     if material_side is not None:
@@ -378,7 +363,6 @@ def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list
 
 
 T = TypeVar("T")
-Vector = npt.NDArray[np.float64]
 
 
 def judge_program(
@@ -449,7 +433,7 @@ def simulate_unchanged(
 
 def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
     """Vibration that rapids leave where a cut follows: maximum of |table - command| once their set-points rest."""
-    found: dict[tuple[float, ...], Vector] = {}
+    found: dict[tuple[float, ...], FloatArray] = {}
     for start_mm, end_mm in _rapids_before_cuts(program):
         key = tuple(np.round(end_mm - start_mm, 9))
         if key not in found:
@@ -463,7 +447,7 @@ def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
     return largest_xyz_um([*found.values(), *shaped])
 
 
-def _rapids_before_cuts(program: Program) -> Iterator[tuple[Vector, Vector]]:
+def _rapids_before_cuts(program: Program) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Start and end of every rapid that nothing but functions and dwells lies between it and a cut."""
     moves = program.core.other_moves
     last: _core.Segment | None = None

@@ -8,15 +8,14 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.whole_text import why_off_grid
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program
 
 MOVE = _core.StepKind.move
-Vector = npt.NDArray[np.float64]
 
 CANNED_CYCLE = "drilling cycle"
 COMPENSATION = "cutter compensation"
@@ -44,14 +43,14 @@ class Rapid:
     """One rapid of a text."""
 
     line: int  # in the text, from 1
-    start_mm: Vector  # where it starts, (3,), as far as it is known
-    end_mm: Vector  # where it ends, (3,)
+    start_mm: FloatArray  # where it starts, (3,), as far as it is known
+    end_mm: FloatArray  # where it ends, (3,)
     region: _core.Region | None  # the move as something that can be written; None: it must stay
     reason: str  # why it must stay
     head: str  # its N word and its comments, empty if it has none
 
     @property
-    def travel_mm(self) -> Vector:
+    def travel_mm(self) -> FloatArray:
         """Signed travel of each axis, (3,)."""
         return np.asarray(self.end_mm - self.start_mm)
 
@@ -189,7 +188,7 @@ class _Reader:
             return NEW_STATE
         return ""
 
-    def _feed_mm_per_s(self, travel_mm: Vector, units: int) -> float:
+    def _feed_mm_per_s(self, travel_mm: FloatArray, units: int) -> float:
         """Largest cutting feed along a travel, a whole F word: of each axis for itself, of the fastest tangentially."""
         share = np.abs(travel_mm) / np.linalg.norm(travel_mm)
         moved = share > 0.0

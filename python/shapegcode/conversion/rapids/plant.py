@@ -9,11 +9,11 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.rapids.candidates import Gap, Rapid
 from shapegcode.conversion.write import EmittedRegion
+from shapegcode.io.arrays import FloatArray
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import NO_OFFSET
 from shapegcode.verdict.figures import RegionVerdict
@@ -114,8 +114,6 @@ class OpenGap:
 _LONGEST_WAIT_S = 30.0  # a vibration that takes longer counts as settled then: nobody waits so long
 _LAG_MEMORY = 20.0  # time constants of the servo loop beyond which the past does not count
 
-Vector = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Timing:
@@ -124,7 +122,7 @@ class Timing:
     motion_s: float  # until the set-points rest, s
     arrival_s: float  # wait for in-position behind them, s
     settling_s: float  # from the end of the set-points until the table stays within the band, s
-    command_mm: Vector  # set-points, one per period, (n, 3); a pause has one
+    command_mm: FloatArray  # set-points, one per period, (n, 3); a pause has one
 
     @property
     def clock_s(self) -> float:
@@ -138,7 +136,7 @@ class Timing:
 
 
 def settling_time_s(
-    command_mm: Vector, options: _core.SimulationOptions, slowest_per_s: float, band_mm: float
+    command_mm: FloatArray, options: _core.SimulationOptions, slowest_per_s: float, band_mm: float
 ) -> float:
     """Time from the end of a command until the table stays within a band around it, s; at most 30 s."""
     still = _core.Path([_core.Segment.line(command_mm[0], command_mm[0], 1.0)])
@@ -180,14 +178,9 @@ class RapidPlant:
         if not self._moving and key in self._known:
             return self._known[key]
         samples = _core.rapid_samples(rapid.start_mm, rapid.end_mm, self.model)
-        timing = Timing(
-            _core.rapid_time_s(travel, self.model),
-            _core.in_position_wait_s(travel, self.model),
-            self._settling_s(samples, rapid.region),
-            samples,
-        )
-        self._known[key] = timing
-        return timing
+        motion_s, arrival_s = _core.rapid_time_s(travel, self.model), _core.in_position_wait_s(travel, self.model)
+        self._known[key] = Timing(motion_s, arrival_s, self._settling_s(samples, rapid.region), samples)
+        return self._known[key]
 
     def simulate_original(self, rapid: Rapid) -> _core.SimulationFigures:
         """The rapid's figures beside which those of the replacement stand."""
@@ -198,23 +191,18 @@ class RapidPlant:
         period = self.model.period_s
         offset = self._machine_model.offset(region)
         runs = []
+        filter_periods = math.ceil(self._machine_model.shaped_filter.duration_s / period) + 1
+        least = 2 + math.ceil(2.0 * blocks.programmed_time_s / period) + filter_periods
         for rule in self._machine_model.block_rules:
-            least = 2 + math.ceil(2.0 * blocks.programmed_time_s / period) + self._filter_periods()
             figures = self._machine_model.simulate_emitted(
                 blocks, region.path, rule, contour=False, record_samples=least, offset=offset
             )
             count = round(figures.duration_s / period) + 1
             command = np.array(figures.recorded_command[:count])
-            settling = self._settling_s(command, region)
             still = np.repeat(command[:1], round(stops_s / period), axis=0)
-            runs.append(
-                Timing(
-                    len(still) * period + figures.duration_s,
-                    self._arrival_s(command),
-                    settling,
-                    np.concatenate([still, command]),
-                )
-            )
+            motion_s, arrival_s = len(still) * period + figures.duration_s, self._arrival_s(command)
+            settling_s = self._settling_s(command, region)
+            runs.append(Timing(motion_s, arrival_s, settling_s, np.concatenate([still, command])))
         return max(runs, key=lambda run: run.settled_s)
 
     def pause(self, seconds: float) -> Timing:
@@ -225,7 +213,7 @@ class RapidPlant:
         """Time of steps one after the other until the table has settled behind all of them together, s."""
         period = self.model.period_s
         clock_s = math.fsum(step.clock_s for step in steps)
-        parts: list[Vector] = []
+        parts: list[FloatArray] = []
         end = next((step.command_mm[-1] for step in reversed(steps) if len(step.command_mm) > 1), np.zeros(3))
         after_s = 0.0
         for step in reversed(steps):
@@ -243,17 +231,14 @@ class RapidPlant:
         still_s = (len(command) - 1 - (moves[-1] + 1 if len(moves) else 0)) * period
         return clock_s + max(0.0, settling_s - still_s)
 
-    def _filter_periods(self) -> int:
-        return math.ceil(self._machine_model.shaped_filter.duration_s / self.model.period_s) + 1
-
     def _options(self, region: _core.Region | None) -> _core.SimulationOptions:
         return self._machine_model.options(offset=NO_OFFSET if region is None else self._machine_model.offset(region))
 
-    def _settling_s(self, command_mm: Vector, region: _core.Region | None) -> float:
+    def _settling_s(self, command_mm: FloatArray, region: _core.Region | None) -> float:
         slowest_per_s = self._machine_model.slowest_decay_per_s
         return settling_time_s(command_mm, self._options(region), slowest_per_s, self.band_mm)
 
-    def _arrival_s(self, command: Vector) -> float:
+    def _arrival_s(self, command: FloatArray) -> float:
         """Wait for in-position behind a command."""
         model = self.model
         moved = [bool(travel) for travel in np.ptp(command, axis=0) > 0.0]

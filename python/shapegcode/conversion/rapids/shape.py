@@ -1,8 +1,6 @@
 """Shaped rapids: G00 moves written as shaped G01 blocks where the table is ready for the next cut sooner.
 
-What is compared is the time until the table has settled, not the time until the axes have arrived: behind a G00 the
-control waits for in-position, but the modes ring on. A rapid is replaced where that costs more than the lower feed, the
-shaper and the exact stop of the replacement. The text that holds the replacements is read back and simulated.
+Compared is the time until the table has settled: behind a G00 the control waits for in-position, but the modes ring on.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ from shapegcode.conversion.rapids.candidates import NO_CUT, find_gaps
 from shapegcode.conversion.rapids.plant import NO_GAIN, Choice, OpenGap, RapidPlant
 from shapegcode.conversion.tables import RapidMove, RapidsOutcome
 from shapegcode.conversion.whole_text import read_back
-from shapegcode.conversion.write import RegionWriter
+from shapegcode.conversion.write import EmittedRegion, RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, written_increment_mm
@@ -71,12 +69,7 @@ class _RapidShaper:
     """Replaces the rapids of one emitted program by shaped moves."""
 
     def __init__(
-        self,
-        emitted: Program,
-        placed: Sequence[Placed],
-        model: MachineModel,
-        grid: Grid,
-        pool: Executor,
+        self, emitted: Program, placed: Sequence[Placed], model: MachineModel, grid: Grid, pool: Executor
     ) -> None:
         self.emitted, self.placed, self.grid, self.pool = emitted, placed, grid, pool
         self.model, self.machine = model, model.machine
@@ -100,9 +93,10 @@ class _RapidShaper:
             if open_gap.choices:
                 open_gaps.append(open_gap)
         choices = [choice for gap in open_gaps for choice in gap.choices]
+        bits = self.machine.controller.dnc_bits_per_character
         for choice in choices:
-            self._write(choice)
-            if budget is not None and self._too_fast(choice, budget):
+            shaped = choice.shaped = self._write(choice)
+            if budget is not None and budget.too_fast(measure_load(choice.region, shaped, self.grid, bits)):
                 kept[BUDGET] += 1
                 choice.text = b""
         self._judge([choice for choice in choices if choice.text])
@@ -132,8 +126,8 @@ class _RapidShaper:
         extra_s = math.fsum(c.after.clock_s - c.before.clock_s for c in shaped if c.after is not None)
         return ShapedRapids(read, spliced.placed, outcome, _warnings(outcome, self.machine), extra_s)
 
-    def _write(self, choice: Choice) -> None:
-        """The lines that replace a rapid."""
+    def _write(self, choice: Choice) -> EmittedRegion:
+        """Put the lines that replace a rapid into its text."""
         region = choice.region
         limits = self.model.limits()
         # Ends of blocks are rounded, and F is rounded up: at the clamp itself a block would last a tick too long.
@@ -141,17 +135,13 @@ class _RapidShaper:
         margin_mm_per_s = 2.0 * increment_mm / self.grid.block_period_s
         limits.max_feed_mm_per_s = np.maximum(limits.max_feed_mm_per_s - margin_mm_per_s, margin_mm_per_s)
         limits.feed_override = max(0.5, 1.0 - margin_mm_per_s / region.path[0].feed_mm_per_s)
-        choice.shaped = self.writer.write(self.emitted, region, limits, self.writer.tolerance())
+        shaped = self.writer.write(self.emitted, region, limits, self.writer.tolerance())
         lines = [choice.rapid.head] if choice.rapid.head else []
         # In G95 a dwell may count revolutions.
         lines += ["G94", _STOP] if region.entry.feed_mode != 94 else [_STOP]
         end = self.emitted.core.line_end.encode()
-        choice.text = b"".join(line.encode("latin-1") + end for line in lines) + choice.shaped.text.joined()
-
-    def _too_fast(self, choice: Choice, budget: Budget) -> bool:
-        assert choice.shaped is not None
-        bits = self.machine.controller.dnc_bits_per_character
-        return bool(budget.too_fast(measure_load(choice.region, choice.shaped, self.grid, bits)))
+        choice.text = b"".join(line.encode("latin-1") + end for line in lines) + shaped.text.joined()
+        return shaped
 
     def _judge(self, choices: Sequence[Choice]) -> None:
         """Simulate every replacement as the text has it."""

@@ -1,8 +1,6 @@
 """A page as one HTML file that needs no server and no network.
 
-What is text stands in the file as HTML and is read without a script; the motion is drawn by the scripts in
-`shapegcode/data/page`, with Plotly for curves. The file forbids itself every connection (Content-Security-Policy), and
-runs no script but those whose hash it names.
+It forbids itself every connection (Content-Security-Policy), and runs no script but those whose hash it names.
 """
 
 from __future__ import annotations

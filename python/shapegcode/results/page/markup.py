@@ -88,8 +88,9 @@ def _part(part: Part, key: str) -> str:
             return _bars(part)
         case Notes():
             return _notes(part)
-        case NextSteps():
-            return _steps(part)
+        case NextSteps(rows):
+            steps = (f"<li>{prose(step.text)}{_command(step.command) if step.command else ''}</li>" for step in rows)
+            return '<ol class="steps">' + "".join(steps) + "</ol>"
         case Picture():
             return _picture(part, key)
         case Text():
@@ -195,11 +196,6 @@ def _notes(notes: Notes) -> str:
         for topic, text in notes.rows
     )
     return f'<dl class="notes">{rows}</dl>'
-
-
-def _steps(steps: NextSteps) -> str:
-    rows = (f"<li>{prose(step.text)}{_command(step.command) if step.command else ''}</li>" for step in steps.rows)
-    return '<ol class="steps">' + "".join(rows) + "</ol>"
 
 
 def _command(text: str) -> str:

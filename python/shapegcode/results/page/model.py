@@ -1,7 +1,6 @@
 """What stands on the page of a result, as data; `html` makes one file of it.
 
-A result's page is made by the module `page` beside it, as its pictures by the module `plots`; a result without one gets
-its answer, tables, pictures and next step. Every number comes from the fields that make the JSON, or from the scene.
+The module `page` beside a result makes its page; every number comes from the fields of the JSON, or from the scene.
 """
 
 from __future__ import annotations

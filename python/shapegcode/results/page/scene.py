@@ -1,7 +1,6 @@
-"""Motion to look at on a page: programs in time, thinned for display, packed so that it is small.
+"""Motion to look at on a page: programs in time, thinned for display (Douglas and Peucker 1973), packed.
 
-Thinned means: between two kept samples every curve is a straight line in time, within a stated fraction of a pixel
-(Douglas and Peucker 1973, with time as the first coordinate). Extremes are kept. Figures are never taken from here.
+Extremes are kept; every curve is within a stated fraction of a pixel. Figures are never taken from here.
 """
 
 from __future__ import annotations
@@ -16,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-
-FloatArray = npt.NDArray[np.float64]
+from shapegcode.io.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,7 @@ class ModeLine:
 
 @dataclass(frozen=True, eq=False)
 class SceneSpectrum:
-    """SceneSpectrum of the acceleration of the command along an axis."""
+    """Spectrum of the acceleration of the command along an axis."""
 
     axis: str  # "x", "y" or "z"
     variant: str  # key of its variant
