@@ -57,111 +57,64 @@ class Finding:
 
 @dataclass(frozen=True)
 class FindingCounts:
-    """How many findings there are of each severity, listed or not.
+    """How many findings there are of each severity, listed or not."""
 
-    Attributes:
-        alarm: what the control refuses.
-        warning: what it would not run as programmed.
-        note: what is worth knowing.
-    """
-
-    alarm: int
-    warning: int
-    note: int
+    alarm: int  # what the control refuses
+    warning: int  # what it would not run as programmed
+    note: int  # what is worth knowing
 
 
 @dataclass(frozen=True)
 class ShortRun:
-    """Cutting blocks with nothing between them, some of which are short.
+    """Cutting blocks with nothing between them, some of which are short."""
 
-    Attributes:
-        lines: first and last line of the source, from 1.
-        count: of short blocks.
-        blocks: of all that move.
-        shortest_s: the shortest block.
-        programmed_s: all of them at their feed, without acceleration.
-        taken_s: the same if no block takes less than the block time.
-    """
-
-    lines: tuple[int, int]
-    count: int
-    blocks: int
-    shortest_s: float
-    programmed_s: float
-    taken_s: float
+    lines: tuple[int, int]  # first and last line of the source, from 1
+    count: int  # of short blocks
+    blocks: int  # of all that move
+    shortest_s: float  # the shortest block
+    programmed_s: float  # all of them at their feed, without acceleration
+    taken_s: float  # the same if no block takes less than the block time
 
 
 @dataclass(frozen=True)
 class ShortBlocks:
-    """Blocks that last less than the block time, and what they cost.
+    """Blocks that last less than the block time, and what they cost."""
 
-    Attributes:
-        block_time_s: what the control needs for a block.
-        count: of short blocks.
-        blocks: of all cutting blocks that move.
-        share: of the short among them.
-        shortest_s: the shortest block; None: none is short.
-        programmed_s: all of them at their feed, without acceleration.
-        taken_s: the same if no block takes less than the block time.
-        first_places: `file:line` of the first short blocks.
-        region_count: runs with short blocks, listed or not.
-        regions: these runs, at most `MOST_FINDINGS`.
-    """
-
-    block_time_s: float
-    count: int
-    blocks: int
-    share: float
-    shortest_s: float | None
-    programmed_s: float
-    taken_s: float
-    first_places: tuple[str, ...]
-    region_count: int
-    regions: tuple[ShortRun, ...]
+    block_time_s: float  # what the control needs for a block
+    count: int  # of short blocks
+    blocks: int  # of all cutting blocks that move
+    share: float  # of the short among them
+    shortest_s: float | None  # the shortest block; None: none is short
+    programmed_s: float  # all of them at their feed, without acceleration
+    taken_s: float  # the same if no block takes less than the block time
+    first_places: tuple[str, ...]  # `file:line` of the first short blocks
+    region_count: int  # runs with short blocks, listed or not
+    regions: tuple[ShortRun, ...]  # these runs, at most `MOST_FINDINGS`
 
 
 @dataclass(frozen=True)
 class StarvedRun:
-    """Cutting blocks that ask for more than the serial line carries.
+    """Cutting blocks that ask for more than the serial line carries."""
 
-    Attributes:
-        lines: first and last line of the source, from 1.
-        bytes: of these lines, line ends included.
-        programmed_s: all of them at their feed, without acceleration.
-        blocks_per_s: that the run asks for.
-        needed_characters_per_s: likewise; of shaped blocks in their busiest stretch.
-        factor: times as long as programmed that the run, or that stretch, takes.
-    """
-
-    lines: tuple[int, int]
-    bytes: int
-    programmed_s: float
-    blocks_per_s: float
-    needed_characters_per_s: float
-    factor: float
+    lines: tuple[int, int]  # first and last line of the source, from 1
+    bytes: int  # of these lines, line ends included
+    programmed_s: float  # all of them at their feed, without acceleration
+    blocks_per_s: float  # that the run asks for
+    needed_characters_per_s: float  # likewise; of shaped blocks in their busiest stretch
+    factor: float  # times as long as programmed that the run, or that stretch, takes
 
 
 @dataclass(frozen=True)
 class SerialLine:
-    """What the serial line carries, and what the program asks for.
+    """What the serial line carries, and what the program asks for."""
 
-    Attributes:
-        baud: bits per second.
-        bits_per_character: start, stop and parity bits included.
-        characters_per_s: that it carries.
-        needed_characters_per_s: that the worst run asks for.
-        factor: their ratio; above 1 that run takes so many times as long.
-        region_count: runs that starve, listed or not.
-        regions: these runs, at most `MOST_FINDINGS`.
-    """
-
-    baud: int
-    bits_per_character: int
-    characters_per_s: float
-    needed_characters_per_s: float
-    factor: float
-    region_count: int
-    regions: tuple[StarvedRun, ...]
+    baud: int  # bits per second
+    bits_per_character: int  # start, stop and parity bits included
+    characters_per_s: float  # that it carries
+    needed_characters_per_s: float  # that the worst run asks for
+    factor: float  # their ratio; above 1 that run takes so many times as long
+    region_count: int  # runs that starve, listed or not
+    regions: tuple[StarvedRun, ...]  # these runs, at most `MOST_FINDINGS`
 
 
 @dataclass(frozen=True, repr=False, eq=False)

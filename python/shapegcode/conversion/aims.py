@@ -273,36 +273,22 @@ class CutCurve:
 
 @dataclass(frozen=True)
 class TolerancePoint:
-    """The program at one contour tolerance.
+    """The program at one contour tolerance."""
 
-    Attributes:
-        name: "as asked", "1.5 times", "the original's contour error", "no slowing".
-        tolerance_um: that the cuts are planned for; without slowing: what they then reach.
-        time_s: of the program.
-        time_increase_percent: over the original.
-        is_within_price: of the program and of each cut.
-        is_knee: a tighter tolerance costs disproportionately more time.
-    """
-
-    name: str
-    tolerance_um: float
-    time_s: float
-    time_increase_percent: float
-    is_within_price: bool
-    is_knee: bool = False
+    name: str  # "as asked", "1.5 times", "the original's contour error", "no slowing"
+    tolerance_um: float  # that the cuts are planned for; without slowing: what they then reach
+    time_s: float  # of the program
+    time_increase_percent: float  # over the original
+    is_within_price: bool  # of the program and of each cut
+    is_knee: bool = False  # a tighter tolerance costs disproportionately more time
 
 
 @dataclass(frozen=True)
 class ToleranceCurve:
-    """Tolerance against time, of the cuts that can be shaped.
+    """Tolerance against time, of the cuts that can be shaped."""
 
-    Attributes:
-        points: from tight to loose.
-        cuts: how many cuts it is of.
-    """
-
-    points: tuple[TolerancePoint, ...]
-    cuts: int
+    points: tuple[TolerancePoint, ...]  # from tight to loose
+    cuts: int  # how many cuts it is of
 
     @property
     def sentence(self) -> str:

@@ -93,56 +93,35 @@ class TransferLoad:
 
 @dataclass(frozen=True)
 class TextNeeds:
-    """What a whole text asks of memory, line and control.
+    """What a whole text asks of memory, line and control."""
 
-    Attributes:
-        bytes: its size.
-        baud: what its section with the most blocks per second needs of the line, bit/s.
-        blocks_per_second: blocks in its busiest stretch.
-        block_period_s: on which it is written.
-    """
-
-    bytes: int
-    baud: float
-    blocks_per_second: float
-    block_period_s: float
+    bytes: int  # its size
+    baud: float  # what its section with the most blocks per second needs of the line, bit/s
+    blocks_per_second: float  # blocks in its busiest stretch
+    block_period_s: float  # on which it is written
 
 
 @dataclass(frozen=True)
 class GivenUp:
-    """A region that is left unchanged.
+    """A region that is left unchanged."""
 
-    Attributes:
-        lines: of the original, first and last.
-        reason: in words.
-        residual_um: residual vibration that stays.
-        bytes: that it would need more.
-    """
-
-    lines: tuple[int, int]
-    reason: str
-    residual_um: Xyz[float]
-    bytes: int
+    lines: tuple[int, int]  # of the original, first and last
+    reason: str  # in words
+    residual_um: Xyz[float]  # residual vibration that stays
+    bytes: int  # that it would need more
 
 
 @dataclass(frozen=True)
 class BudgetOutcome:
-    """What a budget did to a conversion.
+    """What a budget did to a conversion."""
 
-    Attributes:
-        limits: the budget; null: no limit.
-        before: of the text with everything shaped; where the block period is longer: of that on the shorter one,
-            before any region is slowed for the contour tolerance.
-        after: of the text as it is.
-        block_period_s: on which it is written.
-        given_up: regions that are left unchanged.
-    """
-
-    limits: Budget
+    limits: Budget  # the budget; null: no limit
+    # of the text with everything shaped; where the block period is longer: of that on the shorter one, before any
+    # region is slowed for the contour tolerance
     before: TextNeeds
-    after: TextNeeds
-    block_period_s: float
-    given_up: tuple[GivenUp, ...]
+    after: TextNeeds  # of the text as it is
+    block_period_s: float  # on which it is written
+    given_up: tuple[GivenUp, ...]  # regions that are left unchanged
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:

@@ -34,15 +34,10 @@ _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
 @dataclass(frozen=True)
 class ControlNote:
-    """One thing to know at the control.
+    """One thing to know at the control."""
 
-    Attributes:
-        topic: in a word or two.
-        text: in words, with its figures.
-    """
-
-    topic: str
-    text: str
+    topic: str  # in a word or two
+    text: str  # in words, with its figures
 
 
 def at_the_control(

@@ -106,21 +106,13 @@ _TRIALS = (0.9, 0.7, 0.5)  # of the time constant that a rounding in proportion 
 
 @dataclass(frozen=True)
 class FilterAdvice:
-    """A contour error that the control's own filter makes, and what cures it without shaping.
+    """A contour error that the control's own filter makes, and what cures it without shaping."""
 
-    Attributes:
-        key: of the machine file, the filter's time constant.
-        now_s: its value.
-        enough_s: at which every cut of the original keeps its limits, simulated.
-        rounding_um: contour error of the command, which the filter makes.
-        lines: of the cut in which it is largest.
-    """
-
-    key: str
-    now_s: float
-    enough_s: float
-    rounding_um: float
-    lines: tuple[int, int]
+    key: str  # of the machine file, the filter's time constant
+    now_s: float  # its value
+    enough_s: float  # at which every cut of the original keeps its limits, simulated
+    rounding_um: float  # contour error of the command, which the filter makes
+    lines: tuple[int, int]  # of the cut in which it is largest
 
     def __str__(self) -> str:
         """For people."""

@@ -59,33 +59,19 @@ class CutRestarts:
 
 @dataclass(frozen=True)
 class RestartPoint:
-    """A block inside of a shaped cut at which the control can begin, and what is in force there.
+    """A block inside of a shaped cut at which the control can begin, and what is in force there."""
 
-    Attributes:
-        number: its N word.
-        line: of the emitted program, from 1.
-        lines: of the cut in the original, first and last.
-        time_s: from the begin of the cut.
-        position_mm: where the tool has to be before the start, in the coordinate system.
-        speed_mm_per_s: of the shaped command there.
-        vibration_um: amplitude that a start from rest leaves there.
-        coordinate_system: such as "G54" or "G54.1P3".
-        tool: T number in the spindle; null: the program names none before it.
-        length_offset: H number in force; null: none.
-        spindle_rev_per_min: in force; null: none programmed.
-    """
-
-    number: int
-    line: int
-    lines: tuple[int, int]
-    time_s: float
-    position_mm: tuple[float, float, float]
-    speed_mm_per_s: float
-    vibration_um: float
-    coordinate_system: str
-    tool: int | None = None
-    length_offset: int | None = None
-    spindle_rev_per_min: float | None = None
+    number: int  # its N word
+    line: int  # of the emitted program, from 1
+    lines: tuple[int, int]  # of the cut in the original, first and last
+    time_s: float  # from the begin of the cut
+    position_mm: tuple[float, float, float]  # where the tool has to be before the start, in the coordinate system
+    speed_mm_per_s: float  # of the shaped command there
+    vibration_um: float  # amplitude that a start from rest leaves there
+    coordinate_system: str  # such as "G54" or "G54.1P3"
+    tool: int | None = None  # T number in the spindle; null: the program names none before it
+    length_offset: int | None = None  # H number in force; null: none
+    spindle_rev_per_min: float | None = None  # in force; null: none programmed
 
 
 class FreeNumbers:

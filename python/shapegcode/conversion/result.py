@@ -42,36 +42,22 @@ _DEVIATIONS = {"max": "largest", "rms": "RMS", "gouge": "gouge", "excess": "exce
 
 @dataclass(frozen=True)
 class ChangeProof:
-    """What is unchanged in an emitted program.
+    """What is unchanged in an emitted program."""
 
-    Attributes:
-        answer: such as "42 of 42 rapids, 7 of 7 tool calls, 31 of 31 offsets unchanged; path within 12.3 µm".
-        counts: of each kind of which one of both programs has some.
-        path_um: largest distance of the paths of a cut, seen from either; of the command, not of the table.
-        refused: differences that shaping does not explain; none: it is proven.
-    """
-
-    answer: str
-    counts: tuple[KindCount, ...]
-    path_um: float
-    refused: tuple[ProgramDifference, ...]
+    answer: str  # such as "42 of 42 rapids, 7 of 7 tool calls, 31 of 31 offsets unchanged; path within 12.3 µm"
+    counts: tuple[KindCount, ...]  # of each kind of which one of both programs has some
+    path_um: float  # largest distance of the paths of a cut, seen from either; of the command, not of the table
+    refused: tuple[ProgramDifference, ...]  # differences that shaping does not explain; none: it is proven
 
 
 @dataclass(frozen=True)
 class DialectNotes:
-    """For which control the program is written, and what is known of that control.
+    """For which control the program is written, and what is known of that control."""
 
-    Attributes:
-        name: `emission.dialect`.
-        control: which that is.
-        facts: by topic (words, dwell, look-ahead, override, restart ...) what holds there.
-        assumed: topics for which there is no source.
-    """
-
-    name: str
-    control: str
-    facts: Mapping[str, str]
-    assumed: tuple[str, ...]
+    name: str  # `emission.dialect`
+    control: str  # which that is
+    facts: Mapping[str, str]  # by topic (words, dwell, look-ahead, override, restart ...) what holds there
+    assumed: tuple[str, ...]  # topics for which there is no source
 
     @property
     def sentence(self) -> str:

@@ -35,27 +35,16 @@ _PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """A value of the machine file that was not measured, and what it would do to the verdict.
+    """A value of the machine file that was not measured, and what it would do to the verdict."""
 
-    Attributes:
-        key: dotted name in the machine file.
-        value: as it stands there, with its unit.
-        origin: "assumed", "inherited" from another machine, or "default".
-        moved: what it was moved to, in words.
-        figure: the judged figure that it moves furthest towards its limit.
-        figure_um: that figure as the file has the value.
-        moved_um: the same with the value moved.
-        limit_um: what is allowed.
-    """
-
-    key: str
-    value: str
-    origin: str
-    moved: str
-    figure: str
-    figure_um: float
-    moved_um: float
-    limit_um: float
+    key: str  # dotted name in the machine file
+    value: str  # as it stands there, with its unit
+    origin: str  # "assumed", "inherited" from another machine, or "default"
+    moved: str  # what it was moved to, in words
+    figure: str  # the judged figure that it moves furthest towards its limit
+    figure_um: float  # that figure as the file has the value
+    moved_um: float  # the same with the value moved
+    limit_um: float  # what is allowed
 
     @property
     def share(self) -> float:

@@ -100,37 +100,23 @@ _TOOL_CHANGE = 6
 
 @dataclass(frozen=True)
 class CutOutcome:
-    """One cut, shaped or left unchanged.
+    """One cut, shaped or left unchanged."""
 
-    Attributes:
-        lines: of the original, first and last.
-        emitted_lines: of the emitted program.
-        tool: T number that cuts; null: the program names none before it.
-        is_shaped: False: it was left unchanged.
-        reason: why it was left unchanged; empty: it is shaped.
-        gain_um: what shaping gains: the larger fall of residual vibration and contour error; of a cut left unchanged
-            what it would gain, as far as that was tried.
-        residual_um: residual vibration of the worst axis.
-        contour_um: contour error of what the tolerance is about.
-        tolerance_um: contour tolerance that it was shaped for; above the machine's where the price asks for it.
-        time_s: until the set-points rest.
-        bytes: of its text.
-        misses: limits that it misses, in words.
-        cure: what would keep the limits that a cut left unchanged misses; empty: nothing is missed, or nothing known.
-    """
-
-    lines: Lines
-    emitted_lines: Lines
-    tool: int | None
-    is_shaped: bool
-    reason: str
+    lines: Lines  # of the original, first and last
+    emitted_lines: Lines  # of the emitted program
+    tool: int | None  # T number that cuts; null: the program names none before it
+    is_shaped: bool  # False: it was left unchanged
+    reason: str  # why it was left unchanged; empty: it is shaped
+    # what shaping gains: the larger fall of residual vibration and contour error; of a cut left unchanged what it would
+    # gain, as far as that was tried
     gain_um: float
-    residual_um: Pair[float]
-    contour_um: Pair[float]
-    tolerance_um: float
-    time_s: Pair[float]
-    bytes: Pair[int]
-    misses: tuple[str, ...]
+    residual_um: Pair[float]  # residual vibration of the worst axis
+    contour_um: Pair[float]  # contour error of what the tolerance is about
+    tolerance_um: float  # contour tolerance that it was shaped for; above the machine's where the price asks for it
+    time_s: Pair[float]  # until the set-points rest
+    bytes: Pair[int]  # of its text
+    misses: tuple[str, ...]  # limits that it misses, in words
+    # what would keep the limits that a cut left unchanged misses; empty: nothing is missed, or nothing known
     cure: str = ""
 
     @property
@@ -258,49 +244,27 @@ def tools_of_cuts(program: Program) -> Mapping[int, int]:
 
 @dataclass(frozen=True)
 class RapidMove:
-    """A rapid that is a shaped cutting move now.
+    """A rapid that is a shaped cutting move now."""
 
-    Attributes:
-        lines: of the original, first and last.
-        emitted_lines: of the emitted program.
-        time_s: until the set-points rest.
-        in_position_s: wait for in-position behind them.
-        settling_s: from the end of the set-points until the table stays within the band.
-        residual_vibration_um: largest |table - command| while the set-points rest.
-        residual_limit_um: what the emitted one is judged by.
-        misses: tolerances that it leaves; always empty: such a rapid is left unchanged.
-    """
-
-    lines: tuple[int, int]
-    emitted_lines: tuple[int, int]
-    time_s: Pair[float]
-    in_position_s: Pair[float]
-    settling_s: Pair[float]
-    residual_vibration_um: Pair[Xyz[float]]
-    residual_limit_um: Xyz[float]
-    misses: tuple[str, ...]
+    lines: tuple[int, int]  # of the original, first and last
+    emitted_lines: tuple[int, int]  # of the emitted program
+    time_s: Pair[float]  # until the set-points rest
+    in_position_s: Pair[float]  # wait for in-position behind them
+    settling_s: Pair[float]  # from the end of the set-points until the table stays within the band
+    residual_vibration_um: Pair[Xyz[float]]  # largest |table - command| while the set-points rest
+    residual_limit_um: Xyz[float]  # what the emitted one is judged by
+    misses: tuple[str, ...]  # tolerances that it leaves; always empty: such a rapid is left unchanged
 
 
 @dataclass(frozen=True)
 class RapidsOutcome:
-    """The rapids of a program: how many are shaped moves now, why the others stay, and what that saves.
+    """The rapids of a program: how many are shaped moves now, why the others stay, and what that saves."""
 
-    Attributes:
-        found: rapids in the program.
-        shaped: of them, shaped moves now.
-        kept: how many stay, by reason.
-        time_saved_s: by which the table is ready for the next cuts sooner, in all.
-        settle_band_um: half the width of the band in which vibration counts as having decayed.
-        blocks: shaped blocks that replace them.
-        slowed_blocks: of these, such as step an axis by more than the corner limit of the look-ahead.
-        moves: those that are shaped.
-    """
-
-    found: int
-    shaped: int
-    kept: Mapping[str, int]
-    time_saved_s: float
-    settle_band_um: float
-    blocks: int
-    slowed_blocks: int
-    moves: tuple[RapidMove, ...]
+    found: int  # rapids in the program
+    shaped: int  # of them, shaped moves now
+    kept: Mapping[str, int]  # how many stay, by reason
+    time_saved_s: float  # by which the table is ready for the next cuts sooner, in all
+    settle_band_um: float  # half the width of the band in which vibration counts as having decayed
+    blocks: int  # shaped blocks that replace them
+    slowed_blocks: int  # of these, such as step an axis by more than the corner limit of the look-ahead
+    moves: tuple[RapidMove, ...]  # those that are shaped

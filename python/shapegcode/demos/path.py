@@ -44,67 +44,40 @@ _AGREEMENT: dict[Agreement, str] = {"agrees": "yes", "differs": "NO", "explained
 
 @dataclass(frozen=True)
 class Statement:
-    """What a paper states, beside what comes out here.
+    """What a paper states, beside what comes out here."""
 
-    Attributes:
-        place: where in the paper: figure, table, section or equation.
-        what: is stated.
-        published: as the paper has it, with its unit.
-        ours: as it comes out here, with its unit.
-        agreement: whether both are the same: agrees, differs, or explained (differs for a known reason).
-        difference_percent: ours over the published figure, in % of the latter; null where it is no figure.
-        note: why they differ, or under which conditions ours holds; empty: nothing to add.
-    """
-
-    place: str
-    what: str
-    published: str
-    ours: str
-    agreement: Agreement
+    place: str  # where in the paper: figure, table, section or equation
+    what: str  # is stated
+    published: str  # as the paper has it, with its unit
+    ours: str  # as it comes out here, with its unit
+    agreement: Agreement  # whether both are the same: agrees, differs, or explained (differs for a known reason)
+    # ours over the published figure, in % of the latter; null where it is no figure
     difference_percent: float | None = None
-    note: str = ""
+    note: str = ""  # why they differ, or under which conditions ours holds; empty: nothing to add
 
 
 @dataclass(frozen=True)
 class PathRun:
-    """One way of driving the path.
+    """One way of driving the path."""
 
-    Attributes:
-        time_s: for the path.
-        time_increase_percent: of it, over the unshaped.
-        orbit_error_percent: area between command and arc, in % of the area of the sector; 0 unshaped.
-        residual_vibration_um: what is left of the vibration at rest, by axis.
-    """
-
-    time_s: float
-    time_increase_percent: float
-    orbit_error_percent: float
-    residual_vibration_um: Xyz[float]
+    time_s: float  # for the path
+    time_increase_percent: float  # of it, over the unshaped
+    orbit_error_percent: float  # area between command and arc, in % of the area of the sector; 0 unshaped
+    residual_vibration_um: Xyz[float]  # what is left of the vibration at rest, by axis
 
 
 @dataclass(frozen=True)
 class PathCondition:
-    """One feed and reduction.
+    """One feed and reduction."""
 
-    Attributes:
-        feed_mm_per_s: programmed.
-        reduction_percent: of the feed on the arc.
-        unshaped: as programmed.
-        ideal: the paper's shaper in continuous time.
-        emitted: the program that `convert` writes.
-        blocks: of the emitted program.
-        ok: whether `convert` says so of the emitted program.
-        published_orbit_error_percent: table 2 of the paper.
-    """
-
-    feed_mm_per_s: int
-    reduction_percent: int
-    unshaped: PathRun
-    ideal: PathRun
-    emitted: PathRun
-    blocks: int
-    ok: bool
-    published_orbit_error_percent: float
+    feed_mm_per_s: int  # programmed
+    reduction_percent: int  # of the feed on the arc
+    unshaped: PathRun  # as programmed
+    ideal: PathRun  # the paper's shaper in continuous time
+    emitted: PathRun  # the program that `convert` writes
+    blocks: int  # of the emitted program
+    ok: bool  # whether `convert` says so of the emitted program
+    published_orbit_error_percent: float  # table 2 of the paper
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)

@@ -34,121 +34,74 @@ _LIMIT_WORDS = {
 
 @dataclass(frozen=True)
 class FeedRange:
-    """Feeds from the lowest to the highest.
+    """Feeds from the lowest to the highest."""
 
-    Attributes:
-        min: lowest.
-        max: highest.
-    """
-
-    min: float
-    max: float
+    min: float  # lowest
+    max: float  # highest
 
 
 @dataclass(frozen=True)
 class ResultantForce:
-    """The resultant in the XY plane over a stretch.
+    """The resultant in the XY plane over a stretch."""
 
-    Attributes:
-        mean: over the time in material, of the mean over a revolution.
-        max: largest of the peak in a revolution.
-    """
-
-    mean: float
-    max: float
+    mean: float  # over the time in material, of the mean over a revolution
+    max: float  # largest of the peak in a revolution
 
 
 @dataclass(frozen=True)
 class PeakLoad:
-    """The largest value along the program.
+    """The largest value along the program."""
 
-    Attributes:
-        original: with the original feeds.
-        emitted: with the new ones.
-        place: file and line of the latter; empty where there is none.
-    """
-
-    original: float
-    emitted: float
-    place: str
+    original: float  # with the original feeds
+    emitted: float  # with the new ones
+    place: str  # file and line of the latter; empty where there is none
 
 
 @dataclass(frozen=True)
 class PeakLoads:
-    """Largest loads along the program.
+    """Largest loads along the program."""
 
-    Attributes:
-        peak_resultant_n: largest resultant in a revolution.
-        mean_resultant_n: mean of the resultant over a revolution.
-        peak_deflection_um: largest deflection of the tip in a revolution.
-        peak_torque_nm: largest torque in a revolution.
-        mean_power_w: mean power over a revolution.
-    """
-
-    peak_resultant_n: PeakLoad
-    mean_resultant_n: PeakLoad
-    peak_deflection_um: PeakLoad
-    peak_torque_nm: PeakLoad
-    mean_power_w: PeakLoad
+    peak_resultant_n: PeakLoad  # largest resultant in a revolution
+    mean_resultant_n: PeakLoad  # mean of the resultant over a revolution
+    peak_deflection_um: PeakLoad  # largest deflection of the tip in a revolution
+    peak_torque_nm: PeakLoad  # largest torque in a revolution
+    mean_power_w: PeakLoad  # mean power over a revolution
 
 
 @dataclass(frozen=True)
 class HeldLines:
-    """Lines whose feed is held by one thing.
+    """Lines whose feed is held by one thing."""
 
-    Attributes:
-        lines: first and last, from 1.
-        feed_mm_per_min: the feeds that stand there.
-        limit: what holds them: "resultant", "deflection", "torque", "power" or "chip_load"; "programmed": the feed of
-            the program; "max_feed": the largest feed of tool file or axes; "air": nothing to cut; "minimum": the least
-            feed; "kept": left as it was.
-        reason: why they are left as they were; else empty.
-    """
-
-    lines: tuple[int, int]
-    feed_mm_per_min: FeedRange
+    lines: tuple[int, int]  # first and last, from 1
+    feed_mm_per_min: FeedRange  # the feeds that stand there
+    # what holds them: "resultant", "deflection", "torque", "power" or "chip_load"; "programmed": the feed of the
+    # program; "max_feed": the largest feed of tool file or axes; "air": nothing to cut; "minimum": the least feed;
+    # "kept": left as it was
     limit: str
-    reason: str
+    reason: str  # why they are left as they were; else empty
 
 
 @dataclass(frozen=True)
 class ScheduledRegion:
-    """A run of cutting moves between two stops.
+    """A run of cutting moves between two stops."""
 
-    Attributes:
-        lines: first and last, from 1.
-        kept: why its feeds stay; empty if they may change.
-        spindle_rev_per_min: speed of the spindle; 0: not known.
-        radial_depth_mm: largest; None: not known.
-        removal_mm3: volume that is cut; None: not known.
-        misses: limits that are not kept, in words.
-        resultant_force_n: before and after; None: not known.
-    """
-
-    lines: tuple[int, int]
-    kept: str
-    spindle_rev_per_min: float
-    radial_depth_mm: float | None
-    removal_mm3: float | None
-    misses: tuple[str, ...]
-    resultant_force_n: Pair[ResultantForce] | None
+    lines: tuple[int, int]  # first and last, from 1
+    kept: str  # why its feeds stay; empty if they may change
+    spindle_rev_per_min: float  # speed of the spindle; 0: not known
+    radial_depth_mm: float | None  # largest; None: not known
+    removal_mm3: float | None  # volume that is cut; None: not known
+    misses: tuple[str, ...]  # limits that are not kept, in words
+    resultant_force_n: Pair[ResultantForce] | None  # before and after; None: not known
 
 
 @dataclass(frozen=True)
 class KeptMove:
-    """A cutting move outside of the regions that meets material: its feed stays.
+    """A cutting move outside of the regions that meets material: its feed stays."""
 
-    Attributes:
-        place: file and line.
-        feed_mm_per_min: as programmed.
-        misses: limits that are not kept, in words.
-        load: its force; None: not known.
-    """
-
-    place: str
-    feed_mm_per_min: float
-    misses: tuple[str, ...]
-    load: PathLoad | None = field(metadata=hidden())
+    place: str  # file and line
+    feed_mm_per_min: float  # as programmed
+    misses: tuple[str, ...]  # limits that are not kept, in words
+    load: PathLoad | None = field(metadata=hidden())  # its force; None: not known
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -20,23 +20,14 @@ _Keyed = TypeVar("_Keyed", "KeyValue", "DifferentValue")
 
 @dataclass(frozen=True)
 class OpenValue:
-    """A value that was not measured on the machine, and what it would do to a program.
+    """A value that was not measured on the machine, and what it would do to a program."""
 
-    Attributes:
-        key: dotted name.
-        value: as it stands in the file, with its unit.
-        origin: "assumed", "inherited" or "default".
-        moved: what it was moved to, in words; empty: it was not tried.
-        effect: what that does to the figure that it moves furthest, in words; empty: it was not tried.
-        share: how far the figure moves, of its limit; None: it was not tried.
-    """
-
-    key: str
-    value: str
-    origin: str
-    moved: str = ""
-    effect: str = ""
-    share: float | None = None
+    key: str  # dotted name
+    value: str  # as it stands in the file, with its unit
+    origin: str  # "assumed", "inherited" or "default"
+    moved: str = ""  # what it was moved to, in words; empty: it was not tried
+    effect: str = ""  # what that does to the figure that it moves furthest, in words; empty: it was not tried
+    share: float | None = None  # how far the figure moves, of its limit; None: it was not tried
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -201,25 +192,15 @@ _NONE = "-"
 
 @dataclass(frozen=True)
 class DifferentValue:
-    """A key that two machines do not have alike.
+    """A key that two machines do not have alike."""
 
-    Attributes:
-        key: dotted name.
-        unit: of the values; "1" for a ratio.
-        first: value of the first machine, as TOML; "-": it has no such key.
-        second: of the second.
-        first_origin: where it comes from; see `shapegcode machine show`.
-        second_origin: likewise.
-        meaning: what it is.
-    """
-
-    key: str
-    unit: str
-    first: str
-    second: str
-    first_origin: str
-    second_origin: str
-    meaning: str
+    key: str  # dotted name
+    unit: str  # of the values; "1" for a ratio
+    first: str  # value of the first machine, as TOML; "-": it has no such key
+    second: str  # of the second
+    first_origin: str  # where it comes from; see `shapegcode machine show`
+    second_origin: str  # likewise
+    meaning: str  # what it is
 
 
 @dataclass(frozen=True, repr=False, eq=False)

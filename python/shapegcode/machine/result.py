@@ -22,72 +22,43 @@ Value = bool | int | float | str | tuple[int, ...] | Xyz[float]
 
 @dataclass(frozen=True)
 class ReadParameter:
-    """A value of a dump and the key that it went into.
+    """A value of a dump and the key that it went into."""
 
-    Attributes:
-        parameter: number of the parameter.
-        axis: "A1" ... of an axis, "S1" ... of a spindle, "L1" ... of a path; empty where the value has none.
-        raw: the value as it stands there, with its letter.
-        line: of the dump, from 1.
-        key: dotted name in the machine file.
-        value: of the key; several values of a dump may make one.
-    """
-
-    parameter: int
-    axis: str
-    raw: str
-    line: int
-    key: str
-    value: Value
+    parameter: int  # number of the parameter
+    axis: str  # "A1" ... of an axis, "S1" ... of a spindle, "L1" ... of a path; empty where the value has none
+    raw: str  # the value as it stands there, with its letter
+    line: int  # of the dump, from 1
+    key: str  # dotted name in the machine file
+    value: Value  # of the key; several values of a dump may make one
 
 
 @dataclass(frozen=True)
 class ReadTable:
-    """A table of offsets or variables of the control, and the key that it went into.
+    """A table of offsets or variables of the control, and the key that it went into."""
 
-    Attributes:
-        file: name of the file.
-        first_line: of it, from 1.
-        last_line: of it.
-        key: dotted name in the machine file.
-        count: how many values the key has.
-    """
-
-    file: str
-    first_line: int
-    last_line: int
-    key: str
-    count: int
+    file: str  # name of the file
+    first_line: int  # of it, from 1
+    last_line: int  # of it
+    key: str  # dotted name in the machine file
+    count: int  # how many values the key has
 
 
 @dataclass(frozen=True)
 class AssumedValue:
-    """What the dump does not say, and what is taken for it.
+    """What the dump does not say, and what is taken for it."""
 
-    Attributes:
-        key: dotted name in the machine file, or the fact in words.
-        value: what is taken.
-        why: in words.
-    """
-
-    key: str
-    value: Value
-    why: str
+    key: str  # dotted name in the machine file, or the fact in words
+    value: Value  # what is taken
+    why: str  # in words
 
 
 @dataclass(frozen=True)
 class MissingParameter:
-    """What the dump does not hold, or what was not understood.
+    """What the dump does not hold, or what was not understood."""
 
-    Attributes:
-        parameter: number of the parameter; empty where it is none.
-        line: of the dump, from 1; None where it is about none.
-        why: in words.
-    """
-
-    parameter: str
-    line: int | None
-    why: str
+    parameter: str  # number of the parameter; empty where it is none
+    line: int | None  # of the dump, from 1; None where it is about none
+    why: str  # in words
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -22,15 +22,10 @@ CONTOURS = {"command": "contour error of the command", "response": "contour erro
 
 @dataclass(frozen=True)
 class Tracks(Generic[T]):
-    """A figure of both tracks that a machine makes.
+    """A figure of both tracks that a machine makes."""
 
-    Attributes:
-        command: of the set-points.
-        response: of the table.
-    """
-
-    command: T
-    response: T
+    command: T  # of the set-points
+    response: T  # of the table
 
 
 @dataclass(frozen=True)
@@ -64,22 +59,15 @@ class Deviation:
 
 @dataclass(frozen=True)
 class ContourError:
-    """How far a track leaves the programmed path, in µm.
+    """How far a track leaves the programmed path, in µm."""
 
-    Attributes:
-        max: distance, either side; corners that the track cuts short count too.
-        rms: root mean square over all samples.
-        left: largest to the left of the travel, or above.
-        right: largest to the right of it, or below.
-        gouge: largest towards the workpiece, which cuts too much; only where the side of the workpiece is known.
-        excess: largest away from it, which leaves material standing; likewise.
-    """
-
-    max: float
-    rms: float
-    left: float
-    right: float
+    max: float  # distance, either side; corners that the track cuts short count too
+    rms: float  # root mean square over all samples
+    left: float  # largest to the left of the travel, or above
+    right: float  # largest to the right of it, or below
+    # largest towards the workpiece, which cuts too much; only where the side of the workpiece is known
     gouge: float | None = field(default=None, metadata=sparse())
+    # largest away from it, which leaves material standing; likewise
     excess: float | None = field(default=None, metadata=sparse())
 
     @classmethod

@@ -31,19 +31,12 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class MadeFile:
-    """A file that was read or written.
+    """A file that was read or written."""
 
-    Attributes:
-        role: what it was for: "input", "machine", "output" and so on.
-        name: as it was given.
-        sha256: of its bytes; empty: it could not be read again.
-        size_bytes: how many it has.
-    """
-
-    role: str
-    name: str
-    sha256: str
-    size_bytes: int
+    role: str  # what it was for: "input", "machine", "output" and so on
+    name: str  # as it was given
+    sha256: str  # of its bytes; empty: it could not be read again
+    size_bytes: int  # how many it has
 
     @classmethod
     def of(cls, role: str, name: str | Path, content: bytes | memoryview | None = None) -> MadeFile:
@@ -58,21 +51,13 @@ class MadeFile:
 
 @dataclass(frozen=True)
 class Made:
-    """Of what a result was made.
+    """Of what a result was made."""
 
-    Attributes:
-        result: name of its class.
-        by: "shapegcode" and its version.
-        format: see `FORMAT`.
-        command: as it was typed, or the same for one program of several.
-        files: read and written.
-    """
-
-    result: str
-    by: str
-    format: int
-    command: str
-    files: tuple[MadeFile, ...]
+    result: str  # name of its class
+    by: str  # "shapegcode" and its version
+    format: int  # see `FORMAT`
+    command: str  # as it was typed, or the same for one program of several
+    files: tuple[MadeFile, ...]  # read and written
 
     def file(self, role: str) -> MadeFile | None:
         """The file with a role."""

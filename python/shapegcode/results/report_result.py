@@ -10,21 +10,13 @@ from shapegcode.results.table import Column, Table
 
 @dataclass(frozen=True)
 class ReportPage:
-    """A page that was written.
+    """A page that was written."""
 
-    Attributes:
-        source: JSON that it was made of.
-        page: file that was written.
-        result: class of the result; empty: it could not be read back.
-        motion: the programs were found unchanged and simulated again.
-        problems: what is not as it should be; they stand on the page too.
-    """
-
-    source: str
-    page: str
-    result: str
-    motion: bool
-    problems: tuple[str, ...]
+    source: str  # JSON that it was made of
+    page: str  # file that was written
+    result: str  # class of the result; empty: it could not be read back
+    motion: bool  # the programs were found unchanged and simulated again
+    problems: tuple[str, ...]  # what is not as it should be; they stand on the page too
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -142,29 +142,19 @@ class KeyInfo:
 
 @dataclass(frozen=True)
 class KeyValue:
-    """One value of loaded settings, with what the documentation says of its key.
+    """One value of loaded settings, with what the documentation says of its key."""
 
-    Attributes:
-        key: dotted name, ``axes.x.modes.1.frequency_hz``.
-        value: the value as TOML, "not set" for an optional key without one.
-        unit: unit, "1" for a ratio, empty where there is none.
-        origin: where it comes from: "measured" on this machine, "dump" of the control's parameters, "inherited" from
-            another machine, "assumed", "choice" (no property of a machine), "file" (the file states it, and does not
-            say why), "default" (the file leaves it out).
-        assumed: True where the value is an assumption, in the file or as a default.
-        meaning: what it is.
-        fanuc: numbers of the FANUC parameters that correspond to it, or empty.
-        remark: what stands behind the value in the file.
-    """
-
-    key: str
-    value: str
-    unit: str
+    key: str  # dotted name, ``axes.x.modes.1.frequency_hz``
+    value: str  # the value as TOML, "not set" for an optional key without one
+    unit: str  # unit, "1" for a ratio, empty where there is none
+    # where it comes from: "measured" on this machine, "dump" of the control's parameters, "inherited" from another
+    # machine, "assumed", "choice" (no property of a machine), "file" (the file states it, and does not say why),
+    # "default" (the file leaves it out)
     origin: Origin
-    assumed: bool
-    meaning: str
-    fanuc: str
-    remark: str = ""
+    assumed: bool  # True where the value is an assumption, in the file or as a default
+    meaning: str  # what it is
+    fanuc: str  # numbers of the FANUC parameters that correspond to it, or empty
+    remark: str = ""  # what stands behind the value in the file
 
     @property
     def unmeasured(self) -> bool:

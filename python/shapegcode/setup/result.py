@@ -12,19 +12,12 @@ from shapegcode.results.table import Column, Table
 
 @dataclass(frozen=True)
 class OpenQuestion:
-    """A value that nobody said.
+    """A value that nobody said."""
 
-    Attributes:
-        key: of the machine file.
-        value: that holds until then, with its unit.
-        why: where it comes from.
-        command: that finds it; empty: none does.
-    """
-
-    key: str
-    value: str
-    why: str
-    command: str
+    key: str  # of the machine file
+    value: str  # that holds until then, with its unit
+    why: str  # where it comes from
+    command: str  # that finds it; empty: none does
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -210,17 +210,7 @@ _FORM = "TIME:AMPLITUDE,TIME:AMPLITUDE with times in s or with ms behind them, f
 
 @dataclass(frozen=True)
 class Design:
-    """One row of a comparison of shapers.
-
-    Attributes:
-        family: name of its row in the registry.
-        shaper: its impulses.
-        period_s: grid on which its times lie and its zeros are exact, s; None: times are continuous.
-        residual: largest residual ratio of the modes at their nominal frequencies.
-        worst_residual: the same over the modes' bands.
-        exact: whether the modes without a band are cancelled, to a thousandth.
-        pareto: whether no other design of the comparison is at least as good in everything and better in something.
-    """
+    """One row of a comparison of shapers."""
 
     json_extra: ClassVar[dict[str, Any]] = {
         "times_s": tuple[float, ...],
@@ -232,12 +222,13 @@ class Design:
     }
     json_exact: ClassVar[tuple[str, ...]] = ("times_s", "amplitudes")
 
-    family: str
-    shaper: Shaper = field(metadata=hidden())
-    period_s: float | None
-    residual: float
-    worst_residual: float
-    exact: bool = True
+    family: str  # name of its row in the registry
+    shaper: Shaper = field(metadata=hidden())  # its impulses
+    period_s: float | None  # grid on which its times lie and its zeros are exact, s; None: times are continuous
+    residual: float  # largest residual ratio of the modes at their nominal frequencies
+    worst_residual: float  # the same over the modes' bands
+    exact: bool = True  # whether the modes without a band are cancelled, to a thousandth
+    # whether no other design of the comparison is at least as good in everything and better in something
     pareto: bool = False
 
     @property

@@ -19,17 +19,11 @@ _SPEED_MM_PER_S, _RADIUS_MM = 200.0, 20.0  # at which the contour cost is shown
 
 @dataclass(frozen=True)
 class Refusal:
-    """A family that has no design.
+    """A family that has no design."""
 
-    Attributes:
-        family: name of its row in the registry.
-        period_s: grid on which it was tried, s; None: continuous times.
-        reason: why there is none, with what is nearest where the family knows.
-    """
-
-    family: str
-    period_s: float | None
-    reason: str
+    family: str  # name of its row in the registry
+    period_s: float | None  # grid on which it was tried, s; None: continuous times
+    reason: str  # why there is none, with what is nearest where the family knows
 
 
 @dataclass(frozen=True, repr=False, eq=False)

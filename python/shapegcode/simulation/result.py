@@ -28,30 +28,20 @@ _NAMES = {"modal": ("residual vibration", "peak vibration"), "feed-drive": ("err
 
 @dataclass(frozen=True, eq=False)
 class RegionRun:
-    """One cutting region simulated.
+    """One cutting region simulated."""
 
-    Attributes:
-        lines: first and last of the program, from 1.
-        shaped: simulated as shaped blocks.
-        was_rapid: shaped blocks in place of a rapid.
-        time_s: until the set-points rest.
-        residual_vibration_um: largest |response - command| of each axis once the set-points rest.
-        settling_time_s: from that instant until it stays within the band; None: not within the limit, or no band.
-        period_s: time between two samples.
-        path: what it is measured against.
-        figures: what the core measured, with the samples that were recorded.
-        replay: simulates it again and keeps as many samples as one says.
-    """
-
-    lines: tuple[int, int]
-    shaped: bool
-    was_rapid: bool
-    time_s: float
-    residual_vibration_um: Xyz[float]
+    lines: tuple[int, int]  # first and last of the program, from 1
+    shaped: bool  # simulated as shaped blocks
+    was_rapid: bool  # shaped blocks in place of a rapid
+    time_s: float  # until the set-points rest
+    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis once the set-points rest
+    # from that instant until it stays within the band; None: not within the limit, or no band
     settling_time_s: Xyz[float | None]
-    period_s: float = field(metadata=hidden())
-    path: _core.Path = field(metadata=hidden())
+    period_s: float = field(metadata=hidden())  # time between two samples
+    path: _core.Path = field(metadata=hidden())  # what it is measured against
+    # what the core measured, with the samples that were recorded
     figures: _core.SimulationFigures = field(metadata=hidden())
+    # simulates it again and keeps as many samples as one says
     replay: Callable[[int], _core.SimulationFigures] = field(metadata=hidden())
 
     @property
@@ -70,20 +60,13 @@ class ShapedFigures:
     """The regions of a program that are shaped blocks, in the worse of both rules of timing, as `convert` reports them.
 
     Shaped rapids are left out.
-
-    Attributes:
-        regions: how many there are.
-        cutting_time_s: until the set-points rest.
-        residual_vibration_um: largest |response - command| of each axis once the set-points rest.
-        peak_vibration_um: before that.
-        contour_error_um: against the path that the simulation names.
     """
 
-    regions: int
-    cutting_time_s: float
-    residual_vibration_um: Xyz[float]
-    peak_vibration_um: Xyz[float]
-    contour_error_um: Tracks[ContourError]
+    regions: int  # how many there are
+    cutting_time_s: float  # until the set-points rest
+    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis once the set-points rest
+    peak_vibration_um: Xyz[float]  # before that
+    contour_error_um: Tracks[ContourError]  # against the path that the simulation names
 
 
 @dataclass(frozen=True, eq=False)

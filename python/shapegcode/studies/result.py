@@ -27,50 +27,29 @@ _UNITS = {"_um": "µm", "_s": "s"}
 
 @dataclass(frozen=True)
 class VariedKey:
-    """What was varied.
+    """What was varied."""
 
-    Attributes:
-        key: dotted name in the machine file.
-        value: what the file says.
-        unit: of its values.
-        drawn_from: in words.
-        known: the text was converted for each value.
-    """
-
-    key: str
-    value: str
-    unit: str
-    drawn_from: str
-    known: bool
+    key: str  # dotted name in the machine file
+    value: str  # what the file says
+    unit: str  # of its values
+    drawn_from: str  # in words
+    known: bool  # the text was converted for each value
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A measure over all draws.
+    """A measure over all draws."""
 
-    Attributes:
-        name: of the measure, with its unit.
-        nominal: on the machine as the file has it.
-        mean: of all draws.
-        p5: below it lie 5 %; and so the others.
-        p25: likewise.
-        p50: the median.
-        p75: likewise.
-        p95: likewise.
-        p99: likewise.
-        largest: of all draws.
-    """
-
-    name: str
-    nominal: float
-    mean: float
-    p5: float
-    p25: float
-    p50: float
-    p75: float
-    p95: float
-    p99: float
-    largest: float
+    name: str  # of the measure, with its unit
+    nominal: float  # on the machine as the file has it
+    mean: float  # of all draws
+    p5: float  # below it lie 5 %; and so the others
+    p25: float  # likewise
+    p50: float  # the median
+    p75: float  # likewise
+    p95: float  # likewise
+    p99: float  # likewise
+    largest: float  # of all draws
 
     @property
     def unit(self) -> str:
@@ -80,29 +59,17 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Decides:
-    """What a value does to the verdict.
+    """What a value does to the verdict."""
 
-    Attributes:
-        key: of the value.
-        low: least share of the limit, median of the draws in one bin of the value.
-        high: largest.
-        low_at: value at which it is least.
-        high_at: value at which it is largest.
-        first: Sobol index of first order of the share; None: not asked for.
-        total: total Sobol index.
-        first_error: half of the 95 % interval of the first, by resampling.
-        total_error: likewise.
-    """
-
-    key: str
-    low: float
-    high: float
-    low_at: str
-    high_at: str
-    first: float | None = None
-    total: float | None = None
-    first_error: float | None = None
-    total_error: float | None = None
+    key: str  # of the value
+    low: float  # least share of the limit, median of the draws in one bin of the value
+    high: float  # largest
+    low_at: str  # value at which it is least
+    high_at: str  # value at which it is largest
+    first: float | None = None  # Sobol index of first order of the share; None: not asked for
+    total: float | None = None  # total Sobol index
+    first_error: float | None = None  # half of the 95 % interval of the first, by resampling
+    total_error: float | None = None  # likewise
 
 
 def _with_error(value: float | None, error: float | None) -> str:
@@ -111,53 +78,32 @@ def _with_error(value: float | None, error: float | None) -> str:
 
 @dataclass(frozen=True)
 class RefusedDraws:
-    """Draws that could not be simulated, because there is no text for them.
+    """Draws that could not be simulated, because there is no text for them."""
 
-    Attributes:
-        values: that the converter was given, in words.
-        draws: how many.
-        why: in words.
-    """
-
-    values: str
-    draws: int
-    why: str
+    values: str  # that the converter was given, in words
+    draws: int  # how many
+    why: str  # in words
 
 
 @dataclass(frozen=True)
 class BinQuantiles:
-    """A measure over the draws in one bin of a value.
+    """A measure over the draws in one bin of a value."""
 
-    Attributes:
-        at: median of the value; of a list the rank.
-        name: of the bin.
-        low: 5 % of the measure lie below it.
-        median: half of it.
-        high: 95 %.
-    """
-
-    at: float
-    name: str
-    low: float
-    median: float
-    high: float
+    at: float  # median of the value; of a list the rank
+    name: str  # of the bin
+    low: float  # 5 % of the measure lie below it
+    median: float  # half of it
+    high: float  # 95 %
 
 
 @dataclass(frozen=True)
 class Bins:
-    """A measure over one value, bin by bin.
+    """A measure over one value, bin by bin."""
 
-    Attributes:
-        key: of the value.
-        measure: of which.
-        bins: in the order of the values.
-        numbers: the values are numbers; else choices.
-    """
-
-    key: str
-    measure: str
-    bins: tuple[BinQuantiles, ...]
-    numbers: bool
+    key: str  # of the value
+    measure: str  # of which
+    bins: tuple[BinQuantiles, ...]  # in the order of the values
+    numbers: bool  # the values are numbers; else choices
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -359,15 +305,10 @@ _SHOWN = 12
 
 @dataclass(frozen=True)
 class ChosenValue:
-    """A key of the machine file and what was chosen.
+    """A key of the machine file and what was chosen."""
 
-    Attributes:
-        key: dotted name.
-        value: as TOML.
-    """
-
-    key: str
-    value: str
+    key: str  # dotted name
+    value: str  # as TOML
 
 
 @dataclass(frozen=True)

@@ -36,169 +36,100 @@ class Placed:
 
 @dataclass(frozen=True)
 class BlockCount:
-    """How many blocks a program has.
+    """How many blocks a program has."""
 
-    Attributes:
-        read: of the original, expanded.
-        emitted: shaped ones that replace its regions.
-    """
-
-    read: int
-    emitted: int
+    read: int  # of the original, expanded
+    emitted: int  # shaped ones that replace its regions
 
 
 @dataclass(frozen=True)
 class GridTaps:
-    """A shaper on the grid of the blocks.
+    """A shaper on the grid of the blocks."""
 
-    Attributes:
-        delays: in whole block periods.
-        taps: one for each delay.
-    """
-
-    delays: tuple[int, ...]
-    taps: tuple[float, ...]
+    delays: tuple[int, ...]  # in whole block periods
+    taps: tuple[float, ...]  # one for each delay
 
 
 @dataclass(frozen=True)
 class FollowingShapers:
-    """Shapers along an axis, with which modes vary.
+    """Shapers along an axis, with which modes vary."""
 
-    Attributes:
-        axis: "x", "y" or "z".
-        position_mm: where each of them holds exactly (machine coordinates).
-        times_s: taps of each.
-        amplitudes: likewise.
-        worst_residual: largest share of a vibration that is left anywhere along the axis.
-    """
-
-    axis: str
-    position_mm: tuple[float, ...]
-    times_s: tuple[tuple[float, ...], ...]
-    amplitudes: tuple[tuple[float, ...], ...]
-    worst_residual: float
+    axis: str  # "x", "y" or "z"
+    position_mm: tuple[float, ...]  # where each of them holds exactly (machine coordinates)
+    times_s: tuple[tuple[float, ...], ...]  # taps of each
+    amplitudes: tuple[tuple[float, ...], ...]  # likewise
+    worst_residual: float  # largest share of a vibration that is left anywhere along the axis
 
 
 @dataclass(frozen=True)
 class UsedShaper:
-    """The design of a conversion.
+    """The design of a conversion."""
 
-    Attributes:
-        times_s: of the taps.
-        amplitudes: of the taps.
-        family: name of its family.
-        duration_s: of the longest shaper that acts.
-        per_axis: those of X, Y, Z that are used instead (`--per-axis`); else empty.
-        per_axis_duration_s: how long such ones would be; null: not shorter, or not looked for.
-        following: those that follow an axis; only where modes vary with its position.
-    """
-
-    times_s: tuple[float, ...]
-    amplitudes: tuple[float, ...]
-    family: str
-    duration_s: float
-    per_axis: tuple[GridTaps, ...]
-    per_axis_duration_s: float | None
+    times_s: tuple[float, ...]  # of the taps
+    amplitudes: tuple[float, ...]  # of the taps
+    family: str  # name of its family
+    duration_s: float  # of the longest shaper that acts
+    per_axis: tuple[GridTaps, ...]  # those of X, Y, Z that are used instead (`--per-axis`); else empty
+    per_axis_duration_s: float | None  # how long such ones would be; null: not shorter, or not looked for
+    # those that follow an axis; only where modes vary with its position
     following: FollowingShapers | None = field(default=None, metadata=sparse())
 
 
 @dataclass(frozen=True)
 class AppliedLimits:
-    """The tolerances of the machine file that were applied.
+    """The tolerances of the machine file that were applied."""
 
-    Attributes:
-        contour_um: largest deviation from the programmed path.
-        contour_target: of what: "response" or "command".
-        residual_ratio: of the original's residual vibration.
-        residual_floor_um: residual vibration below this passes.
-        residual_floor_increments: likewise, in least increments.
-        feed_excess_ratio: share by which the set-points may run faster than programmed.
-        plant: behind which the programs were simulated, "modal" or "feed-drive".
-        program_time_percent: largest increase of the program's time.
-        cut_time_percent: largest increase of the time of one cut.
-    """
-
-    contour_um: float
-    contour_target: str
-    residual_ratio: float
-    residual_floor_um: float
-    residual_floor_increments: float
-    feed_excess_ratio: float
-    plant: str
-    program_time_percent: float
-    cut_time_percent: float
+    contour_um: float  # largest deviation from the programmed path
+    contour_target: str  # of what: "response" or "command"
+    residual_ratio: float  # of the original's residual vibration
+    residual_floor_um: float  # residual vibration below this passes
+    residual_floor_increments: float  # likewise, in least increments
+    feed_excess_ratio: float  # share by which the set-points may run faster than programmed
+    plant: str  # behind which the programs were simulated, "modal" or "feed-drive"
+    program_time_percent: float  # largest increase of the program's time
+    cut_time_percent: float  # largest increase of the time of one cut
 
 
 @dataclass(frozen=True)
 class OverrideResidual:
-    """Residual vibration of the emitted program at another feed override.
+    """Residual vibration of the emitted program at another feed override."""
 
-    Attributes:
-        override: ratio, 0.9 = 90 %.
-        residual_um: largest of all regions.
-    """
-
-    override: float
-    residual_um: Xyz[float]
+    override: float  # ratio, 0.9 = 90 %
+    residual_um: Xyz[float]  # largest of all regions
 
 
 @dataclass(frozen=True)
 class FrequencyResidual:
-    """Residual vibration of the emitted program where every mode is off.
+    """Residual vibration of the emitted program where every mode is off."""
 
-    Attributes:
-        shift: by how many of their stated uncertainties, -1 or +1.
-        residual_um: largest of all regions.
-    """
-
-    shift: float
-    residual_um: Xyz[float]
+    shift: float  # by how many of their stated uncertainties, -1 or +1
+    residual_um: Xyz[float]  # largest of all regions
 
 
 @dataclass(frozen=True)
 class CaseVerdict:
-    """The emitted program in one case: what it leaves, beside the limit that it comes nearest to.
+    """The emitted program in one case: what it leaves, beside the limit that it comes nearest to."""
 
-    Attributes:
-        name: in words, unique.
-        block_end: "ceil" or "carry"; null where look-ahead plans the blocks anew.
-        override: feed override, 1 = 100 %.
-        mode: that is off: "x.1" as in the machine file, "all", or null.
-        shift: by how many of its stated uncertainties, -1 or +1.
-        look_ahead: the controller's look-ahead stays on.
-        starved_ms: how long the block buffer is empty once; 0: never.
-        counts: it lies in the band that the machine file states.
-        residual_um: largest of all regions.
-        contour_error_um: largest of all regions; null where it was not measured.
-        time_s: of all cuts; null where those left unchanged were not simulated.
-        within: every region keeps its limits.
-        figure: which figure takes the largest share of its limit.
-        value_um: that figure.
-        limit_um: its limit.
-        share_of_limit: their ratio; null where nothing is allowed.
-        lines: of the region that has it, first and last.
-        gouge_um: largest deviation towards the workpiece; only where its side is known.
-        excess_um: largest deviation away from it; likewise.
-    """
-
-    name: str
-    block_end: str | None
-    override: float
-    mode: str | None
-    shift: float
-    look_ahead: bool
-    starved_ms: float
-    counts: bool
-    residual_um: Xyz[float]
-    contour_error_um: Tracks[float | None]
-    time_s: float | None
-    within: bool
-    figure: str
-    value_um: float
-    limit_um: float
-    share_of_limit: float | None
-    lines: tuple[int, int]
+    name: str  # in words, unique
+    block_end: str | None  # "ceil" or "carry"; null where look-ahead plans the blocks anew
+    override: float  # feed override, 1 = 100 %
+    mode: str | None  # that is off: "x.1" as in the machine file, "all", or null
+    shift: float  # by how many of its stated uncertainties, -1 or +1
+    look_ahead: bool  # the controller's look-ahead stays on
+    starved_ms: float  # how long the block buffer is empty once; 0: never
+    counts: bool  # it lies in the band that the machine file states
+    residual_um: Xyz[float]  # largest of all regions
+    contour_error_um: Tracks[float | None]  # largest of all regions; null where it was not measured
+    time_s: float | None  # of all cuts; null where those left unchanged were not simulated
+    within: bool  # every region keeps its limits
+    figure: str  # which figure takes the largest share of its limit
+    value_um: float  # that figure
+    limit_um: float  # its limit
+    share_of_limit: float | None  # their ratio; null where nothing is allowed
+    lines: tuple[int, int]  # of the region that has it, first and last
+    # largest deviation towards the workpiece; only where its side is known
     gouge_um: Tracks[float | None] | None = field(default=None, metadata=sparse())
+    # largest deviation away from it; likewise
     excess_um: Tracks[float | None] | None = field(default=None, metadata=sparse())
 
 
@@ -215,18 +146,12 @@ class FeedExcess:
 
     The speed is that of the set-points along their own path, over one, four or sixteen shortest blocks, less two
     increments by which rounding may lengthen it; positions are matched by path length, not by time.
-
-    Attributes:
-        ratio: speed over programmed feed; 1: as programmed.
-        speed_mm_per_min: of the set-points.
-        programmed_mm_per_min: at the same place.
-        line: that programs this feed, of the original.
     """
 
-    ratio: float
-    speed_mm_per_min: float
-    programmed_mm_per_min: float
-    line: int
+    ratio: float  # speed over programmed feed; 1: as programmed
+    speed_mm_per_min: float  # of the set-points
+    programmed_mm_per_min: float  # at the same place
+    line: int  # that programs this feed, of the original
 
     def __str__(self) -> str:
         """For people."""
@@ -238,31 +163,20 @@ class FeedExcess:
 
 @dataclass(frozen=True)
 class RegionVerdict:
-    """One cut as programmed and as emitted, beside its limits.
+    """One cut as programmed and as emitted, beside its limits."""
 
-    Attributes:
-        lines: of the original, first and last.
-        emitted_lines: of the emitted program.
-        time_s: until the set-points rest.
-        residual_vibration_um: maximum of |table - command| while they rest; emitted: worse rule of block timing.
-        residual_limit_um: what the emitted one is judged by.
-        contour_error_um: of the emitted program, of what the tolerance is about.
-        original_contour_error_um: likewise of the original.
-        feed_excess: where shaped blocks run fastest against the programmed feed; null for a cut left unchanged.
-        misses: every tolerance that it leaves, in words.
-        worse: those of them in which it is worse than the original.
-    """
-
-    lines: tuple[int, int]
-    emitted_lines: tuple[int, int]
-    time_s: Pair[float]
+    lines: tuple[int, int]  # of the original, first and last
+    emitted_lines: tuple[int, int]  # of the emitted program
+    time_s: Pair[float]  # until the set-points rest
+    # maximum of |table - command| while they rest; emitted: worse rule of block timing
     residual_vibration_um: Pair[Xyz[float]]
-    residual_limit_um: Xyz[float]
-    contour_error_um: float
-    original_contour_error_um: float
+    residual_limit_um: Xyz[float]  # what the emitted one is judged by
+    contour_error_um: float  # of the emitted program, of what the tolerance is about
+    original_contour_error_um: float  # likewise of the original
+    # where shaped blocks run fastest against the programmed feed; null for a cut left unchanged
     feed_excess: FeedExcess | None
-    misses: tuple[str, ...]
-    worse: tuple[str, ...] = ()
+    misses: tuple[str, ...]  # every tolerance that it leaves, in words
+    worse: tuple[str, ...] = ()  # those of them in which it is worse than the original
 
     def over_limit(self) -> Iterator[tuple[float, float]]:
         """Residual and limit of every axis that leaves its limit, um."""
@@ -276,37 +190,27 @@ class ProgramFigures:
     """Every cut of a program, as programmed and as emitted, shaped or left unchanged.
 
     Emitted figures of shaped cuts are the worse of both rules of block timing.
-
-    Attributes:
-        residual_vibration_um: maximum of |table - command| from the instant at which the set-points rest.
-        peak_vibration_um: maximum of |table - command| before that instant.
-        contour_error_um: distance to the programmed path of command and table.
-        rapid_vibration_um: maximum of |table - command| behind a rapid that a cut follows; it is held to no limit.
-        orbit_error_percent: per arc: area between emitted command and arc over the area of its sector.
-        override_residual: residual vibration of the shaped cuts at 80, 90, 110 and 120 %.
-        frequency_residual: with every mode off by its uncertainty; empty where none states one.
-        slowed_blocks: emitted blocks that step an axis by more than the corner limit of the look-ahead.
-        feed_excess: where the emitted blocks run fastest against the programmed feed; null where nothing was shaped.
-        cases: the operating conditions in which the emitted program was simulated; those that do not count are of the
-            shaped cuts alone.
-        worst_case: the one that decides; null without cuts.
-        regions: the shaped cuts, in the order of the program.
-        unchanged: the cuts left unchanged, likewise.
     """
 
+    # maximum of |table - command| from the instant at which the set-points rest
     residual_vibration_um: Pair[Xyz[float]]
-    peak_vibration_um: Pair[Xyz[float]]
-    contour_error_um: Tracks[Pair[ContourError]]
+    peak_vibration_um: Pair[Xyz[float]]  # maximum of |table - command| before that instant
+    contour_error_um: Tracks[Pair[ContourError]]  # distance to the programmed path of command and table
+    # maximum of |table - command| behind a rapid that a cut follows; it is held to no limit
     rapid_vibration_um: Pair[Xyz[float]]
-    orbit_error_percent: tuple[float, ...]
-    override_residual: tuple[OverrideResidual, ...]
+    orbit_error_percent: tuple[float, ...]  # per arc: area between emitted command and arc over the area of its sector
+    override_residual: tuple[OverrideResidual, ...]  # residual vibration of the shaped cuts at 80, 90, 110 and 120 %
+    # with every mode off by its uncertainty; empty where none states one
     frequency_residual: tuple[FrequencyResidual, ...]
-    slowed_blocks: int
+    slowed_blocks: int  # emitted blocks that step an axis by more than the corner limit of the look-ahead
+    # where the emitted blocks run fastest against the programmed feed; null where nothing was shaped
     feed_excess: FeedExcess | None
+    # the operating conditions in which the emitted program was simulated; those that do not count are of the shaped
+    # cuts alone
     cases: tuple[CaseVerdict, ...]
-    worst_case: CaseVerdict | None
-    regions: tuple[RegionVerdict, ...]
-    unchanged: tuple[RegionVerdict, ...]
+    worst_case: CaseVerdict | None  # the one that decides; null without cuts
+    regions: tuple[RegionVerdict, ...]  # the shaped cuts, in the order of the program
+    unchanged: tuple[RegionVerdict, ...]  # the cuts left unchanged, likewise
 
     @property
     def all_cuts(self) -> list[RegionVerdict]:
